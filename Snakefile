@@ -49,7 +49,6 @@ rule all:
         rules.metrics.input,
         rules.figures.input,
         rules.quality.input,
-        rules.study_warnings.output,
         rules.report.input,
 
 

@@ -1,4 +1,4 @@
-# Quality control before the solve: a page and a verdict for each brain, and the warnings of all steps.
+# Quality control before the solve: a page and a verdict for each brain.
 from gyriflow.study import reporting
 
 
@@ -31,21 +31,6 @@ rule quality_table:
         order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
     script:
         "../scripts/quality_table.py"
-
-
-# logs are no inputs: what has warned is known once all is done
-rule study_warnings:
-    input:
-        rules.figures.input,
-        rules.metrics.input,
-        rules.quality_table.output,
-    output:
-        f"{STUDY}/warnings.csv",
-    params:
-        brains=[brain.id for brain in CONFIG.brains],
-        folded=study.pairs,
-    script:
-        "../scripts/study_warnings.py"
 
 
 rule quality:

@@ -31,26 +31,14 @@ rule register:
 
 
 # the surfaces as they are given, with all their vertices, in the pose of the mesh
-rule matched_surface:
-    input:
-        from_brain("given.files"),
-        report=PIAL["report"],
-    output:
-        MATCHED_SURFACE,
-    params:
-        files=from_brain("given.files"),
-    script:
-        "../scripts/matched_surface.py"
-
-
 rule match_surfaces:
     input:
-        earlier=MATCHED_SURFACE.format(brain="{earlier}"),
-        later=MATCHED_SURFACE.format(brain="{later}"),
-        earlier_report=PIAL["report"].format(brain="{earlier}"),
-        later_report=PIAL["report"].format(brain="{later}"),
+        lambda w: study.brains[w.earlier].given.files + study.brains[w.later].given.files,
+        reports=[PIAL["report"].format(brain=name) for name in ("{earlier}", "{later}")],
     output:
         MATCHED,
+    params:
+        files=lambda w: [study.brains[name].given.files for name in (w.earlier, w.later)],
     script:
         "../scripts/match_surfaces.py"
 

@@ -1,20 +1,21 @@
-# What the jobs took, and the report: one HTML page with the figures and tables of the registry.
+# What the jobs took and warned of, and the report: one HTML page with the figures and tables of the registry.
 from itertools import takewhile
 
 PAGE = f"{workflow.basedir}/workflow/report/page"
-PICTURE_BYTES = 9_000_000
 
 
 rule study_resources:
     input:
-        # the files of benchmarks are no inputs: a lost one would have its stage run again
+        # logs and the files of benchmarks are no inputs: a lost one would have its stage run again
         rules.figures.input,
         rules.metrics.input,
         rules.quality_table.output,
     output:
         csv=f"{STUDY}/resources.csv",
         table=f"{STUDY}/resources.html",
+        warnings=f"{STUDY}/warnings.csv",
     params:
+        brains=[brain.id for brain in CONFIG.brains],
         # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
         benchmarks=lambda w: {
             job.name: job.benchmark.regex().pattern
@@ -26,32 +27,6 @@ rule study_resources:
         "../scripts/study_resources.py"
 
 
-rule report_provenance:
-    input:
-        rules.metrics.input,
-    output:
-        "results/report/provenance.json",
-    params:
-        files=reporting.input_files(study),
-    script:
-        "../scripts/report_provenance.py"
-
-
-rule methods:
-    input:
-        params=study.files(PARAMETERS),
-        summaries=study.files(FOLDING["summary"]),
-        provenance=rules.report_provenance.output[0],
-        template=f"{PAGE}/methods.rst",
-    output:
-        "results/report/methods.rst",
-    params:
-        folded=study.pairs,
-        used=reporting.method(study),
-    script:
-        "../scripts/methods.py"
-
-
 rule html_report:
     input:
         rules.figures.input,
@@ -60,12 +35,13 @@ rule html_report:
         asked_for(FIGURES, "report", "quality"),
         runs=rules.study_runs.output.csv,
         quality=rules.quality_table.output[0],
-        warnings=rules.study_warnings.output[0],
+        warnings=rules.study_resources.output.warnings,
         validation=f"{STUDY}/validation.csv" if study.validated else [],
-        provenance=rules.report_provenance.output[0],
-        methods=rules.methods.output[0],
+        run_params=study.files(PARAMETERS),
+        summaries=study.files(FOLDING["summary"]),
         view=asked_for(FIGURES, "view")[0],
         words=f"{workflow.basedir}/workflow/report/figures.yaml",
+        template=f"{PAGE}/methods.rst",
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
@@ -73,11 +49,17 @@ rule html_report:
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:
-        "results/report/report.html",
+        page="results/report/report.html",
+        methods="results/report/methods.rst",
+        provenance="results/report/provenance.json",
+        # the configuration with its paths, for those who have the files
+        config="results/report/config.yaml",
     params:
         figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
-        picture_bytes=PICTURE_BYTES,
         brains=reporting.described_brains(study),
+        files=reporting.input_files(study),
+        folded=study.pairs,
+        method=reporting.method(study),
         config=reporting.used_settings(study),
     script:
         "../scripts/html_report.py"
@@ -100,20 +82,9 @@ rule provenance:
         "../scripts/provenance.py"
 
 
-# the configuration with its paths, for those who have the files
-rule report_config:
-    output:
-        "results/report/config.yaml",
-    params:
-        config=reporting.used_settings(study),
-    script:
-        "../scripts/report_config.py"
-
-
 rule report:
     input:
         rules.html_report.output,
-        rules.report_config.output,
         rules.provenance.output,
 
 
@@ -121,5 +92,4 @@ rule report:
 localrules:
     atlas_file,
     parameters,
-    methods,
     html_report,

@@ -1,8 +1,6 @@
 # What compares the runs of a study with each other and with the measured brains.
 # the tables of a study, and the files that each is joined from
 JOINED = {**study.tables, **study.validation_tables}
-# the tables that hold metrics, of whole hemispheres and of regions
-METRIC_TABLES = [f"{STUDY}/{table}.csv" for table in ("metrics", "regions") if JOINED[table]]
 
 
 rule study_table:
@@ -16,50 +14,25 @@ rule study_table:
         "../scripts/join_tables.py"
 
 
-rule spectral_distance:
-    input:
-        f"{STUDY}/spectra.csv",
-    output:
-        f"{STUDY}/spectral_distance.csv",
-    script:
-        "../scripts/spectral_distance.py"
-
-
-rule asymmetry:
-    input:
-        metrics=METRIC_TABLES[0],
-        regions=METRIC_TABLES[1:],
-    output:
-        f"{STUDY}/asymmetry.csv",
-    script:
-        "../scripts/asymmetry.py"
-
-
-rule centiles:
+rule derived_tables:
     input:
         metrics=f"{STUDY}/metrics.csv",
+        regions=f"{STUDY}/regions.csv" if study.tables["regions"] else [],
+        spectra=f"{STUDY}/spectra.csv",
     output:
-        norms=f"{STUDY}/norms.csv",
-        curves=f"{STUDY}/norm_curves.csv",
-        centiles=f"{STUDY}/centiles.csv",
-    params:
-        reference=study.norm_reference,
-    script:
-        "../scripts/centiles.py"
-
-
-rule group_tables:
-    input:
-        METRIC_TABLES,
-    output:
-        long=f"{STUDY}/metrics_long.csv",
-        wide=f"{STUDY}/metrics_wide.csv",
-        change=f"{STUDY}/change.csv",
+        **{
+            name: f"{STUDY}/{name}.csv"
+            for name in (
+                *("metrics_long", "metrics_wide", "change", "asymmetry"),
+                *("norms", "norm_curves", "centiles", "spectral_distance"),
+            )
+        },
     params:
         scans=study.scans,
         covariates={brain.id: brain.given.covariates for brain in study.brains.values()},
+        reference=study.norm_reference,
     script:
-        "../scripts/group_tables.py"
+        "../scripts/derived_tables.py"
 
 
 EXPORTED = study.exported
@@ -83,8 +56,8 @@ rule export:
             if brain["volume"]
             for file in ("labels", "surface", "thickness")
         ],
-        long=rules.group_tables.output.long,
-        wide=rules.group_tables.output.wide,
+        long=rules.derived_tables.output.metrics_long,
+        wide=rules.derived_tables.output.metrics_wide,
     output:
         # a folder would hold a file of Snakemake's
         "results/export/dataset_description.json",
@@ -117,8 +90,5 @@ rule metrics:
             rules.study_table.output,
             table=[name for name, files in study.tables.items() if files],
         ),
-        rules.spectral_distance.output,
-        rules.asymmetry.output,
-        rules.centiles.output,
-        rules.group_tables.output,
+        rules.derived_tables.output,
         rules.validate.input,

@@ -57,34 +57,24 @@ for name, (source, sides) in PIAL_RULES.items():
             "../scripts/pial.py"
 
 
-for name, source in (
-    ("cortical_thickness", "labels"),
-    ("thickness_from_white", "white"),
-):
-
-    rule:
-        name:
-            name
-        input:
-            given=lambda w: list(study.brains[w.brain].thickness_from.values()),
-            surface=PIAL["whole"],
-            report=PIAL["report"],
-        output:
-            **THICKNESS,
-        wildcard_constraints:
-            brain=brains_with(
-                lambda brain: brain.thickness_from
-                and ("labels" in brain.thickness_from) == (source == "labels")
-            ),
-        resources:
-            mem_mb=surface_memory,
-        params:
-            # exchanged files are the same inputs to Snakemake
-            given=from_brain("thickness_from"),
-            affine_from=from_brain("given.affine_from"),
-            scheme=from_brain("scheme"),
-        script:
-            "../scripts/thickness.py"
+rule cortical_thickness:
+    input:
+        given=lambda w: list(study.brains[w.brain].thickness_from.values()),
+        surface=PIAL["whole"],
+        report=PIAL["report"],
+    output:
+        **THICKNESS,
+    wildcard_constraints:
+        brain=brains_with(lambda brain: brain.thickness_from),
+    resources:
+        mem_mb=surface_memory,
+    params:
+        # exchanged files are the same inputs to Snakemake
+        given=from_brain("thickness_from"),
+        affine_from=from_brain("given.affine_from"),
+        scheme=from_brain("scheme"),
+    script:
+        "../scripts/thickness.py"
 
 
 rule surface:

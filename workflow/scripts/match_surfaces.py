@@ -1,14 +1,21 @@
 """Where the vertices of a brain's surface are in another brain whose surface has the same ones."""
 
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.growth.matched_surfaces import match_surfaces
+from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.growth.matched_surfaces import match_surfaces, outward
 from gyriflow.io.registrations import write_matched_surfaces
 from gyriflow.io.surfaces import read_pose, read_surface
+from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 
-files = snakemake.input
-with step(snakemake.log[0], files.earlier, files.later):
-    found, report = match_surfaces(read_surface(files.earlier), read_surface(files.later))
+first, second = snakemake.params.files
+with step(snakemake.log[0], *first, *second):
+    poses, surfaces = [read_pose(path) for path in snakemake.input.reports], []
+    for files, pose in zip((first, second), poses, strict=True):
+        # hemispheres may have come in poses of their own
+        sides = zip(files, SIDES[: len(files)], strict=True)
+        surfaces.append(merged(*(transformed(outward(read_surface(path)), pose.of_file(side)) for path, side in sides)))
+    found, report = match_surfaces(*surfaces)
     # correspondences are between the brains' own worlds, as registrations are
-    first, second = (read_pose(path).inverse for path in (files.earlier_report, files.later_report))
-    write_matched_surfaces(snakemake.output[0], between_moved(found, first, second), report)
+    between = between_moved(found, *(pose.inverse for pose in poses))
+    write_matched_surfaces(snakemake.output[0], between, report)

@@ -1,8 +1,8 @@
-"""Time, memory, energy and emissions of all jobs: as a table, and as a page for the report."""
+"""Time, memory, energy and emissions of all jobs, as a table and as a page for the report, and their warnings."""
 
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import write_table
-from gyriflow.io.jobs import read_benchmarks
+from gyriflow.io.jobs import gather_messages, read_benchmarks
 from gyriflow.parameters.terms import run_names
 from gyriflow.report.resources import resources
 from gyriflow.report.tables import html_table
@@ -20,3 +20,4 @@ with step(snakemake.log[0]):
     table = resources(jobs)
     write_table(output.csv, table)
     write_html(output.table, html_table(table))
+    write_table(output.warnings, gather_messages(".", params.brains, params.folded))

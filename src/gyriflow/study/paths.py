@@ -72,7 +72,6 @@ THICKNESS = {
     "report": f"{BRAIN}/surface/thickness.json",
 }
 MASK = f"{BRAIN}/surface/mask.nii.gz"
-MATCHED_SURFACE = f"{BRAIN}/surface/matched.surf.gii"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
 MESH = {

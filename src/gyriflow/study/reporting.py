@@ -81,5 +81,4 @@ def quality_files(brain: Brain) -> dict[str, Any]:
 def surface_logs(brain: Brain) -> list[str]:
     """Return the logs of the steps that have made a brain's surface and thickness."""
     made_by = [rule for rule, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
-    rules = (*made_by, "cortical_thickness", "thickness_from_white")
-    return [f"results/brains/{brain.id}/logs/{rule}.log" for rule in rules]
+    return [f"results/brains/{brain.id}/logs/{rule}.log" for rule in (*made_by, "cortical_thickness")]
