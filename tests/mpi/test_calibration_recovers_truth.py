@@ -6,9 +6,7 @@ import pytest
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
-from gyriflow.compare.design import calibrated_parameters, sobol_design
-from gyriflow.compare.scores import size_score
-from gyriflow.compare.surrogate import fit, optimum, propose
+from gyriflow.compare.calibration import calibrated_parameters, fit, optimum, propose, size_score, sobol_design
 from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface

@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.compare.design import sobol_design
-from gyriflow.compare.surrogate import fit, propose
+from gyriflow.compare.calibration import fit, propose, sobol_design
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

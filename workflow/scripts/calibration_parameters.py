@@ -1,6 +1,6 @@
 """The parameters of a run of the calibration: those of the base run with the values of the run's round."""
 
-from gyriflow.compare.design import calibrated_parameters
+from gyriflow.compare.calibration import calibrated_parameters
 from gyriflow.io.files import read_table
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.step import step

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from gyriflow.compare.scores import shape_scores, size_score
+from gyriflow.compare.calibration import shape_scores, size_score
 from gyriflow.compare.shapes import Shape, ready
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.compare.surrogate import fit, optimum
+from gyriflow.compare.calibration import fit, optimum
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

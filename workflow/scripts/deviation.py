@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import KDTree
 
-from gyriflow.compare.deviation import deviation_maps, thickness_difference_mm
+from gyriflow.compare.prediction import deviation_maps
 from gyriflow.geometry.alignment import fit_onto
 from gyriflow.geometry.matching import match_points, values_at
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
@@ -28,9 +28,9 @@ with step(snakemake.log[0]):
     maps = deviation_maps(expected, fitted)
     if files.thickness:
         at_start, run_at_start, run, found = (read_vertex_maps(path)["thickness_mm"] for path in files.thickness)
-        maps["thickness_difference_mm"] = thickness_difference_mm(
-            at(fitted, real, found), at(first, start, at_start), run_at_start, run
-        )
+        # that of the start brain grows as the run has it grow
+        grown = at(first, start, at_start) * run / run_at_start
+        maps["thickness_difference_mm"] = at(fitted, real, found) - grown
     write_vertex_maps(snakemake.output.maps, maps)
     parts = {"whole": surface, **dict(zip(params.sides, map(read_surface, files.sides), strict=True))}
     places = {part: KDTree(surface.vertices).query(mesh.vertices)[1] for part, mesh in parts.items()}

@@ -2,9 +2,10 @@
 
 import pandas as pd
 
-from gyriflow.compare.onset import named, onset, regions_on, relief, sulcal_regions
+from gyriflow.compare.onset import named, onset, relief, sulcal_regions
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.triangles import convex_hull, transformed
+from gyriflow.geometry.matching import labels_at, match_points
+from gyriflow.geometry.triangles import TriangleMesh, convex_hull, transformed, vertex_normals
 from gyriflow.growth.carrying import carry_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.registrations import read_correspondence
@@ -18,8 +19,8 @@ files, params, tables = snakemake.input, snakemake.params, []
 
 def places(mesh, index):
     """Return the last brain's sulci on a surface in the pose of the brain of an index."""
-    points = carry_surface(transformed(mesh, poses[index].inverse), between[index:])
-    return regions_on(mesh, transform_points(points, poses[-1].world), real[-1], last)
+    points = transform_points(carry_surface(transformed(mesh, poses[index].inverse), between[index:]), poses[-1].world)
+    return labels_at(match_points(points, vertex_normals(TriangleMesh(points, mesh.faces)), real[-1]), last)
 
 
 with step(snakemake.log[0]):

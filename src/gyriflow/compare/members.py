@@ -9,7 +9,7 @@ import pandas as pd
 from ..parameters.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
 
 SIZES = ("area", "volume", "gyrification_index")
-"""Metrics of whole brains whose relative difference from the real one is a measure."""
+"""Metrics whose relative difference from the real brain's is a measure."""
 MODES = "weyl_number"
 """The metric that says at how many modes the spectrum of a hemisphere is cut."""
 COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")

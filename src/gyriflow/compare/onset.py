@@ -8,7 +8,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -17,7 +16,6 @@ from ..geometry.triangles import (
     face_components,
     submesh,
     vertex_areas,
-    vertex_normals,
 )
 
 DEEP_MM = 2.0
@@ -51,12 +49,6 @@ def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats)
     for name, number in enumerate(largest, start=1):
         regions[used[np.unique(part.faces[component == number])]] = name
     return regions
-
-
-def regions_on(mesh: TriangleMesh, carried: Floats, target: TriangleMesh, regions: NDArray[np.integer]) -> Ints:
-    """Return the (n,) regions of a surface whose vertices were `carried`, (n, 3), into the space of the `target`."""
-    match = match_points(carried, vertex_normals(TriangleMesh(carried, mesh.faces)), target)
-    return labels_at(match, regions)
 
 
 def relief(

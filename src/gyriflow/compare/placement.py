@@ -30,10 +30,9 @@ def correlation(one: Floats, other: Floats, weights: Floats) -> float:
 
 
 def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
-    """Return (r − r_start)/(r_adjacent − r_start) from two weeks after the start on; NaN before.
+    """Return (r − r_start)/(r_adjacent − r_start): 1 is as good as the real brain of the week before, 0 as the start.
 
-    1 is as good as the real brain of the week before, 0 as the start brain scaled up. After one week the adjacent brain
-    is the start itself. NaN also where the adjacent week is no better than the start.
+    NaN within two weeks of the start, and where the adjacent week is no better than the start.
     """
     room = r_adjacent - r_start
     return float((r - r_start) / room) if horizon > SKILLED_FROM and room > 0 else float("nan")
@@ -50,15 +49,7 @@ def values_on(real: Shape, other: Shape) -> tuple[dict[str, Floats], float]:
     return values, float(np.average(match.agrees, weights=real.areas))
 
 
-def placement(
-    real: Shape,
-    run: Shape,
-    start: Shape,
-    adjacent: Shape | None,
-    *,
-    horizon: float,
-    seed: int,
-) -> dict[str, float | bool]:
+def placement(real: Shape, run: Shape, start: Shape, adjacent: Shape, *, horizon: float) -> dict[str, float | bool]:
     """Tell how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
 
     Correlations are those of `values_on`, weighted by area over the whole surface. For each of `MEASURES`: r_…,
@@ -66,12 +57,11 @@ def placement(
     replacement (Efron and Tibshirani 1993), and skill_…. matched_share is the part of the real surface's area for which
     an agreeing point of the run was found. asymmetry_mm and mirrored_patches are those of `drawn_patches`.
 
-    `start` is the start brain scaled up: no folding at all; `adjacent` the real brain of the week before, if there is
-    one. The horizon is in weeks since the start, the seed that of the bootstrap.
+    `start` is the start brain scaled up: no folding at all; `adjacent` the real brain of the week before. The horizon
+    is in weeks since the start.
     """
     on_run, share = values_on(real, run)
-    on_start, _ = values_on(real, start)
-    on_adjacent, _ = values_on(real, adjacent) if adjacent else ({}, 0.0)
+    (on_start, _), (on_adjacent, _) = values_on(real, start), values_on(real, adjacent)
     patch, drawn = drawn_patches(real)
     row = {"matched_share": share} | drawn
     areas = real.areas
@@ -79,8 +69,8 @@ def placement(
         truth = getattr(real, measure)
         r = correlation(truth, on_run[measure], areas)
         r_start = correlation(truth, on_start[measure], areas)
-        r_adjacent = correlation(truth, on_adjacent[measure], areas) if adjacent else np.nan
-        low, high = gain_interval(truth, on_run[measure], on_start[measure], areas, patch, seed=seed)
+        r_adjacent = correlation(truth, on_adjacent[measure], areas)
+        low, high = gain_interval(truth, on_run[measure], on_start[measure], areas, patch)
         row |= {
             f"r_{measure}": r,
             f"r_start_{measure}": r_start,
@@ -134,7 +124,7 @@ def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | No
 
 
 def gain_interval(
-    truth: Floats, run: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer], *, seed: int
+    truth: Floats, run: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer], *, seed: int = 0
 ) -> tuple[float, float]:
     """Return the 95 % interval of r(run) − r(start) when whole patches of the surface are drawn with replacement."""
     drawn = draw_patches(patch, seed=seed)
@@ -143,7 +133,7 @@ def gain_interval(
     return float(low), float(high)
 
 
-def draw_patches(patch: NDArray[np.integer], *, seed: int) -> Ints:
+def draw_patches(patch: NDArray[np.integer], *, seed: int = 0) -> Ints:
     """Draw patches with replacement: how often each of p is drawn, (DRAWS, p)."""
     count = int(patch.max()) + 1
     return np.random.default_rng(seed).multinomial(count, np.full(count, 1 / count), size=DRAWS)

@@ -1,4 +1,4 @@
-"""What a predicted brain is worth: its distance from the real one, its size and folds, beside simpler predictions."""
+"""What a predicted brain is worth beside simpler predictions, and how the real brain deviates from the expected one."""
 
 from typing import Any
 
@@ -7,6 +7,7 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import fit_onto
+from ..geometry.diffusion import diffuse
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import (
@@ -22,6 +23,9 @@ from ..geometry.triangles import (
 )
 from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, values_on
 from .shapes import EDGE_MM, Shape, cortex_dice
+
+SMOOTHING_MM = 3.0
+"""Standard deviation that areas are smoothed with before they are compared."""
 
 
 def apart(predicted: TriangleMesh, real: TriangleMesh, real_even: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
@@ -94,7 +98,7 @@ def endpoints(
     placed = transformed(predicted, fit_onto(predicted, real))
     pair, areas = apart(placed, real, real_shape.mesh), real_shape.areas
     values, _ = values_on(real_shape, shape)
-    drawn = draw_patches(patch, seed=0)
+    drawn = draw_patches(patch)
     away = drawn_distances(pair, real_shape.mesh.vertices, patch, drawn)
     r = drawn_correlations(real_shape.shape_index, values["shape_index"], areas, patch, drawn)
     row: dict[str, Any] = distances(pair) | {
@@ -127,3 +131,21 @@ def with_skill(rows: pd.DataFrame) -> pd.DataFrame:
     skill, drawn = (1 - rows[name] / rows["week"].map(best[name]) for name in ("distance_mm", "drawn_mm"))
     low, high = np.array([np.quantile(values, INTERVAL) for values in drawn]).T
     return rows.drop(columns="drawn_mm").assign(skill=skill, skill_low=low, skill_high=high)
+
+
+def deviation_maps(expected: TriangleMesh, real: TriangleMesh) -> dict[str, Floats]:
+    """Return distance_mm and log_area at the (n,) vertices of the expected surface.
+
+    The distance is along the normal, positive where the real brain lies outside; the other is the logarithm of the real
+    over the expected area.
+
+    Parameters
+    ----------
+    expected, real
+        The expected surface in the pose of the real one, and the same moved onto that.
+    """
+    ratio = vertex_areas(real) / vertex_areas(expected)
+    return {
+        "distance_mm": ((real.vertices - expected.vertices) * vertex_normals(expected)).sum(axis=1),
+        "log_area": np.log(diffuse(expected.vertices, expected.faces, ratio, SMOOTHING_MM)),
+    }

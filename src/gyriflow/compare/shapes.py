@@ -1,7 +1,4 @@
-"""Surfaces made ready for comparison: the real brain's volume, even triangles, one pose; and what folds they have.
-
-Folds wherever they are: curvature's size and distribution.
-"""
+"""Surfaces made ready for comparison: the real brain's volume, even triangles, one pose; and what folds they have."""
 
 from dataclasses import dataclass
 
@@ -44,10 +41,6 @@ class Shape:
     shape_index: Floats
 
     def __post_init__(self) -> None:
-        for name in ("mean_curvature", "shape_index"):
-            values = getattr(self, name)
-            if np.shape(values) != (len(self.mesh.vertices),):
-                raise ValueError(f"{name} of shape {np.shape(values)} for {len(self.mesh.vertices)} vertices")
         clipped = np.clip(self.mean_curvature, -LARGEST_CURVATURE, LARGEST_CURVATURE)
         object.__setattr__(self, "mean_curvature", clipped)
 

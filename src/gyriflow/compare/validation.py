@@ -33,7 +33,7 @@ def validation_row(
     run: Shape,
     real: Shape,
     start: Shape,
-    adjacent: Shape | None,
+    adjacent: Shape,
 ) -> dict[str, Any]:
     """Return a row of validation.csv.
 
@@ -58,17 +58,15 @@ def validation_row(
         quantity, _ = name.split("_")
         row[f"{quantity}_error"] = row[name] / row[f"curve_{name}"] - 1
         row[f"{quantity}_difference"] = row[name] / row[f"real_{name}"] - 1
-    row |= placement(real, run, start, adjacent, horizon=horizon, seed=0)
+    row |= placement(real, run, start, adjacent, horizon=horizon)
     return row | against_real(run, real)
 
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Make a table of rows of `validation_row`, what is compared first, by run, start and week."""
     first = ["run", "kind", "start_week", "week", "horizon", "distance_mm", "distance95_mm", "cortex_dice"]
-    table = pd.DataFrame(rows)
-    return table[[*first, *table.columns.difference(first, sort=False)]].sort_values(
-        ["run", "start_week", "week"], ignore_index=True
-    )
+    table = pd.DataFrame(rows).sort_values(["run", "start_week", "week"], ignore_index=True)
+    return table[[*first, *table.columns.difference(first, sort=False)]]
 
 
 def _sizes(mesh: TriangleMesh) -> dict[str, float]:
@@ -104,8 +102,8 @@ def displacement_table(
     nothing joins hemispheres that are bodies of their own, so that growth does not say how they lie to each other.
 
     Weeks ascend; simulated and measured are (w, n, 3) positions in mm of the same vertices, of the run and carried
-    along the registration; faces the (m, 3) triangles of the closed surface. Growth that came
-    from that very registration (`registered`) tests the solver's consistency, not the model.
+    along the registration; faces the (m, 3) triangles. Growth that came from that very registration (`registered`)
+    tests the solver's consistency, not the model.
 
     Returns
     -------
@@ -136,16 +134,12 @@ def displacement_table(
             moved[piece] = without_rigid_motion(first, then, by_area) @ turn.T
             moved_really[piece] = without_rigid_motion(real_first, real_then, by_area)
             scaled[piece] = scale * (real_first - np.average(real_first, axis=0, weights=by_area))
-        r, slope = vector_agreement(moved, moved_really, weights)
-        r_scaling, slope_scaling = vector_agreement(scaled, moved_really, weights)
         row: dict[str, Any] = {"from_week": weeks[number], "to_week": weeks[number + 1]}
-        row |= {"test": "consistency" if registered else "comparison"}
-        row |= {"displacement_r": r, "displacement_slope": slope}
-        row |= {"displacement_r_scaling": r_scaling, "displacement_slope_scaling": slope_scaling}
-        row |= {"rms_mm": _rms(moved, weights), "measured_rms_mm": _rms(moved_really, weights)}
+        row["test"] = "consistency" if registered else "comparison"
+        for end, vectors in (("", moved), ("_scaling", scaled)):
+            agreement = vector_agreement(vectors, moved_really, weights)
+            row[f"displacement_r{end}"], row[f"displacement_slope{end}"] = agreement
+        for name, vectors in (("rms_mm", moved), ("measured_rms_mm", moved_really)):
+            row[name] = float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights)))
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _rms(vectors: Floats, weights: Floats) -> float:
-    return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=weights)))

@@ -1,14 +1,26 @@
-"""Designs fill their bounds, and the surrogate finds a known least."""
+"""Designs fill their bounds, scores grow with what differs, and the surrogate finds a known least."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.compare.design import calibrated_parameters, in_unit_box, sobol_design
-from gyriflow.compare.surrogate import fit, optimum, propose
+from gyriflow.compare.calibration import (
+    calibrated_parameters,
+    fit,
+    in_unit_box,
+    optimum,
+    propose,
+    shape_scores,
+    size_score,
+    sobol_design,
+)
+from gyriflow.geometry.triangles import TriangleMesh
+
+from .bumpy import bumpy, shaped
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
+SCORES = ("shape_index", "mean_curvature", "curvature_distribution")
 
 
 def scored(design):
@@ -68,3 +80,24 @@ def test_values_take_their_places_in_the_parameters():
     led = calibrated_parameters(base, {"growth.area_cm2.amplitude": 1.1}, 25.0)
     assert led["growth"]["area_cm2"] == pytest.approx({21.0: 99.0, 25.0: 165.0})
     assert base["contact"]["gap_mm"] == 2.5
+
+
+def test_the_same_brain_has_the_score_0():
+    shape = shaped(bumpy(1))
+    assert shape_scores(shape, shape, SCORES) == pytest.approx(dict.fromkeys(SCORES, 0.0), abs=1e-9)
+    assert size_score(shape.mesh, shape.mesh) == 0
+
+
+def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution():
+    one, same, other = shaped(bumpy(1)), shaped(bumpy(1, height=1.05)), shaped(bumpy(2))
+    near, far = shape_scores(same, one, SCORES), shape_scores(other, one, SCORES)
+    assert near["shape_index"] < 0.1 < far["shape_index"]
+    assert near["mean_curvature"] < 0.1 < far["mean_curvature"]
+    flat = shape_scores(shaped(bumpy(1, height=0.05)), one, SCORES)
+    assert flat["curvature_distribution"] > 3 * far["curvature_distribution"]
+
+
+def test_a_brain_scaled_by_a_tenth_differs_in_area_and_volume():
+    mesh = bumpy(1)
+    larger = TriangleMesh(1.1 * mesh.vertices, mesh.faces)
+    assert size_score(larger, mesh) == pytest.approx(np.hypot(1.1**2 - 1, 1.1**3 - 1))

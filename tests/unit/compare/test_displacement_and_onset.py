@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 import trimesh
 
-from gyriflow.compare.onset import named, onset, regions_on, relief, sulcal_regions
+from gyriflow.compare.onset import named, onset, relief, sulcal_regions
 from gyriflow.compare.validation import displacement_table, vector_agreement
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
@@ -123,7 +123,7 @@ def test_what_is_there_at_the_start_has_no_onset_and_an_unknown_week_is_skipped(
     assert unknown.loc["central", "onset_week"] == 24.0
 
 
-def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surface():
+def test_sulci_are_valleys_found_by_their_depth():
     mesh, depths = groove(4.0)
     bend = np.where(depths > 1.0, -0.2, 0.05)
     regions = sulcal_regions(mesh, depths, bend)
@@ -131,9 +131,6 @@ def test_sulci_are_valleys_found_by_their_depth_and_carried_to_an_earlier_surfac
     inside = regions == 1
     assert depths[inside].min() >= 2.0 > depths[~inside].min()
     assert not sulcal_regions(mesh, depths, np.abs(bend)).any()
-    smooth, _ = groove(0.0)
-    found = regions_on(smooth, np.asarray(smooth.vertices), mesh, regions)
-    assert np.mean((found == 1) == inside) > 0.98
     assert not sulcal_regions(*groove(1.0), bend).any()
 
 

@@ -1,4 +1,4 @@
-"""What a foretold brain is worth: known distances, sizes, roughness and skill."""
+"""What a foretold brain is worth, and how the real one deviates from it: known distances, sizes, roughness, skill."""
 
 import numpy as np
 import pandas as pd
@@ -6,13 +6,7 @@ import pytest
 from shapes import rigid, sphere
 
 from gyriflow.compare.placement import patches
-from gyriflow.compare.prediction import (
-    apart,
-    distances,
-    endpoints,
-    roughness_mm,
-    with_skill,
-)
+from gyriflow.compare.prediction import apart, deviation_maps, distances, endpoints, roughness_mm, with_skill
 from gyriflow.compare.shapes import ready
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.report.labels import SIMPLER_WAYS
@@ -95,3 +89,29 @@ def test_skill_is_against_the_best_simple_way_of_the_week():
     assert (found[23, "run"], found[23, "atlas_deformed"]) == pytest.approx((-1.0, 0.0))
     alone = with_skill(rows[rows["model"] == "run"])
     assert alone[["skill", "skill_low", "skill_high"]].isna().all(axis=None)
+
+
+BALL = sphere(20.0)
+
+
+def scaled(factors):
+    return TriangleMesh(BALL.vertices * factors, BALL.faces)
+
+
+def test_a_larger_ball_lies_outside_and_has_more_area():
+    maps = deviation_maps(BALL, scaled(1.1))
+    np.testing.assert_allclose(maps["distance_mm"], 2.0, atol=0.01)
+    np.testing.assert_allclose(maps["log_area"], 2 * np.log(1.1), atol=1e-6)
+    smaller = deviation_maps(BALL, scaled(0.9))
+    assert (smaller["distance_mm"] < 0).all()
+    assert (smaller["log_area"] < 0).all()
+
+
+def test_what_deviates_in_one_place_does_so_there_alone():
+    top = np.linalg.norm(BALL.vertices - [0, 0, 20], axis=1) < 12
+    maps = deviation_maps(BALL, scaled(np.where(top, 1.1, 1.0)[:, None]))
+    assert maps["distance_mm"][top] == pytest.approx(2.0, abs=0.05)
+    assert not maps["distance_mm"][~top].any()
+    pole, opposite = BALL.vertices[:, 2].argmax(), BALL.vertices[:, 2].argmin()
+    assert maps["log_area"][pole] == pytest.approx(2 * np.log(1.1), abs=0.01)
+    assert maps["log_area"][opposite] == pytest.approx(0.0, abs=0.01)

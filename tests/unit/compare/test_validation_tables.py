@@ -1,8 +1,5 @@
 """Rows of validation."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,8 +7,7 @@ import pytest
 from gyriflow.compare.validation import ordered, validation_row
 from gyriflow.geometry.triangles import area, signed_volume, transformed
 
-sys.path.insert(0, str(Path(__file__).parent))
-from bumpy import RADIUS, bumpy, shaped
+from .bumpy import RADIUS, bumpy, shaped
 
 REAL = bumpy(1)
 SHAPES = {"real": shaped(REAL), "start": shaped(bumpy(2)), "adjacent": shaped(bumpy(1, height=0.8))}

@@ -1,8 +1,10 @@
-"""A Gaussian process through the scores of a calibration's runs: where it expects the least, and how sure it is."""
+"""Calibration: designs of its rounds, the scores of their runs, and a surrogate that says where the least may be."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,12 +14,87 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-from .design import Floats, in_bounds, in_unit_box
+from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
+from ..parameters.terms import AMPLITUDE, STIFFNESS_RATIO, Score
+from .placement import MEASURES, correlation, values_on
+from .shapes import Shape, against_real
 
+DIGITS = 6
+"""Significant digits of calibrated values."""
 CANDIDATES = 1024
 """Points of a Sobol sequence at which the surrogate is looked at."""
 APART = 0.02
 """Least distance of runs of a round from each other and from earlier runs, in the unit box."""
+
+
+def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -> pd.DataFrame:
+    """Spread `count` rows of values evenly over the box of the bounds: a scrambled Sobol sequence.
+
+    The same seed gives the same rows. Source: Sobol 1967; Owen 1998 for the scrambling.
+    """
+    # the sequence is balanced over powers of two; its first rows are taken
+    power = int(np.ceil(np.log2(max(count, 2))))
+    points = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed)).random_base2(power)[:count]
+    return in_bounds(points, bounds)
+
+
+def in_bounds(points: Floats, bounds: Mapping[str, Sequence[float]]) -> pd.DataFrame:
+    """Scale (n, d) points of the unit box to values between the bounds, in columns of the parameters' names."""
+    low, high = np.transpose(list(bounds.values()))
+    values = low + points * (high - low)
+    return pd.DataFrame(values, columns=list(bounds)).map(lambda value: float(f"{value:.{DIGITS}g}"))
+
+
+def in_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> Floats:
+    """Scale rows of values to (n, d) points of the unit box."""
+    low, high = np.transpose(list(bounds.values()))
+    return np.asarray((values[list(bounds)].to_numpy(dtype=float) - low) / (high - low))
+
+
+def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
+    """Return the content of `params.yaml` of a run of a calibration, which ends at a week.
+
+    Parameters
+    ----------
+    base
+        Content of that of the base run.
+    values
+        By parameter: a key with dots for inner ones, `stiffness_ratio`, or `KEY.amplitude`, which scales a curve.
+    """
+    params = deepcopy(dict(base))
+    for key, value in values.items():
+        if key == STIFFNESS_RATIO:
+            params["shear_modulus_cortex_pa"] = value * params["shear_modulus_core_pa"]
+            continue
+        *outer, last = key.removesuffix(AMPLITUDE).split(".")
+        section = params
+        for name in outer:
+            section = section[name]
+        section[last] = _scaled(section[last], value) if key.endswith(AMPLITUDE) else value
+    return params | {"end_week": week, "output_weeks": [params["start_week"], week]}
+
+
+def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
+    if "weeks" in curve:
+        return dict(curve) | {"weeks": _scaled(curve["weeks"], factor)}
+    return {week: factor * value for week, value in curve.items()}
+
+
+def size_score(simulated: TriangleMesh, real: TriangleMesh) -> float:
+    """Return √(a² + v²) with a, v the relative differences in area and volume of two closed surfaces as they are."""
+    return float(np.hypot(area(simulated) / area(real) - 1, signed_volume(simulated) / signed_volume(real) - 1))
+
+
+def shape_scores(run: Shape, real: Shape, names: Collection[Score]) -> dict[Score, float]:
+    """Score shapes that are ready and laid onto each other by those of `names` that compare such.
+
+    shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is
+    curvature_distance_per_mm of `shapes.against_real`.
+    """
+    values, _ = values_on(real, run)
+    scores = {measure: 1 - correlation(getattr(real, measure), values[measure], real.areas) for measure in MEASURES}
+    scores["curvature_distribution"] = against_real(run, real)["curvature_distance_per_mm"]
+    return {name: scores[name] for name in names}
 
 
 @dataclass(frozen=True, eq=False)
