@@ -15,7 +15,7 @@ rule calibration_design:
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,
-        runs=lambda w: CALIBRATED.runs_of(int(w.round)),
+        runs=lambda w: [run for run, number in CALIBRATED.rounds.items() if number == int(w.round)],
     script:
         "../scripts/calibration_design.py"
 

@@ -1,10 +1,7 @@
 # Quality control before the solve: a page and a verdict for each brain.
-from gyriflow.study import reporting
-
-
 rule quality_page:
     input:
-        unpack(lambda w: reporting.quality_files(study.brains[w.brain])),
+        unpack(from_brain("quality_files")),
     output:
         png=f"{BRAIN}/figures/quality.png",
         pdf=f"{BRAIN}/figures/quality.pdf",
@@ -13,9 +10,9 @@ rule quality_page:
         week=from_brain("week"),
         white_files=from_brain("given.white_files"),
         affine_from=from_brain("given.affine_from"),
-        labels=lambda w: reporting.quality_labels(study.brains[w.brain].given),
+        labels=lambda w: study.quality_labels(w.brain),
         scheme=from_brain("scheme"),
-        logs=lambda w: reporting.surface_logs(study.brains[w.brain]),
+        logs=from_brain("surface_logs"),
         dpi=CONFIG.report.dpi,
     script:
         "../scripts/quality_page.py"
@@ -27,7 +24,7 @@ rule quality_table:
     output:
         f"{STUDY}/quality.csv",
     params:
-        refused=reporting.refused_rows(study, REFUSED),
+        refused=study.refused_rows(REFUSED),
         order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
     script:
         "../scripts/quality_table.py"

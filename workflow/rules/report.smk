@@ -56,11 +56,11 @@ rule html_report:
         config="results/report/config.yaml",
     params:
         figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
-        brains=reporting.described_brains(study),
-        files=reporting.input_files(study),
+        brains=study.described_brains,
+        files=study.input_files,
         folded=study.pairs,
-        method=reporting.method(study),
-        config=reporting.used_settings(study),
+        method=study.method,
+        config=study.used_settings,
     script:
         "../scripts/html_report.py"
 
@@ -75,7 +75,7 @@ rule provenance:
         brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
         runs=study.files(f"{RUN}/provenance.json"),
     params:
-        config=reporting.used_settings(study),
+        config=study.used_settings,
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         folded=study.pairs,
     script:

@@ -11,13 +11,10 @@ STUDY = "results/study"
 CALIBRATION = f"{STUDY}/calibration"
 WEEK = "week-{week}"
 
-PARTS = {"whole": "pial", "left": "left.pial", "right": "right.pial"}
-"""How the names of a brain's surfaces begin, by what they are of."""
-
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
     """Return the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
-    return {part: f"{folder}/{PARTS[part]}.surf.gii" for part in ("whole", *sides)}
+    return {"whole": f"{folder}/pial.surf.gii", **{side: f"{folder}/{side}.pial.surf.gii" for side in sides}}
 
 
 def pial_of(*sides: Side) -> dict[str, str]:

@@ -134,6 +134,25 @@ class Brain:
             regions=self.regions if self.has_regions else {},
         )
 
+    @property
+    def surface_logs(self) -> list[str]:
+        """The logs of the steps that have made its surface and thickness."""
+        made_by = [rule for rule, made in paths.PIAL_RULES.items() if made == (self.given.source, self.sides)]
+        return [f"results/brains/{self.id}/logs/{rule}.log" for rule in (*made_by, "cortical_thickness")]
+
+    @property
+    def quality_files(self) -> dict[str, Any]:
+        """The files that the page of its quality shows."""
+        return {
+            "surface": self.pial,
+            "report": self.report,
+            "labels": self.given.label_volume or [],
+            "image": self.given.image or [],
+            "white": list(self.given.white_files.values()),
+            "thickness": self.measured.thickness,
+            "measured": paths.THICKNESS["report"].format(brain=self.id) if self.thickness_from else [],
+        }
+
 
 @dataclass(frozen=True)
 class Chain:
@@ -361,10 +380,6 @@ class Calibration:
     base: tuple[Simulation, ...]
     rounds: Mapping[str, int]
     real: Mapping[str, tuple[Brain, ...]]
-
-    def runs_of(self, number: int) -> list[str]:
-        """Return the runs of a round."""
-        return [run for run, of_run in self.rounds.items() if of_run == number]
 
     def scores_before(self, number: int) -> list[str]:
         """Return the scores of all runs of the rounds before one."""

@@ -273,3 +273,60 @@ class Study:
             "template_maps": template,
             "volume": volume if brain.given.has_labels and not real else {},
         }
+
+    # what the report and the table of quality say beside figures
+
+    @property
+    def used_settings(self) -> dict[str, Any]:
+        """The configuration; the brains of the atlas are among the brains by now."""
+        return self.config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
+
+    @property
+    def described_brains(self) -> list[dict[str, Any]]:
+        """What the configuration says of each brain, refused ones too, with its licence where it is of an atlas."""
+        licences = {
+            used.atlas.brain_id(file.series, file.week): used.atlas.licence.name
+            for used in self.config.atlases
+            for file in used.files
+        }
+        keys = ("id", "week", "population", "source", "synthetic")
+        return [
+            {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
+            for brain in self.config.brains
+        ]
+
+    @property
+    def method(self) -> dict[str, Any]:
+        """What the text of the methods says of the configuration: its brains, and settings by section."""
+        named = {"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}, "metrics": {"curvature_radius_mm"}}
+        brains = [brain for brain in self.described_brains if brain["id"] in self.brains]
+        return {"brains": brains, **self.config.model_dump(mode="json", include=named)}
+
+    @property
+    def input_files(self) -> list[tuple[str, str, str]]:
+        """Brain, what it is and path of all files that brains are made from."""
+        return [
+            (brain.id, what, path)
+            for brain in self.brains.values()
+            for what, paths in (
+                (brain.given.source, brain.given.files),
+                ("image", [brain.given.image] if brain.given.image else []),
+                ("white", list(brain.given.white_files.values())),
+            )
+            for path in paths
+        ]
+
+    def quality_labels(self, brain: str) -> dict[str, Any]:
+        """Return what the table of quality says of a brain before it is looked at, also of a refused one."""
+        given = self.config.brain(brain)
+        return {
+            "subject": brain,
+            **{key: getattr(given, key) for key in ("week", "population", "source")},
+            "sides": " ".join(given.sides),
+            "page": f"results/brains/{brain}/figures/quality.png",
+        }
+
+    def refused_rows(self, causes: Mapping[str, str]) -> list[dict[str, Any]]:
+        """Return the rows of that table for brains that were refused, or left out of the list of participants."""
+        rows = [self.quality_labels(brain) | {"cause": cause, "page": None} for brain, cause in causes.items()]
+        return rows + [{"subject": row, **values} for row, values in self.config.left_out.items()]

@@ -346,7 +346,7 @@ def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
     rounds = {"rounds": [3, 1]}
     search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     found = study(real, calibrate=search | rounds).calibration
-    assert (found.runs_of(1), found.scores_before(0)) == (["calibration-03"], [])
+    assert (list(found.rounds.values()), found.scores_before(0)) == ([0, 0, 0, 1], [])
     assert found.scores_before(1)[-1] == "results/study/calibration/scores/calibration-02.csv"
     assert found.design("calibration-03") == "results/study/calibration/round-1.csv"
     assert ids(found.real["b21"]) == ["b24"]
