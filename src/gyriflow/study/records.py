@@ -1,6 +1,6 @@
 """The records of a study: what is known of each brain, run and comparison before data are read, and their files."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -95,6 +95,11 @@ class Brain:
     def population(self) -> str:
         """What it is called in tables: its population, or synthetic or unknown."""
         return self.given.population or ("synthetic" if self.given.synthetic else "unknown")
+
+    def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
+        """Return the brains that it may be compared with: of its hemispheres, and its population if it has one."""
+        population = self.given.population
+        return [one for one in brains if population in (None, one.given.population) and one.sides == self.sides]
 
     @property
     def registered_volume(self) -> str:

@@ -52,8 +52,6 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         chains=chains,
         comparisons=_comparisons(config, members, simulations.values(), known),
         calibration=calibration,
-        references=_references([one for one in simulations.values() if one.run in config.runs], known),
-        norm_reference=_norm_reference(config, [one.start for one in foldings if one.run in config.runs], known),
         unreachable=unreachable,
     )
 
@@ -83,14 +81,8 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
     )
 
 
-def comparable(start: Brain, brains: Iterable[Brain]) -> list[Brain]:
-    """Return the brains that a start may be compared with: of its hemispheres, and its population if it has one."""
-    own = start.given.population
-    return [brain for brain in brains if own in (None, brain.given.population) and brain.sides == start.sides]
-
-
 def _compared_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
-    alike = [brain for brain in comparable(start, brains) if not brain.given.synthetic]
+    alike = [brain for brain in start.comparable(brains) if not brain.given.synthetic]
     return list({week_tag(week): week for week in sorted(brain.week for brain in alike) if week > start.week}.values())
 
 
@@ -296,23 +288,22 @@ def _simulation(
     run, start, growth = folding.run, folding.start, folding.settings.growth
     shapes = _shapes(folding.settings)
     sizes = growth.model == "sizes" and "measured" in [getattr(growth, size) for size in SIZES]
-    compared: dict[str, tuple[Brain, ...]] = {}
-    alike = comparable(start, brains)
-    ordered = sorted(alike, key=lambda brain: brain.subject != start.subject)
-    for tag in map(week_tag, folding.weeks[1:]):
-        if of_week := tuple(brain for brain in ordered if week_tag(brain.week) == tag):
-            compared[tag] = of_week
+    alike = sorted(start.comparable(brains), key=lambda brain: brain.subject != start.subject)
+    compared = {
+        tag: of_week
+        for tag in map(week_tag, folding.weeks[1:])
+        if (of_week := tuple(brain for brain in alike if week_tag(brain.week) == tag))
+    }
     real = {
-        tag: next(brain for brain in of_week if not brain.given.synthetic)
+        tag: real_of_week[0]
         for tag, of_week in compared.items()
-        if not start.given.synthetic and not all(brain.given.synthetic for brain in of_week)
+        if (real_of_week := [brain for brain in of_week if not brain.given.synthetic]) and not start.given.synthetic
     }
     scans = [brain for brain in brains if start.given.subject is not None and brain.subject == start.subject]
     behind = chains[start.id, "atlas"].later
     others_only = shapes == "atlas" and not any(
         brain.week > start.week for brain in (*alike, *scans) if brain in behind
     )
-    calibrate = config.calibrate
     return Simulation(
         run=run,
         start=start,
@@ -321,26 +312,13 @@ def _simulation(
         shapes=shapes,
         series=series.for_sizes(start),
         curves=CURVES["curves"] if sizes or growth.thickness_mm == "measured" else [],
-        base=calibrate.base if calibrate is not None and run in calibrate.runs else run,
+        base=config.calibrate.base if config.calibrate and run in config.calibrate.runs else run,
         compared=compared,
         real=real,
         kind="explained" if not others_only and (shapes or sizes) else "predicted",
         from_others_only=others_only,
         has_regions=start.has_regions and run in config.runs,
     )
-
-
-def _references(
-    simulations: Iterable[Simulation], brains: Sequence[Brain]
-) -> dict[tuple[str, str], tuple[Brain, Brain]]:
-    """Return by start and week the real brain, and the latest real one before that the start may be compared with."""
-    references = {}
-    for one in simulations:
-        alike = [brain for brain in comparable(one.start, brains) if not brain.given.synthetic]
-        for week, real in one.real.items():
-            before = [brain for brain in alike if brain.week < float(week)]
-            references[one.start.id, week] = real, max(before, key=lambda brain: brain.week)
-    return references
 
 
 def _compared_with(compared: Compared, start: Brain, brains: Iterable[Brain]) -> tuple[Brain, ...]:
@@ -363,21 +341,3 @@ def _comparisons(
         if foldings:
             comparisons[name] = Comparison(name, study.compare_week, foldings, real)
     return comparisons
-
-
-def _norm_reference(config: Config, starts: Sequence[Brain], brains: Sequence[Brain]) -> list[str]:
-    """Return the ids of the measured brains that others are compared with: the given ones, or else all real ones.
-
-    They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
-    and the real ones are of several populations, those of the start's are used.
-    """
-    if not starts:
-        return []
-    start, given = min(starts, key=brains.index), config.metrics.norm_reference
-    alike = [brain for brain in brains if brain.sides == start.sides]
-    if given is not None:
-        return [brain.id for brain in alike if brain.id in given]
-    real = [brain for brain in alike if not brain.given.synthetic]
-    if len({brain.given.population for brain in real}) > 1:
-        real = [brain for brain in real if brain.given.population == start.given.population]
-    return [brain.id for brain in real]

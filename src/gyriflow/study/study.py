@@ -20,9 +20,7 @@ class Study:
 
     `simulations` are by run and start: of `runs`, of studies, and of the calibration. `chains` are the brains behind
     the growth of a start, by its id and whose growth it is. `comparisons` are what the configuration calls studies.
-    `references` are by start and week the real brain that runs are compared with, and the latest real one before it;
-    `norm_reference` are the ids of the brains that others are compared with. `unreachable` says why starts are not
-    folded.
+    `unreachable` says why starts are not folded.
     """
 
     config: Config
@@ -32,8 +30,6 @@ class Study:
     chains: Mapping[tuple[str, Origin], Chain]
     comparisons: Mapping[str, Comparison]
     calibration: Calibration | None
-    references: Mapping[tuple[str, str], tuple[Brain, Brain]]
-    norm_reference: list[str]
     unreachable: Mapping[str, InputError]
 
     @cached_property
@@ -84,6 +80,17 @@ class Study:
     def validated(self) -> list[Simulation]:
         """The simulations that are compared with some real brain."""
         return [one for one in self.folded if one.real]
+
+    @cached_property
+    def references(self) -> dict[tuple[str, str], tuple[Brain, Brain]]:
+        """By start and week the real brain that runs are compared with, and the latest comparable real one before."""
+        references = {}
+        for one in self.validated:
+            alike = [brain for brain in one.start.comparable(self.brains.values()) if not brain.given.synthetic]
+            for week, real in one.real.items():
+                before = [brain for brain in alike if brain.week < float(week)]
+                references[one.start.id, week] = real, max(before, key=lambda brain: brain.week)
+        return references
 
     @cached_property
     def expected(self) -> list[Simulation]:
@@ -192,6 +199,24 @@ class Study:
             "published_centiles": [paths.VOLUMES["scores"].format(brain=id) for id in labelled],
             "displacement": self.files(paths.DISPLACEMENT),
         }
+
+    @cached_property
+    def norm_reference(self) -> list[str]:
+        """The ids of the measured brains that others are compared with: the given ones, or else all real ones.
+
+        They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
+        and the real ones are of several populations, those of the start's are used.
+        """
+        if not self.starts:
+            return []
+        start, given = self.starts[0], self.config.metrics.norm_reference
+        alike = [brain for brain in self.brains.values() if brain.sides == start.sides]
+        if given is not None:
+            return [brain.id for brain in alike if brain.id in given]
+        real = [brain for brain in alike if not brain.given.synthetic]
+        if len({brain.given.population for brain in real}) > 1:
+            real = [brain for brain in real if brain.given.population == start.given.population]
+        return [brain.id for brain in real]
 
     @property
     def scans(self) -> dict[str, list[str]]:
