@@ -112,11 +112,9 @@ def displacement_table(
         displacement_r_scaling, displacement_slope_scaling, rms_mm, measured_rms_mm (root mean square by area, of the
         interval).
     """
-    if len(weeks) < 2 or simulated.shape != measured.shape or len(simulated) != len(weeks):
+    if len(weeks) < 2:
         raise InputError(
-            "displacements are those of the same vertices in the same weeks",
-            found=f"{len(weeks)} weeks, positions {simulated.shape} and {measured.shape}",
-            expected="two or more weeks, equal shapes",
+            "no displacement to compare", found=f"{len(weeks)} weeks that both have", expected="two or more weeks"
         )
     component = face_components(TriangleMesh(measured[0], faces))
     pieces = [np.unique(faces[component == number]) for number in range(component.max() + 1)]

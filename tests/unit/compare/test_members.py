@@ -25,8 +25,9 @@ METRICS = pd.DataFrame(
     ],
     columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
 )
-SPECTRAL = pd.DataFrame([("b", "left", "spectral_distance_B4", 0.2, "ok")],
-                        columns=["real", "hemisphere", "metric", "value", "flag"])  # fmt: skip
+SPECTRAL = pd.DataFrame(
+    {"real": ["b"], "hemisphere": "left", "metric": "spectral_distance_B4", "value": 0.2, "flag": "ok"}
+)
 SURFACES = {"whole": {"symmetric_mean": 1.5}}
 
 
@@ -74,13 +75,10 @@ def compared(**distances):
     return pd.DataFrame(rows)
 
 
-def test_the_nearest_run_is_named_with_the_next():
+def test_the_nearest_run_is_named_with_the_next_and_what_stands_against_it():
     (row,) = nearest(compared(t1=0.3, t2=0.1, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert (row["thickness_mm"], row["distance"], row["next_thickness_mm"], row["next_distance"]) == (2, 0.1, 3, 0.2)
     assert row["flag"] == "ok"
-
-
-def test_what_stands_against_the_nearest_is_said():
     (row,) = nearest(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
 
@@ -88,8 +86,8 @@ def test_what_stands_against_the_nearest_is_said():
 def test_the_papers_value_stands_beside_ours_where_it_reports_one():
     published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
     table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
-    assert with_published_nearest(table, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
-    cut = table.assign(measure="relative_power_B4_weyl")
-    assert with_published_nearest(cut, published, ["thickness_mm"], 28)["paper"].tolist() == [2.25]
+    for measure in ("relative_power_B4", "relative_power_B4_weyl"):
+        found = with_published_nearest(table.assign(measure=measure), published, ["thickness_mm"], 28)
+        assert found["paper"].tolist() == [2.25]
     assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
     assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()

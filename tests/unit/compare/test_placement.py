@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import rigid
 
 from gyriflow.compare.placement import correlation, drawn_patches, gain_interval, patches, placement, skill
-from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.shapes import Shape, against_real, cortex_dice, ready
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
 
@@ -12,13 +12,6 @@ from .bumpy import RADIUS, bumpy, field, shaped
 REAL = bumpy(1)
 TRUTH = shaped(REAL)
 SMOOTH = bumpy(1, height=0.0)
-
-
-def motion(degrees: float, shift: tuple[float, float, float]) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_rotvec([0, 0, degrees], degrees=True).as_matrix()
-    matrix[:3, 3] = shift
-    return matrix
 
 
 def noise(seed: int) -> np.ndarray:
@@ -40,7 +33,7 @@ def test_skill_is_between_the_start_and_the_adjacent_week():
 
 
 def test_a_brain_that_is_laid_back_has_its_folds_in_place():
-    scaled = transformed(REAL, motion(12, (5, -3, 2)) @ np.diag([0.7, 0.7, 0.7, 1.0]))
+    scaled = transformed(REAL, rigid(0, 0, 12, shift=(5, -3, 2)) @ np.diag([0.7, 0.7, 0.7, 1.0]))
     laid = ready(scaled, REAL)
     assert signed_volume(laid) == pytest.approx(signed_volume(REAL), rel=0.01)
     assert mean_edge_length(laid) == pytest.approx(1.0, abs=0.1)
@@ -48,7 +41,7 @@ def test_a_brain_that_is_laid_back_has_its_folds_in_place():
     assert row["r_mean_curvature"] > 0.95
     assert row["r_start_mean_curvature"] == pytest.approx(0, abs=0.06)
     assert row["matched_share"] == pytest.approx(1.0)
-    rotated = placement(TRUTH, shaped(transformed(REAL, motion(90, (0, 0, 0)))), TRUTH, TRUTH, horizon=3)
+    rotated = placement(TRUTH, shaped(transformed(REAL, rigid(0, 0, 90))), TRUTH, TRUTH, horizon=3)
     assert abs(rotated["r_mean_curvature"]) < 0.25
 
 
@@ -93,7 +86,7 @@ def test_mirror_patches_are_drawn_together_where_the_brain_is_its_mirror_image()
     brain = two_sided(bumpy(1))
     half = len(REAL.vertices)
     # wherever the brain lies
-    laid = transformed(brain, motion(8, (5, -3, 2)))
+    laid = transformed(brain, rigid(0, 0, 8, shift=(5, -3, 2)))
     patch, drawn = drawn_patches(shaped(laid, np.zeros(2 * half)))
     assert drawn["mirrored_patches"] is True
     assert drawn["asymmetry_mm"] == pytest.approx(0, abs=0.02)
@@ -132,3 +125,18 @@ def test_intervals_of_symmetric_brains_are_root_two_wider_when_mirror_patches_ar
 def test_open_or_turned_surfaces_are_refused():
     with pytest.raises(InputError, match="encloses no volume"):
         ready(flipped(REAL), REAL)
+
+
+def test_size_and_distance_of_curvature():
+    half = np.where(SMOOTH.vertices[:, 2] > 0, 0.1, -0.1)
+    against = against_real(Shape(SMOOTH, 2 * half, half), Shape(SMOOTH, half, half))
+    assert against["curvature_rms_ratio"] == pytest.approx(2.0)
+    assert against["curvature_distance_per_mm"] == pytest.approx(0.1, rel=0.02)
+
+
+def test_cortices_overlap_as_far_as_their_surfaces_are_the_same():
+    # the outer 2 mm of balls of 20 and 21 mm share those from 19 to 20 mm
+    shared, *whole = ((far**3 - near**3) for near, far in ((19, 20), (18, 20), (19, 21)))
+    larger = TriangleMesh(SMOOTH.vertices * 21 / 20, SMOOTH.faces)
+    assert cortex_dice(SMOOTH, larger) == pytest.approx(2 * shared / sum(whole), abs=0.04)
+    assert cortex_dice(SMOOTH, SMOOTH) == 1.0
