@@ -22,7 +22,6 @@ if not workflow.overwrite_configfiles:
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/retrieve.smk"
-include: "workflow/rules/input.smk"
 include: "workflow/rules/surface.smk"
 include: "workflow/rules/growth.smk"
 include: "workflow/rules/mesh.smk"

@@ -79,18 +79,12 @@ SOLVE = (
 FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
-def limits(wildcards):
-    """Return the memory in MiB and the minutes that a folding may take."""
-    simulation = study.simulations[wildcards.run, wildcards.brain]
-    return job_limits(simulation, CONFIG.mesh)
-
-
-# what both rules of a folding ask of a cluster
+# what both rules of a folding ask of a cluster: ranks, memory in MiB and minutes
 LIMITED = {
     "mpi": "mpiexec",
     "tasks": from_simulation("settings.ranks"),
-    "mem_mb": lambda w: limits(w)[0],
-    "runtime": lambda w: limits(w)[1],
+    "mem_mb": lambda w: job_limits(study.simulations[w.run, w.brain], CONFIG.mesh)[0],
+    "runtime": lambda w: job_limits(study.simulations[w.run, w.brain], CONFIG.mesh)[1],
 }
 
 

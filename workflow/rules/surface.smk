@@ -30,6 +30,19 @@ def pial_settings(wildcards):
     return surface_settings(*names)
 
 
+# a simple shape in the place of a brain
+rule shape:
+    output:
+        SHAPE,
+    wildcard_constraints:
+        brain=brains_with(lambda brain: brain.given.source == "shape"),
+    params:
+        shape=lambda w: study.brains[w.brain].given.shape.model_dump(mode="json")
+        | surface_settings("edge_length_mm"),
+    script:
+        "../scripts/shape.py"
+
+
 for name, (source, sides) in PIAL_RULES.items():
 
     rule:

@@ -8,15 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    face_areas,
-    face_components,
-    submesh,
-    vertex_areas,
-)
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, face_components, submesh, vertex_areas
 
 DEEP_MM = 2.0
 """A sulcus is there when it is so much below its neighbouring crowns."""
