@@ -1,5 +1,6 @@
 """Masks of voxels, their topology made that of balls, what hangs on them by stalks cut off, and isosurfaces."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,8 @@ from scipy.special import ndtr
 from skimage.measure import euler_number, marching_cubes
 
 from ..errors import MeshError
-from ..geometry.triangles import TriangleMesh, signed_volume, transformed
+from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 PAD_VOXELS = 6
 LEVEL = 0.5
@@ -55,6 +55,17 @@ def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
     return moved
 
 
+def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
+    """Yield each part of an (i, j, k) mask: its box, one voxel wider than the part, and the part's mask in it.
+
+    Voxels at edges and corners of each other are of one part.
+    """
+    number, _ = ndimage.label(mask, OUTSIDE)
+    for index, tight in enumerate(ndimage.find_objects(number), start=1):
+        box = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in tight)
+        yield box, number[box] == index
+
+
 def smooth_mask(mask: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
     """Return the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
@@ -73,13 +84,10 @@ def remove_bridges(
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~left_shut
-    number, _ = ndimage.label(closed, np.ones((3, 3, 3)))
     inside, slits = field > LEVEL, np.zeros_like(mask)
-    for index, tight in enumerate(ndimage.find_objects(number), start=1):
-        box = tuple(slice(side.start - 1, side.stop + 1) for side in tight)
-        slit = number[box] == index
+    for box, slit in parts_in_boxes(closed):
         opened = inside[box] & ~slit
-        if slit.sum() >= LEAST_SLIT_VOXELS and euler_gain(inside[box], opened) == 0:
+        if slit.sum() >= LEAST_SLIT_VOXELS and _euler_gain(inside[box], opened) == 0:
             inside[box] = opened
             slits[box] |= slit
     # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
@@ -165,7 +173,7 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
             # an earlier change may have touched this patch
             patch = patch & (now != fills)
             changed = np.where(patch, fills, now)
-            if left == 0 or not patch.any() or euler_gain(now, changed) <= 0:
+            if left == 0 or not patch.any() or _euler_gain(now, changed) <= 0:
                 continue
             trial = mask.copy()
             trial[box] = _least_change(now, changed, field[box])
@@ -218,21 +226,12 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
     far_outside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(~mask) <= reach) > reach
     far_inside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(mask) > reach) == 0
     opened = ndimage.distance_transform_edt(far_inside) <= reach
-    patches = []
-    for fills, difference in ((True, far_outside & ~mask), (False, mask & ~opened)):
-        number, _ = ndimage.label(difference, OUTSIDE)
-        for index, tight in enumerate(ndimage.find_objects(number), start=1):
-            box = tuple(
-                slice(max(side.start - 1, 0), min(side.stop + 1, n)) for side, n in zip(tight, mask.shape, strict=True)
-            )
-            patch = number[box] == index
-            patches.append((int(patch.sum()), fills, box, patch))
-    patches.sort(key=lambda item: item[0])
-    return [(fills, box, patch) for _, fills, box, patch in patches]
+    changes = (True, far_outside & ~mask), (False, mask & ~opened)
+    patches = [(fills, box, patch) for fills, change in changes for box, patch in parts_in_boxes(change)]
+    return sorted(patches, key=lambda item: item[2].sum())
 
 
-def euler_gain(before: Mask, after: Mask) -> int:
-    """Return by how much the Euler number rises; inside a box that holds the change with a margin of one voxel."""
+def _euler_gain(before: Mask, after: Mask) -> int:
     return int(euler_number(after, connectivity=FACES) - euler_number(before, connectivity=FACES))
 
 

@@ -14,11 +14,13 @@ from ..parameters.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from .extraction import (
     COMPARABLE,
+    OUTSIDE,
     PAD_VOXELS,
     Floats,
     Mask,
     crop,
     main_parts,
+    parts_in_boxes,
     shifted_affine,
     smooth_mask,
     without_stalks,
@@ -36,10 +38,6 @@ LEAST_PARTED = 0.9
 LITTLE_CORTEX = 0.7
 # a loss beyond this fraction of a brain is reported
 REPORTED_LOSS = 0.005
-# where ventricles are labelled, atlases leave up to 0.8 % of the cerebrum empty inside; one lateral ventricle is 1.7 %
-FURTHER_VENTRICLES = 0.012
-# the cerebrum is at 0.98 of the surface of a lateral ventricle, at 0.7 of that of a gap beside a small hemisphere
-AROUND_VENTRICLE = 0.9
 # the directions in which a voxel of fluid looks for tissue: to the faces, edges and corners of its cell
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
 # fluid belongs to the cerebrum where it sees the cerebrum's tissue in more than this part of the directions
@@ -48,9 +46,8 @@ ENCLOSED = 0.5
 WHOLLY = 0.93
 # the border between what is enclosed and what is not is smoothed over this many voxels
 SMOOTHING = 2.0
-# parts of the fluid below this share of the largest are crumbs
+# parts of what is enclosed below this share of the largest are crumbs
 CRUMB = 0.02
-EVERY_NEIGHBOUR = np.ones((3, 3, 3), dtype=bool)
 # the smaller hemisphere, of the larger one's volume, where labels say which side is which
 SMALLEST_HEMISPHERE = 0.04
 # ventricles without labels are looked for in what a closing with a ball of this radius adds to the tissue
@@ -240,30 +237,22 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     # what labels leave empty inside is looked through as well: choroid plexus, septum
     clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
     out = fluid & (_seen(clear, tissue, SMOOTHING) <= ENCLOSED)
-    # crumbs that are cut off behind what is left out go with it
-    number, count = ndimage.label(fluid & ~out, EVERY_NEIGHBOUR)
-    if count:
-        sizes = np.bincount(number.ravel())[1:]
-        crumbs = np.isin(number, np.flatnonzero(sizes < CRUMB * sizes.max()) + 1)
-        out = ndimage.binary_propagation(out, EVERY_NEIGHBOUR, mask=out | crumbs)
     return _beside_hindbrain(out, labels, scheme)
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
-    """Return the voxels of ventricles that have no label of the cerebrum, (i, j, k) bool.
+    """Return the voxels of ventricles that have no label of the cerebrum, (i, j, k) bool; none where some have one.
 
-    Such voxels look on tissue inside the cortex, or on labelled ventricles, in more than half of 26 directions. Sulci,
-    fissures and cisterns look on cortex, or they are open. Where no cortex is labelled, nearly all directions count.
-    Less than `REPORTED_LOSS` of the cerebrum, or `FURTHER_VENTRICLES` where some are labelled, is roughness of the
-    labels. Then a gap that the cerebrum does not enclose is none.
+    Such voxels look on tissue inside the cortex in more than half of 26 directions. Sulci, fissures and cisterns look
+    on cortex, or they are open. Where no cortex is labelled, nearly all directions count. Less than `REPORTED_LOSS` of
+    the cerebrum is roughness of the labels.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
-    labelled = np.isin(labels, scheme.ventricles).any()
     size = np.linalg.norm(affine[:3, :3], axis=0)
     margin = int(np.ceil(CLOSING_MM / size.min())) + 2
-    if 2 * margin > max(labels.shape):
-        # in a far larger unit, which is reported elsewhere
+    # a far larger unit is reported elsewhere
+    if np.isin(labels, scheme.ventricles).any() or 2 * margin > max(labels.shape):
         return filled
     (box,) = ndimage.find_objects(cerebrum.astype(np.uint8))
     numbers, tissue = np.pad(labels[box], margin), np.pad(cerebrum[box], margin)
@@ -272,12 +261,10 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
     seen = _seen(clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * SMOOTHING)
-    number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), EVERY_NEIGHBOUR)
+    number, _ = ndimage.label(clear & (seen > (ENCLOSED if scheme.cortex else WHOLLY)), OUTSIDE)
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, CRUMB * sizes.max())) + 1)
-    around = ndimage.binary_dilation(enclosed) & ~enclosed
-    large = enclosed.sum() > (FURTHER_VENTRICLES if labelled else REPORTED_LOSS) * cerebrum.sum()
-    if large and (not labelled or tissue[around].mean() > AROUND_VENTRICLE):
+    if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
 
@@ -286,15 +273,12 @@ def _beside_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
     hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
     if not hindbrain.any():
         return out
-    number, _ = ndimage.label(out, EVERY_NEIGHBOUR)
-    elsewhere = ~hindbrain & ~np.isin(labels, scheme.cerebrum)
-    parts = []
-    for part, box in enumerate(ndimage.find_objects(number), start=1):
-        wide = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)
-        around = ndimage.binary_dilation(number[wide] == part, EVERY_NEIGHBOUR)
-        if (around & hindbrain[wide]).sum() > (around & elsewhere[wide]).sum():
-            parts.append(part)
-    return np.isin(number, parts)
+    elsewhere, beside = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
+    for box, part in parts_in_boxes(out):
+        around = ndimage.binary_dilation(part, OUTSIDE)
+        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
+            beside[box] |= part
+    return beside
 
 
 def _seen(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:

@@ -34,8 +34,6 @@ LEAST_CONFIDENCE, WORST_RESIDUAL = 1.07, 0.13
 LEAST_SIDED = 1.07
 # beside the shape, poses near these axes of files are likely
 CONVENTION_DEG = 35.0
-# two hemispheres side by side have their centres this far apart, in sizes
-APART = 0.4
 # the shape agrees with the axes of files: tilt of the plane between the hemispheres, and pitch
 SAME_TILT_DEG, SAME_PITCH_DEG = 10.0, 15.0
 # files of one brain share their coordinates where their poses differ by less; distances are in sizes
@@ -74,14 +72,10 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     shape = shape_of(mesh)
     fit, confidence = register_from_all_sides(shape, hemispheres())
     mirrored, _ = register_from_all_sides(shape.mirrored(), hemispheres())
-    return _upright(shape, fit, confidence, mirrored.residual / fit.residual)
-
-
-def _upright(shape: Shape, fit: Fit, confidence: float, sided: float) -> Hemisphere:
     normal, offset = medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
-    rotation = turn.as_matrix() @ fit.rotation
-    return Hemisphere(shape, rotation, -offset * shape.size_mm, fit.residual, confidence, sided)
+    sided = mirrored.residual / fit.residual
+    return Hemisphere(shape, turn.as_matrix() @ fit.rotation, -offset * shape.size_mm, fit.residual, confidence, sided)
 
 
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
@@ -91,15 +85,14 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     near RAS or LPS, they keep the file's pose; where they share others, one motion poses both; else each has its own,
     with the medial walls beside x = 0. `declared` is whether the files name one and the same coordinate system.
 
-    Where a shape fits several poses, that is chosen which is near RAS or LPS in both files with the left hemisphere on
-    the left. InputError where there is none, and where the two seem to be swapped or of one side.
+    Where a shape fits several poses, both are taken as RAS+ with a warning. InputError where it is not near that
+    either, and where the two seem to be swapped or of one side.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
-    doubtful = [(one, side) for one, side in zip(shapes, SIDES, strict=True) if not one.is_clear]
-    if doubtful and not (shapes := _near_a_convention(shapes)):
-        one, side = doubtful[0]
-        raise _unclear(one, f"{side} hemisphere")
+    if not all(one.is_clear for one in shapes):
+        kept = [_kept_as_ras(one, hemispheres(), f"{side} hemisphere") for one, side in zip(shapes, SIDES, strict=True)]
+        return kept[0]
     one, other = shapes
     fit = register(one.shape, [other.shape], other.rotation.T @ one.rotation)
     # half-way between what the right one says of itself, and what the left one says of it
@@ -152,43 +145,20 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
         )
 
 
-def _unclear(one: Hemisphere, what: str) -> InputError:
-    return InputError(
-        f"the pose of the {what} cannot be determined from its shape",
-        found=f"a residual of {one.residual:.3f}, the next best pose {one.confidence:.2f} times worse",
-        expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS or LPS",
-        remedy="Is it the closed pial surface of a cerebrum? If so, pose it and set coordinates: ras or lps.",
-    )
-
-
-def _near_a_convention(shapes: list[Hemisphere]) -> list[Hemisphere]:
-    """Return hemispheres posed from RAS or from LPS axes; empty where the two agree with neither.
-
-    Both are to fit the template nearly as well as in their best poses, within 35° of the axes, with the left one on
-    the left. Few random poses are so near: this is evidence where the shape leaves a choice.
-    """
-    for axes in (convention[:3, :3] for convention in CONVENTIONS.values()):
-        # mirrored files have the same axes up to signs, which cancel
-        fits = [_fit_near(axes, one, hemispheres()) for one in shapes]
-        # the left one is mirrored, so that both are to be right of the middle
-        across = sum((axes @ one.shape.centre)[0] for one in shapes)
-        posed = [
-            _upright(one.shape, fit, one.confidence, one.sided) for one, fit in zip(shapes, fits, strict=True) if fit
-        ]
-        if len(posed) == 2 and across > APART * shapes[0].shape.size_mm:
-            return posed
-    return []
-
-
-def _fit_near(axes: Floats, one: Hemisphere, targets: Sequence[Shape]) -> Fit | None:
-    fit = register(one.shape, targets, axes)
-    nearly = fit.residual < LEAST_CONFIDENCE * one.residual and fit.residual <= WORST_RESIDUAL
-    return fit if nearly and angle_deg(fit.rotation @ axes.T) < CONVENTION_DEG else None
-
-
 def _kept_as_ras(one: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
-    if _fit_near(np.eye(3), one, targets) is None:
-        raise _unclear(one, what)
+    """Return the file's pose for a shape that fits others as well; InputError where it does not nearly fit near it.
+
+    Few random poses are so near to it: this is evidence where the shape leaves a choice.
+    """
+    fit = register(one.shape, targets, np.eye(3))
+    nearly = fit.residual < LEAST_CONFIDENCE * one.residual and fit.residual <= WORST_RESIDUAL
+    if not nearly or angle_deg(fit.rotation) >= CONVENTION_DEG:
+        raise InputError(
+            f"the pose of the {what} cannot be determined from its shape",
+            found=f"a residual of {one.residual:.3f}, the next best pose {one.confidence:.2f} times worse",
+            expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS",
+            remedy="Is it the closed pial surface of a cerebrum? If so, pose it and set coordinates: ras or lps.",
+        )
     doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: set coordinates"
     return Pose(by="default", warnings=(doubt,))
 
@@ -260,17 +230,7 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     shape = shape_of(mesh, deepest=DEEPEST)
     fit, confidence = register_from_all_sides(shape, brains())
     one = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
-    angles = _angles(one.rotation)
-    nearest = min(angles, key=lambda name: angles[name])
-    if coordinates != "auto":
-        doubtful = one.is_clear and angles[coordinates] > LEAST_TURN_DEG
-        doubts = [_against(coordinates, "brain is", angles[coordinates])] if doubtful else []
-        return _in_axes(coordinates, "configuration", *doubts)
-    if one.is_clear and angles[nearest] < CONVENTION_DEG:
-        return _in_axes(nearest, "shape", *_other_axes(nearest))
-    if one.is_clear:
-        return turned(one.rotation, "shape", "ras", f"the brain was turned by {angles['ras']:.0f}°, as its shape says")
-    return _kept_as_ras(one, brains(), "brain")
+    return _judged(one, one.rotation, coordinates, "brain", brains())
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
@@ -298,49 +258,42 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
     mirror = MIRROR if side == "left" else np.eye(4)
     one = hemisphere_by_shape(transformed(mesh, mirror))
     rotation = mirror[:3, :3] @ one.rotation @ mirror[:3, :3]
-    angles = _angles(rotation)
-    nearest = min(angles, key=lambda name: angles[name])
     if coordinates == "auto" and one.is_clear and one.sided < 1 / LEAST_SIDED:
         raise InputError(
             f"the hemisphere seems to be the {'right' if side == 'left' else 'left'} one",
             found=f"{one.sided:.2f} times as far from the other side's template",
             expected="more than 1",
         )
-    doubts = []
+    pose = _judged(one, rotation, coordinates, "hemisphere", hemispheres(), of_volume=of_volume)
     if one.sided < LEAST_SIDED:
-        doubts.append(f"the side, {side}, is taken from the configuration: it cannot be determined from the shape")
-    if coordinates != "auto":
-        if one.is_clear and angles[coordinates] > LEAST_TURN_DEG:
-            doubts.append(_against(coordinates, "hemisphere is", angles[coordinates]))
-        pose = _in_axes(coordinates, "configuration", *doubts)
-    elif not one.is_clear:
-        pose = _kept_as_ras(one, hemispheres(), "hemisphere")
-        pose = replace(pose, warnings=(*doubts, *pose.warnings))
-    elif angles[nearest] < CONVENTION_DEG:
-        axes = CONVENTIONS[nearest][:3, :3]
-        # the smallest turn that sets the medial wall upright
-        upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
-        pose = turned(
-            upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *doubts, *_other_axes(nearest)
-        )
-    else:
-        doubts.append(f"the hemisphere was turned by {angles['ras']:.0f}°, as its shape says")
-        pose = turned(rotation, "shape", "ras", *doubts)
+        doubt = f"the side, {side}, is taken from the configuration: it cannot be determined from the shape"
+        pose = replace(pose, warnings=(doubt, *pose.warnings))
     return replace(pose, evidence={"confidence": one.confidence, "sided": one.sided})
 
 
-def _angles(rotation: Floats) -> dict[str, float]:
-    return {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
+def _judged(
+    one: Hemisphere, rotation: Floats, coordinates: str, what: str, targets: Sequence[Shape], of_volume: bool = False
+) -> Pose:
+    """Return the pose that is named, or else what a brain's or a hemisphere's `rotation` to RAS+ (3, 3) says of it."""
+    angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
+    if coordinates != "auto":
+        doubtful = one.is_clear and angles[coordinates] > LEAST_TURN_DEG
+        doubts = [_against(coordinates, f"{what} is", angles[coordinates])] if doubtful else []
+        return turned(CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts)
+    if not one.is_clear:
+        return _kept_as_ras(one, targets, what)
+    nearest = min(angles, key=lambda name: angles[name])
+    if angles[nearest] >= CONVENTION_DEG:
+        return turned(rotation, "shape", "ras", f"the {what} was turned by {angles['ras']:.0f}°, as its shape says")
+    axes = CONVENTIONS[nearest][:3, :3]
+    said = [] if nearest == "ras" else [f"the shape says that the coordinates are {nearest.upper()}"]
+    if what == "brain":
+        return turned(axes, "shape", nearest, *said)
+    # the smallest turn that sets the medial wall upright
+    upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
+    return turned(upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *said)
 
 
 def _against(coordinates: str, what: str, angle: float) -> str:
     check = "check them, or set coordinates: auto"
     return f"the shape says that the {what} turned by {angle:.0f}° against the coordinates {coordinates}: {check}"
-
-
-def _other_axes(nearest: str) -> list[str]:
-    return [] if nearest == "ras" else [f"the shape says that the coordinates are {nearest.upper()}"]
-
-
-def _in_axes(coordinates: str, by: str, *warnings: str) -> Pose:
-    return turned(CONVENTIONS[coordinates][:3, :3], by, coordinates, *warnings)

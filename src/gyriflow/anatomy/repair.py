@@ -11,13 +11,9 @@ import igl
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
-from scipy.sparse.csgraph import connected_components, laplacian
-from scipy.sparse.linalg import spsolve
-from scipy.spatial import cKDTree
+from scipy import ndimage
 
 from ..errors import MeshError
-from ..geometry.matching import nearest_on
 from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
 from ..geometry.triangles import (
     TriangleMesh,
@@ -49,10 +45,8 @@ SAME_MM = 1e-5
 COMPARABLE = 0.3
 # lengths of brains and hemispheres
 SMALLEST_MM, LARGEST_MM = 15.0, 300.0
-# vertices are off their surface at this distance from the middle of those around them, and so many times theirs from it
-SPIKE_MM, SPIKE_SPREADS = 5.0, 3.0
-# more than this share of the vertices are a part of the brain
-SPIKE_SHARE = 0.02
+# an edge as long, and so many times the median, leads to a vertex off the surface
+SPIKE_MM, SPIKE_SPREADS = 10.0, 10.0
 # voxels in which a surface is looked at for stalks
 STALK_VOXEL_MM = 0.8
 # cuts follow the triangles, so that they are wider than the stalks
@@ -79,54 +73,22 @@ class Sound:
 
 def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> Sound:
     """Return a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
+    lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
     mesh, repairs = clean(mesh, max_hole_mm, one=one)
     warnings, dropped, kept = [], repairs["area_dropped_mm2"], area(mesh)
+    if lengths.max() > max(SPIKE_MM, SPIKE_SPREADS * np.median(lengths)):
+        warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
     if dropped > REPORTED_LOSS * kept:
         warnings.append(
             f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "
             f"{100 * dropped / (kept + dropped):.1f} % of the area"
         )
-    if spikes := repairs["vertices_moved_back"]:
-        warnings.append(f"vertices far off the surface were set between their neighbours: {spikes}")
     mesh, stalks = surface_without_stalks(mesh)
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"
         for stalk in stalks
     ]
     return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
-
-
-def without_spikes(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Return a surface whose vertices far off it are set between those around them, and the number of them.
-
-    They are groups of few vertices that only long edges join to the rest, and that are far from those around them.
-    """
-    pairs, number = edges(mesh)[0], len(mesh.vertices)
-    length = np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1)
-    near = length <= max(SPIKE_MM, SPIKE_SPREADS * float(np.median(length)))
-    _, part = connected_components(_graph(pairs[near], number), directed=False)
-    few = np.bincount(part)[part] < SPIKE_SHARE * number
-    _, group = connected_components(_graph(pairs[few[pairs].all(axis=1)], number), directed=False)
-    rim = pairs[few[pairs].sum(axis=1) == 1]
-    inner, outer = np.where(few[rim[:, :1]], rim, rim[:, ::-1]).T
-    far = np.zeros(number, dtype=bool)
-    for one in np.unique(group[inner]):
-        members, around = few & (group == one), mesh.vertices[outer[group[inner] == one]]
-        places = mesh.vertices[members], around
-        away, wide = (np.linalg.norm(points - around.mean(axis=0), axis=1).max() for points in places)
-        far |= members & (away > max(SPIKE_MM, SPIKE_SPREADS * wide) and members.sum() < SPIKE_SHARE * number)
-    if not far.any():
-        return mesh, 0
-    # each in the middle of its neighbours
-    stiffness = laplacian(_graph(pairs, number).tocsr()).tocsr()
-    vertices = mesh.vertices.astype(np.float64)
-    vertices[far] = spsolve(stiffness[far][:, far].tocsc(), -stiffness[far][:, ~far] @ vertices[~far])
-    return TriangleMesh(vertices, mesh.faces), int(far.sum())
-
-
-def _graph(pairs: NDArray[np.integer], number: int) -> sparse.coo_array:
-    both = np.concatenate([pairs, pairs[:, ::-1]])
-    return sparse.coo_array((np.ones(len(both)), both.T), (number, number))
 
 
 def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
@@ -184,15 +146,13 @@ def make_even(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: flo
 def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
     """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are joined, degenerate and double faces removed, vertices far off the surface set between their
-    neighbours, non-manifold edges opened, holes up to `max_hole_mm` across closed, faces turned outward, small
-    pieces and pieces inside others dropped, and all but the largest where there is to be `one`. MeshError for larger
-    holes and for surfaces that stay open.
+    Equal vertices are joined, degenerate and double faces removed, non-manifold edges opened, holes up to `max_hole_mm`
+    across closed, faces turned outward, small pieces and pieces inside others dropped, and all but the largest where
+    there is to be `one`. MeshError for larger holes and for surfaces that stay open.
     """
     mesh, doubles = _drop_doubles(mesh)
     # not before: faces that meet in several copies of a vertex would count
     cutting = int(self_intersecting_faces(mesh).sum())
-    mesh, spikes = without_spikes(mesh)
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh, one)
     mesh, holes = _fill_holes(mesh, max_hole_mm)
@@ -205,7 +165,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple
             found=f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair",
             expected="a closed surface",
         )
-    counts = {"faces_that_cut_others": cutting, "vertices_moved_back": spikes, "pieces_turned_outward": sum(inward)}
+    counts = {"faces_that_cut_others": cutting, "pieces_turned_outward": sum(inward)}
     return mesh, doubles | opened | dropped | holes | counts
 
 
@@ -388,11 +348,11 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = first
     points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
-    # every face lies within a voxel of one of these points
-    near, _ = cKDTree(_spread_points(mesh, voxel_mm)).query(points, distance_upper_bound=3.0 * voxel_mm, workers=-1)
-    band = np.isfinite(near)
-    distance = np.full(len(points), np.inf)
-    distance[band] = nearest_on(points[band], mesh)[0]
+    # NaN beyond the bound, where the field is 0 or 1
+    near_by = igl.SIGNED_DISTANCE_TYPE_UNSIGNED, -2.0 * voxel_mm, 2.0 * voxel_mm
+    distance = igl.signed_distance(points, mesh.vertices, mesh.faces, *near_by)[0]
+    band = np.isfinite(distance)
+    distance[~band] = np.inf
     wound = np.zeros(len(points), dtype=bool)
     wound[band] = igl.fast_winding_number(mesh.vertices, mesh.faces, points[band]) > 0.5
     # where no surface is near, each region is inside or outside as a whole
@@ -405,15 +365,3 @@ def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
     field, report = make_simple(field)
     return isosurface(field, affine), report
-
-
-def _spread_points(mesh: TriangleMesh, voxel_mm: float) -> Floats:
-    triangles = mesh.vertices[mesh.faces]
-    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
-    # of each face as many as its size asks for: one long face is not to fill the memory
-    every = np.maximum(np.ceil(longest / voxel_mm), 1).astype(int)
-    points = []
-    for steps in np.unique(every):
-        weights = np.array([(i, j, steps - i - j) for i in range(steps + 1) for j in range(steps + 1 - i)]) / steps
-        points.append(np.einsum("wk,fkd->wfd", weights, triangles[every == steps]).reshape(-1, 3).round(3))
-    return np.unique(np.concatenate(points), axis=0)

@@ -76,9 +76,10 @@ def cortical_thickness(
     values = layer_thickness(pial, inner)
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     size = np.linalg.norm(affine[:3, :3], axis=0)
-    to_cortex, to_outside = (ndimage.distance_transform_edt(mask, sampling=size) for mask in (~cortex, cerebrum))
-    at_labels = sample(to_outside, affine, points) < FARTHEST_VOXELS * voxel
-    over_cortex = sample(to_cortex, affine, points) < NEAR_VOXELS * voxel
+    to_cortex, to_outside = (
+        sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points) for mask in (~cortex, cerebrum)
+    )
+    at_labels, over_cortex = to_outside < FARTHEST_VOXELS * voxel, to_cortex < NEAR_VOXELS * voxel
     measured = at_labels & over_cortex & (values >= THINNEST_VOXELS * voxel)
     if not measured.any():
         raise InputError(
@@ -109,10 +110,10 @@ def thickness_from_labels(
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     cortex = np.isin(cerebrum.tissue, scheme.cortex)
     thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine, smoothing_voxels)
-    suggested = thickness.report["suggested_thickness_mm"]
-    log.info("cortical thickness: %.2f mm on average, a suggestion for thickness_mm", suggested)
-    if not USUAL_MM[0] <= suggested <= USUAL_MM[1]:
-        log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", suggested)
+    mean = thickness.report["mean_mm"]
+    log.info("cortical thickness: %.2f mm on average", mean)
+    if not USUAL_MM[0] <= mean <= USUAL_MM[1]:
+        log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", mean)
     return thickness
 
 
@@ -129,7 +130,6 @@ def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
         "quantile95_mm": high,
         "sd_mm": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
         "measured_area_share": float(weights.sum() / areas.sum()),
-        "suggested_thickness_mm": round(mean, 2),
     }
 
 

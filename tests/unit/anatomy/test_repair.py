@@ -41,28 +41,12 @@ def test_large_hole_is_refused_with_its_size():
         clean(wide, 20.0)
 
 
-@pytest.mark.parametrize("shift", [60.0, -25.0], ids=["spike", "dent"])
-@pytest.mark.parametrize("reach", [0.1, 2.0], ids=["one", "several"])
-def test_vertices_far_off_the_surface_are_moved_back_and_told(shift, reach):
+def test_a_vertex_far_off_the_surface_is_told():
     whole = ball()
+    assert sound_pieces(whole, 3.0).warnings == []
     vertices = whole.vertices.copy()
-    moved = np.linalg.norm(vertices - vertices[7], axis=1) < reach
-    vertices[moved] *= 1.0 + shift / RADIUS
-    found = sound_pieces(TriangleMesh(vertices, whole.faces), 3.0)
-    assert found.report["repair"]["vertices_moved_back"] == moved.sum()
-    assert f"far off the surface were set between their neighbours: {moved.sum()}" in found.warnings[0]
-    assert signed_volume(found.mesh) == pytest.approx(VOLUME, rel=0.01)
-    assert np.linalg.norm(found.mesh.vertices, axis=1).max() < RADIUS + 0.1
-
-
-def test_large_triangles_and_fans_are_no_spikes():
-    assert clean(sphere(40.0, 0), 3.0)[1]["vertices_moved_back"] == 0
-    # a flat end of 24 mm across, closed by a fan of long triangles
-    whole = sphere(20.0, 4)
-    kept = whole.vertices[whole.faces][:, :, 2].max(axis=1) < 16.0
-    mesh, report = clean(submesh(whole, kept)[0], 30.0)
-    assert report["holes_closed"] == 1
-    assert clean(mesh, 3.0)[1]["vertices_moved_back"] == 0
+    vertices[7] *= 7.0
+    assert "an edge is 60 mm long" in sound_pieces(TriangleMesh(vertices, whole.faces), 3.0).warnings[0]
 
 
 def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
