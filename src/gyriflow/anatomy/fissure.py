@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.alignment import motion
-from ..geometry.deformations import transform_points
+from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import (
     Ints,
@@ -53,8 +53,6 @@ BEND_MM = 4.0
 FURTHEST_MM = 5.0
 # how often the mid-surface is searched for around the last one, so that it follows a midline that is shifted far
 FOLLOWED = 4
-# a mid-surface that is this far from its plane is reported
-SHIFTED_MM = 5.0
 # a fissure is shown where it is so wide a gap in its own plane: twice this many half millimetres
 SHOWN_CELLS = 8
 # cortex that stays on the tissue which joins the hemispheres
@@ -241,9 +239,17 @@ class Fissure:
 
     def height_above(self, points: Floats) -> Floats:
         """Return the (n,) distances in mm from the mid-surface along the plane's normal, positive to the right."""
-        index = ((points @ self.axes.T - self.corner) / SPACING_MM).T
-        middle = ndimage.map_coordinates(self.heights, index, order=1, mode="nearest")
+        middle = ndimage.map_coordinates(self.heights, self.cells(points), order=1, mode="nearest")
         return points @ self.plane.normal - self.plane.offset - middle
+
+    def cells(self, points: Floats) -> Floats:
+        """Return the (2, n) places of (n, 3) points among the heights, in steps of these."""
+        return ((points @ self.axes.T - self.corner) / SPACING_MM).T
+
+    def nearest_cells(self, points: Floats) -> tuple[Ints, ...]:
+        """Return the indices, two of (n,), of the heights nearest to (n, 3) points."""
+        ends = np.array(self.heights.shape)[:, None] - 1
+        return tuple(np.clip(np.rint(self.cells(points)).astype(int), 0, ends))
 
     @property
     def places(self) -> Floats:
@@ -258,7 +264,7 @@ class Fissure:
         reach = max(0.5 * gap_mm, voxel)
         shown = np.zeros(self.heights.shape, dtype=bool)
         for height in np.arange(-reach, reach + 0.25 * voxel, 0.5 * voxel):
-            index = _index(self.places + height * self.plane.normal, affine)
+            index = voxel_index(self.places + height * self.plane.normal, affine)
             shown |= ndimage.map_coordinates(mask.astype(np.float32), index, order=0, mode="constant") < 0.5
         # gaps here and there between touching walls show no fissure, but would leave tunnels in one that is opened
         return ~ndimage.binary_opening(shown, iterations=SHOWN_CELLS)
@@ -267,9 +273,7 @@ class Fissure:
         """Return which voxels of an (i, j, k) volume are within a distance of the mid-surface, where (a, b) holds."""
         points = transform_points(np.indices(shape).reshape(3, -1).T, affine)
         close = np.abs(self.height_above(points)) < reach_mm
-        index = np.rint((points[close] @ self.axes.T - self.corner) / SPACING_MM).astype(int)
-        index = np.clip(index, 0, np.array(where.shape) - 1)
-        close[close] = where[tuple(index.T)]
+        close[close] = where[self.nearest_cells(points[close])]
         return np.asarray(close).reshape(shape)
 
 
@@ -284,15 +288,12 @@ def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
 
 def between(walls: TriangleMesh, start: Fissure) -> Fissure:
     """Return a mid-surface moved to half-way between walls that face each other; where there are none, it stays."""
-    plane, axes, corner, shape = start.plane, start.axes, start.corner, start.heights.shape
+    plane, shape, bend = start.plane, start.heights.shape, BEND_MM / SPACING_MM
     middle = fissure_points(walls, plane.normal, plane.offset)
-    height = middle @ plane.normal - plane.offset
-    fissure, ends = start, np.array(shape)[:, None] - 1
-    bend = BEND_MM / SPACING_MM
+    height, fissure = middle @ plane.normal - plane.offset, start
     for _ in range(FOLLOWED):
         near = np.abs(fissure.height_above(middle)) < FURTHEST_MM
-        index = tuple(np.clip(np.rint((middle[near] @ axes.T - corner) / SPACING_MM).astype(int).T, 0, ends))
-        weight, total = np.zeros(shape), np.zeros(shape)
+        index, weight, total = start.nearest_cells(middle[near]), np.zeros(shape), np.zeros(shape)
         np.add.at(weight, index, 1.0)
         np.add.at(total, index, height[near])
         weight, total = ndimage.gaussian_filter(weight, bend), ndimage.gaussian_filter(total, bend)
@@ -313,7 +314,7 @@ def open_fissure(
     """
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     # the mid-surface, seen flat: where is the core, where is the brain
-    index = _index(fissure.places, affine)
+    index = voxel_index(fissure.places, affine)
     core_there = ndimage.map_coordinates(core.astype(np.float32), index, order=1, mode="constant") > 0.5
     brain_there = ndimage.map_coordinates(field, index, order=1, mode="constant") > 0.5
     depth = ndimage.distance_transform_edt(~core_there) * SPACING_MM - FLOOR_MM
@@ -326,20 +327,14 @@ def open_fissure(
         return field
     depth = np.where(reached, depth, -ndimage.distance_transform_edt(~reached) * SPACING_MM)
     # voxels near the mid-surface: outside the opening by this distance
-    grid = np.indices(field.shape).reshape(3, -1).T
-    points = transform_points(grid, affine)
+    points = transform_points(np.indices(field.shape).reshape(3, -1).T, affine)
     height = np.abs(fissure.height_above(points))
     near = height < gap_mm / 2 + 2.0 * voxel
-    place = ((points[near] @ fissure.axes.T - fissure.corner) / SPACING_MM).T
-    below = -ndimage.map_coordinates(depth, place, order=1, mode="nearest")
+    below = -ndimage.map_coordinates(depth, fissure.cells(points[near]), order=1, mode="nearest")
     outside = np.maximum(height[near] - gap_mm / 2, below)
     result = field.ravel().copy()
     result[near] = np.minimum(result[near], np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0))
     return result.reshape(field.shape)
-
-
-def _index(places: Floats, affine: Floats) -> Floats:
-    return np.moveaxis(transform_points(places, np.linalg.inv(affine)), -1, 0)
 
 
 def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:
@@ -356,7 +351,7 @@ def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Float
 
 def sample(field: Floats, affine: Floats, points: Floats) -> Floats:
     """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
-    return ndimage.map_coordinates(field, _index(points, affine), order=1, mode="nearest")
+    return ndimage.map_coordinates(field, voxel_index(points, affine), order=1, mode="nearest")
 
 
 def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
@@ -395,13 +390,6 @@ def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fi
     weight = ndimage.gaussian_filter(crossed.astype(float), bend)
     total = ndimage.gaussian_filter(np.where(crossed, move, 0.0), bend)
     return replace(fissure, heights=fissure.heights + total / (weight + 0.02))
-
-
-def doubts_of_shift(fissure: Fissure) -> list[str]:
-    """Return what is doubtful about a mid-surface that bends far from its plane."""
-    shift = float(np.abs(fissure.heights).max())
-    bends = f"the fissure bends away from its plane by up to {shift:.0f} mm: check it"
-    return [bends] if shift > SHIFTED_MM else []
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -39,7 +39,6 @@ from .fissure import (
     MidPlane,
     between,
     cut_sides,
-    doubts_of_shift,
     fissure_between,
     fissure_between_labels,
     least_gap,
@@ -95,6 +94,8 @@ DOUBTFUL_ASYMMETRY = 0.03
 MOST_UNEQUAL = 15.0
 # voxels as large as this show the shape of a brain well enough for its pose
 OF_SHAPE_MM = 1.5
+# between hemispheres from surfaces, at least
+GAP_MM = 0.5
 # the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane
 BESIDE_MM = 0.5
 
@@ -222,7 +223,7 @@ def _fissure_of_labels(
     fissure = fissure_between(walls, plane)
     if to_right is not None:
         fissure = fissure_between_labels(to_right, affine, fissure)
-    return fissure, to_right, doubts + doubts_of_shift(fissure)
+    return fissure, to_right, doubts
 
 
 def from_hemispheres(
@@ -232,7 +233,6 @@ def from_hemispheres(
     week: float,
     coordinates: Coordinates = "ras",
     declared: bool = False,
-    gap_mm: float = 0.5,
     edge_length_mm: float = 1.0,
     smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
@@ -242,7 +242,7 @@ def from_hemispheres(
     """Return the pial surface of a brain from closed surfaces of its hemispheres.
 
     The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
-    together so that the mid-sagittal plane is x = const, and moved apart along x until they are `gap_mm` from each
+    together so that the mid-sagittal plane is x = const, and moved apart along x until they are 0.5 mm from each
     other. With coordinates "auto" each may be in any rigid pose, which its shape shows; `declared` is whether both
     files name one coordinate system. Where coordinates are named, a shape that contradicts them is warned of.
     InputError where the pose cannot be determined, or the hemispheres are swapped, of different size or not of the
@@ -270,12 +270,13 @@ def from_hemispheres(
     plane = mid_plane(merged(left, right), named=coordinates != "auto")
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     gap, to_right = least_gap(left, right), plane.normal
-    left, right, moved = set_apart(left, right, gap_mm, to_right)
+    left, right, moved = set_apart(left, right, GAP_MM, to_right)
     if moved > 0:
-        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {gap_mm:g} mm"])
+        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {GAP_MM:g} mm"])
         plane = mid_plane(merged(left, right), named=coordinates != "auto")
-    apart = {side: motion(shift=sign * moved * to_right) for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
-    pose = pose.each({side: shift @ pose.of_file(side) for side, shift in apart.items()})
+    apart = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
+    files = {side: shift @ pose.of_file(side) for side, shift in apart.items()}
+    pose = replace(pose, files={**pose.files, **files})
     measures = {"gap_before_mm": gap, "moved_apart_mm": moved}
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, **measures}
     for name, *steps in zip(SIDES, sides, even, strict=True):
@@ -326,9 +327,7 @@ def from_surface(
         return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
     mesh = transformed(even.mesh, pose.of_file())
     plane = mid_plane(mesh, named=coordinates != "auto")
-    fissure = fissure_between(mesh, plane)
-    warnings += logged(doubts_of_shift(fissure))
-    left = left_faces(mesh, fissure.height_above(corners(mesh).mean(axis=1)))
+    left = left_faces(mesh, fissure_between(mesh, plane).height_above(corners(mesh).mean(axis=1)))
     return _upright(mesh, left, plane, pose, week, {"source": "pial", **report}, warnings)
 
 

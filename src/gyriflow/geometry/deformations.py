@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from .triangles import Floats, TriangleMesh, frozen, transformed
@@ -53,6 +53,11 @@ def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
+def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
+    """Return the (3, …) indices of voxels, with fractions, at (…, 3) points in mm of a volume's (4, 4) affine."""
+    return np.moveaxis(transform_points(points, np.linalg.inv(np.asarray(affine, dtype=float))), -1, 0)
+
+
 def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Correspondence:
     """Return what two brains' correspondence is after (4, 4) rigid motions of the first and of the second."""
     if isinstance(pair, MatchedSurfaces):
@@ -63,7 +68,7 @@ def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Corres
 
 def carry(deformation: Deformation, points: Floats) -> Floats:
     """Return where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
-    index = transform_points(points, np.linalg.inv(deformation.affine)).T
+    index = voxel_index(points, deformation.affine)
     parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
     return transform_points(points + np.stack(parts, axis=1).astype(np.float64), deformation.matrix)
 

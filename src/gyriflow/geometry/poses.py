@@ -56,10 +56,6 @@ class Pose:
         files = {name: matrix @ one for name, one in self.files.items()}
         return replace(self, world=matrix @ self.world, files=files)
 
-    def each(self, files: Mapping[str, Floats]) -> "Pose":
-        """Return the pose with the motions of some files in the place of theirs."""
-        return replace(self, files={**self.files, **files})
-
     def plain(self) -> dict[str, Any]:
         """Return the pose in plain values for JSON."""
         files = {name: one.tolist() for name, one in self.files.items()}

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from ..geometry.alignment import angle_deg
+from ..geometry.deformations import voxel_index
 from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
-from .sections import PLANES, SCALE_BAR_MM, Extent, draw_image, draw_outline, plane_grid, voxel_index
+from .sections import PLANES, SCALE_BAR_MM, Extent, draw_image, draw_outline, plane_grid
 from .style import FULL_WIDTH_IN, REAL_SURFACE_COLOUR, new_figure, styled, wrap
 
 Verdict = Literal["fine", "look"]

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 
+from ..geometry.deformations import voxel_index
 from ..geometry.triangles import Floats, TriangleMesh
 from .labels import week_label
 from .style import (
@@ -76,12 +77,6 @@ def draw_image(axes: Axes, values: Floats, affine: ArrayLike, points: Floats, ex
     brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
     grey = map_coordinates(np.nan_to_num(values), voxel_index(points, affine), order=1)
     axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, origin="lower", extent=extent, interpolation="none")
-
-
-def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
-    """Return the (3, rows, columns) indices of voxels at (rows, columns, 3) places."""
-    inverse = np.linalg.inv(np.asarray(affine, dtype=float))
-    return np.moveaxis(points @ inverse[:3, :3].T + inverse[:3, 3], -1, 0)
 
 
 @styled

@@ -24,7 +24,7 @@ def test_surfaces_in_lps_are_flipped_once_and_volumes_never(coordinates, flip):
 
 
 def test_a_motion_after_a_pose_moves_all_and_sides_may_have_their_own():
-    pose = Pose(files={"left": LPS, "whole": LPS}, by="shape").each({"left": TURN}).then(rigid(0, 0, 90))
+    pose = Pose(files={"left": TURN, "whole": LPS}, by="shape").then(rigid(0, 0, 90))
     np.testing.assert_allclose(pose.of_file("left"), rigid(0, 0, 90) @ TURN)
     np.testing.assert_allclose(pose.of_file("right"), rigid(0, 0, 90) @ LPS)
     np.testing.assert_allclose(pose.world, rigid(0, 0, 90))
