@@ -18,7 +18,6 @@ from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersec
 from ..geometry.triangles import (
     TriangleMesh,
     area,
-    area_vectors,
     corners,
     edges,
     euler_number,
@@ -34,7 +33,7 @@ from ..geometry.triangles import (
 from ..parameters.terms import MOST_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
-from .extraction import EDGE_SLOPE, Floats, isosurface, make_simple, without_stalks
+from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks
 from .labels import REPORTED_LOSS
 
 log = logging.getLogger(__name__)
@@ -200,11 +199,11 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
         document.meshing_repair_non_manifold_vertices(vertdispratio=0.0)
         mesh = from_meshlab(document)
     faces, _ = igl.bfs_orient(mesh.faces)
-    agree = np.einsum("ij,ij->i", area_vectors(mesh), area_vectors(TriangleMesh(mesh.vertices, faces))) >= 0
+    turned = int((faces != mesh.faces).any(axis=1).sum())
     return TriangleMesh(mesh.vertices, faces), {
         "non_manifold_edges_opened": bad,
         "non_manifold_vertices_split": split,
-        "faces_turned_to_agree": int(min((~agree).sum(), agree.sum())),
+        "faces_turned_to_agree": min(turned, len(faces) - turned),
     }
 
 
@@ -234,13 +233,12 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
             else "Give a closed surface: holes of this size are not to be covered.",
         )
     vertices, faces = [mesh.vertices], [mesh.faces]
-    directed = {tuple(pair) for pair in mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()}
     for number, loop in enumerate(loops):
         centre = np.full(len(loop), len(mesh.vertices) + number)
         start, end = loop, np.roll(loop, -1)
         # the fan runs along the loop against the faces that are there
-        along = (int(start[0]), int(end[0])) in directed
-        faces.append(np.stack([end, start, centre] if along else [start, end, centre], axis=1))
+        along = (mesh.faces[:, [0, 1, 2]] == start[0]) & (mesh.faces[:, [1, 2, 0]] == end[0])
+        faces.append(np.stack([end, start, centre] if along.any() else [start, end, centre], axis=1))
         vertices.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
     counts = {"holes_closed": len(loops), "largest_hole_mm": max(sizes, default=0.0)}
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)), counts
@@ -286,11 +284,10 @@ def surface_of_mask(
     `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
     out. The report has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
     """
-    field, topology = make_simple(field, smallest)
-    rough = isosurface(field, affine)
+    simple, topology = make_simple(field, smallest)
+    rough = isosurface(simple, affine)
     even = make_sound(rough, smoothing_iterations, edge_length_mm)
-    voxels = sum(topology[f"voxels_{key}"] for key in ("filled", "filled_in_tunnels"))
-    voxels -= sum(topology[f"voxels_{key}"] for key in ("dropped", "cut_from_bridges"))
+    voxels = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(even.mesh, repaired_mm3 - taken_mm3, area(rough))
     warnings = list(even.warnings)

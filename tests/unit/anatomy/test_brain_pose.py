@@ -85,7 +85,11 @@ def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
 
 
 def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
-    pose = pose_of_volume_by_shape(transformed(ellipsoid((24, 33, 22)), rigid(*(50, 40, 30))), sided=False)
+    # neither front nor back, up nor down, and its axes are no file's
+    mesh = transformed(ellipsoid((24, 33, 22)), rigid(50, 40, 30))
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
+        pose_of_surface(mesh, "auto")
+    pose = pose_of_volume_by_shape(mesh, sided=False)
     assert np.array_equal(pose.world, np.eye(4))
     assert "unchecked" in pose.warnings[0]
 
@@ -100,18 +104,15 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
 
 
 @pytest.mark.fault(10)
-def test_the_shape_tells_lps_from_ras():
-    assert pose_of_surface(atlas_brain(), "auto").warnings == ()
-    lps = pose_of_surface(transformed(atlas_brain(), LPS), "auto")
-    np.testing.assert_array_equal(lps.of_file(), LPS)
-    assert "are LPS" in lps.warnings[0]
-
-
-def test_the_shape_tells_any_pose():
-    turn = rigid(100, 40, -70)
+@pytest.mark.parametrize(
+    ("turn", "most_deg", "said"),
+    [(np.eye(4), 1e-6, ()), (LPS, 1e-6, ("are LPS",)), (rigid(100, 40, -70), 5.0, ("as its shape says",))],
+    ids=["RAS", "LPS", "any"],
+)
+def test_the_shape_of_a_surface_tells_its_pose(turn, most_deg, said):
     pose = pose_of_surface(transformed(atlas_brain(), turn), "auto")
-    assert angle_deg(pose.world[:3, :3] @ turn[:3, :3]) < 5.0
-    assert "as its shape says" in pose.warnings[0]
+    assert angle_deg(pose.of_file()[:3, :3] @ turn[:3, :3]) < most_deg
+    assert [part in warning for part, warning in zip(said, pose.warnings, strict=True)] == [True] * len(said)
 
 
 def test_coordinates_that_are_named_are_kept_and_doubted():
@@ -127,13 +128,6 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
     pose = pose_of_surface(mesh, "auto")
     assert pose.by == "default"
     assert "set coordinates" in pose.warnings[0]
-
-
-def test_a_shape_without_a_pose_is_refused():
-    # neither front nor back, up nor down, and its axes are no file's
-    mesh = transformed(ellipsoid((24, 33, 22)), rigid(*(50, 40, 30)))
-    with pytest.raises(InputError, match="cannot be determined from its shape"):
-        pose_of_surface(mesh, "auto")
 
 
 @pytest.mark.fault(9, 10)

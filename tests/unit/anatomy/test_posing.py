@@ -20,7 +20,7 @@ from gyriflow.anatomy.template import MIRROR, medial_wall, shape_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
-from gyriflow.io.surfaces import declared, read_surface, write_surface
+from gyriflow.io.surfaces import read_surface
 from gyriflow.parameters.terms import SIDES
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")) / "hemispheres"
@@ -139,13 +139,6 @@ def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
         there, ended = transformed(file, surface.pose.of_file(name)).vertices, getattr(surface, name).vertices
         for edge in (np.min, np.max):
             np.testing.assert_allclose(edge(there, axis=0), edge(ended, axis=0), atol=1.0)
-
-
-def test_files_say_their_axes_and_side(tmp_path, halves):
-    write_surface(tmp_path / "left.surf.gii", halves[0], "CortexLeft")
-    assert declared(tmp_path / "left.surf.gii") == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
-    write_surface(tmp_path / "left.stl", halves[0])
-    assert declared(tmp_path / "left.stl") == (None, None)
 
 
 @pytest.mark.slow

@@ -18,7 +18,6 @@ from gyriflow.geometry.triangles import (
     submesh,
     unit,
 )
-from gyriflow.metrics.measure import measure_brain
 
 AXES = (10.0, 13.0, 8.0)
 
@@ -81,16 +80,6 @@ def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
     assert corners(surface.left)[:, :, 0].mean(axis=1).max() < 0 < corners(surface.right)[:, :, 0].mean(axis=1).min()
     assert area(surface.left) + area(surface.right) == pytest.approx(area(shape))
     assert area(surface.left) == pytest.approx(area(shape) / 2, rel=0.02)
-
-
-def test_a_sphere_is_measured_as_a_sphere():
-    surface = from_shape(ball(1.0), week=21.0)
-    table = measure_brain(surface.whole, surface.left, surface.right).table
-    whole = table[table["hemisphere"] == "whole"].set_index("metric")["value"]
-    assert whole["mean_shape_index"] == pytest.approx(1.0, abs=0.005)
-    assert whole["mean_curvedness"] == pytest.approx(1 / 15, rel=0.02)
-    assert whole["gyrification_index"] == pytest.approx(1.0, abs=0.001)
-    assert whole["area"] == pytest.approx(4 * np.pi * 1.5**2, rel=0.01)
 
 
 def test_a_shape_that_is_not_closed_or_cuts_itself_is_refused():
