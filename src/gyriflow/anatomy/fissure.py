@@ -244,7 +244,7 @@ class Fissure:
 
     def cells(self, points: Floats) -> Floats:
         """Return the (2, n) places of (n, 3) points among the heights, in steps of these."""
-        return ((points @ self.axes.T - self.corner) / SPACING_MM).T
+        return np.asarray((points @ self.axes.T - self.corner).T / SPACING_MM, dtype=np.float64)
 
     def nearest_cells(self, points: Floats) -> tuple[Ints, ...]:
         """Return the indices, two of (n,), of the heights nearest to (n, 3) points."""

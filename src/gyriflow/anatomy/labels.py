@@ -75,10 +75,6 @@ class Cerebrum:
     def volume_mm3(self) -> float:
         return float(self.mask.sum() * abs(np.linalg.det(self.affine[:3, :3])))
 
-    @property
-    def extents_mm(self) -> Floats:
-        return np.linalg.norm(self.affine[:3, :3], axis=0) * (np.array(self.mask.shape) - 2 * PAD_VOXELS)
-
 
 def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cortex: float = 0.0) -> Cerebrum:
     """Return the cerebrum without ventricles that its tissue does not enclose, what hangs on it by thin stalks, and
@@ -90,7 +86,8 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
     mask = cerebrum_mask(labels, scheme)
     report: dict[str, Any] = {}
     warnings = []
-    if missing := missing_tissues(labels, scheme):
+    lacked = np.setdiff1d(scheme.cerebrum, labels)
+    if missing := [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number in lacked]:
         report["missing_tissues"] = missing
         log.info("tissues that this brain does not have: %s", ", ".join(missing[:20]))
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
@@ -115,15 +112,12 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, least_cor
         if empty.any():
             nearest = ndimage.distance_transform_edt(~named, return_distances=False, return_indices=True)
             tissue[empty] = labels[tuple(nearest[:, empty])]
-    report["outside"] = {"ventricles_mL": float(open_fluid.sum() * voxel_ml), "stalks": stalks}
-    report["outside"] |= {"parts": parts, "parts_mL": float(apart * voxel_ml)}
-    lost = report["outside"]["ventricles_mL"] + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
-    if lost > 0:
-        said = f"{lost:.2f} mL of the cerebrum's labels lie outside it or hang on a thin stalk: left out"
-        if lost > REPORTED_LOSS * mask.sum() * voxel_ml:
-            warnings.append(said)
-        else:
-            log.info(said)
+    fluid_ml = float(open_fluid.sum() * voxel_ml)
+    apart_ml = {"parts": parts, "parts_mL": float(apart * voxel_ml)}
+    report["outside"] = {"ventricles_mL": fluid_ml, "stalks": stalks, **apart_ml}
+    lost = fluid_ml + sum(stalk["volume_mm3"] for stalk in stalks) * ML_PER_MM3
+    if lost > REPORTED_LOSS * mask.sum() * voxel_ml:
+        warnings.append(f"{lost:.2f} mL of the cerebrum's labels lie outside it or hang on a thin stalk: left out")
     fluid = kept & (np.isin(labels, scheme.ventricles) | unlabelled)
     volumes = {"cerebrum": kept}
     if scheme.cortex:
@@ -168,12 +162,6 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
                 expected="voxels of " + _listed(numbers, scheme),
             )
     return np.isin(labels, scheme.cerebrum)
-
-
-def missing_tissues(labels: Labels, scheme: LabelScheme) -> list[str]:
-    """Return the tissues of the cerebrum, such as "8 corpus callosum", that a label volume does not have."""
-    present = set(map(int, np.unique(labels)))
-    return [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number not in present]
 
 
 def require_cortex_outside(

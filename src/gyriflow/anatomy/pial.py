@@ -64,7 +64,6 @@ from .labels import (
 from .plausible import (
     DOUBTFUL_RATIO,
     doubts_of_proportions,
-    narrowness,
     require_common_pose,
     require_one,
     require_pair,
@@ -147,10 +146,9 @@ def from_labels(
     mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
     warnings = logged(cerebrum.warnings)
     pose = Pose() if side else pose_of_labels(labels, affine, scheme)
-    if side:
-        _require_no_other(tissue, scheme, side)
-    sides = 2.0 if side else 1.0
-    warnings += logged(require_plausible_size(sides * cerebrum.volume_mm3, cerebrum.extents_mm, week))
+    if side and set(_labelled_sides(tissue, scheme)) - {side}:
+        raise InputError(f"the volume holds labels of another hemisphere than the {side} one")
+    warnings += logged(require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, week))
     if (share := report["border_share"]) > REPORTED_LOSS:
         cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
         warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
@@ -253,7 +251,7 @@ def from_hemispheres(
     warnings = logged(warning for side in sides for warning in side.warnings)
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
-    warnings += logged(require_plausible_size(volume, np.ptp(merged(left, right).vertices, axis=0), week))
+    warnings += logged(require_plausible_size(volume, week))
     if coordinates == "auto":
         pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
@@ -307,8 +305,7 @@ def from_surface(
     """
     clean = sound_pieces(mesh, max_hole_mm, one=side is not None)
     warnings = logged(clean.warnings)
-    volume, extents = signed_volume(clean.mesh), np.ptp(clean.mesh.vertices, axis=0)
-    warnings += logged(require_plausible_size((2.0 if side else 1.0) * volume, extents, week))
+    warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
         require_one(clean.mesh)
     even = make_sound(clean.mesh, smoothing_iterations, edge_length_mm)
@@ -423,31 +420,22 @@ def _single_hemisphere(
     return _pial_surface(whole, left, right, fissure_x, pose, week, report, warnings)
 
 
-def _require_no_other(tissue: Labels, scheme: LabelScheme, side: Side) -> None:
-    others = np.intersect1d(scheme.right if side == "left" else scheme.left, scheme.cortex)
-    if len(others) and np.isin(tissue, others).any():
-        raise InputError(
-            f"the volume holds labels of another hemisphere than the {side} one",
-            found=", ".join(scheme.labels[n] for n in others if (tissue == n).any()),
-            expected=f"those of the {side} hemisphere",
-        )
+def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
+    cortex = scheme.cortex or scheme.cerebrum
+    there = {"left": scheme.left, "right": scheme.right}
+    return [side for side in SIDES if np.isin(tissue, np.intersect1d(there[side], cortex)).any()]
 
 
 def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.float32]) -> list[str]:
-    sides = {
-        name: bool(np.isin(cerebrum.tissue, np.intersect1d(numbers, scheme.cortex or scheme.cerebrum)).any())
-        for name, numbers in (("left", scheme.left), ("right", scheme.right))
-    }
-    # a part that is left out below, for its size, makes no second hemisphere
-    parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
-    surface = isosurface(smooth_mask(parts, 1.0), cerebrum.affine)
-    if scheme.left and sum(sides.values()) == 1:
+    if len(there := _labelled_sides(cerebrum.tissue, scheme)) == 1:
         raise InputError(
-            f"the volume has labels of the {'left' if sides['left'] else 'right'} hemisphere only",
-            found=f"a cerebrum whose narrowest extent is {narrowness(surface):.2f} of its longest",
+            f"the volume has labels of the {there[0]} hemisphere only",
             expected="labels of both hemispheres",
             remedy="Choose a scheme without left and right, or give the only one under hemisphere, with its side.",
         )
+    # a part that is left out below, for its size, makes no second hemisphere
+    parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
+    surface = isosurface(smooth_mask(parts, 1.0), cerebrum.affine)
     # a brain that the field of view cuts off may be as flat, which has been reported already
     return require_whole(surface, "volume", refuses=cerebrum.report["border_share"] <= REPORTED_LOSS)
 

@@ -31,11 +31,10 @@ def expected_volume_ml(week: float) -> float:
     return float(EARLY[1] * np.exp(rate * (week - EARLY[0])))
 
 
-def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -> list[str]:
+def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
     """Return what is doubtful about a cerebrum's volume at its week: below 0.55 or above 1.45 of the published one.
 
     InputError where it is out of all proportion, less than a fifth or more than six times, with a guess of the unit.
-    `extents_mm` (3,) only appears in the message.
     """
     expected = expected_volume_ml(week)
     volume = volume_mm3 * ML_PER_MM3
@@ -48,7 +47,7 @@ def require_plausible_size(volume_mm3: float, extents_mm: Floats, week: float) -
     guess = next((u for u, mm in UNITS_MM.items() if LEAST <= volume * mm**3 / expected <= MOST), None)
     raise InputError(
         f"the cerebrum's size is not that of week {week:g}",
-        found=f"{volume:.3g} mL, {' x '.join(f'{extent:.3g}' for extent in extents_mm)} mm",
+        found=f"{volume:.3g} mL",
         expected=f"{LEAST * expected:.0f} to {MOST * expected:.0f} mL",
         remedy=f"The file seems to be in {guess}: give it in mm, with mm in the header."
         if guess

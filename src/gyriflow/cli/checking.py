@@ -186,7 +186,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
     cerebrum = read_cerebrum(read.labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
     if whole:
-        yield from require_plausible_size(cerebrum.volume_mm3, cerebrum.extents_mm, brain.week)
+        yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
 
 def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:

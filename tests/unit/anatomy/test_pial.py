@@ -123,7 +123,7 @@ def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
     ("share", "doubted"), [(0.57, False), (1.27, False), (0.8**-3, True), (0.3, True), (0.5, True), (1.5, True)]
 )
 def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
-    said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, np.ones(3), 24.0)
+    said = require_plausible_size(share * expected_volume_ml(24.0) * 1e3, 24.0)
     assert [f"has {100 * share:.0f} % of the volume expected at week 24" in doubt for doubt in said] == [True] * doubted
 
 
