@@ -252,35 +252,33 @@ def from_hemispheres(
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
     warnings += logged(require_plausible_size(volume, week))
-    if coordinates == "auto":
+    if named := coordinates != "auto":
+        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
+    else:
         pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
         warnings += logged(pose.warnings)
-    else:
-        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
     length = float(np.ptp(merged(left, right).vertices, axis=0).max())
     warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
-    if coordinates != "auto":
+    if named:
         warnings += logged(doubts_of_hemispheres(left, right, coordinates))
     even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
     warnings += logged(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
-    plane = mid_plane(merged(left, right), named=coordinates != "auto")
+    plane = mid_plane(merged(left, right), named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     gap, to_right = least_gap(left, right), plane.normal
     left, right, moved = set_apart(left, right, GAP_MM, to_right)
     if moved > 0:
         warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {GAP_MM:g} mm"])
-        plane = mid_plane(merged(left, right), named=coordinates != "auto")
+        plane = mid_plane(merged(left, right), named=named)
     apart = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
     files = {side: shift @ pose.of_file(side) for side, shift in apart.items()}
     pose = replace(pose, files={**pose.files, **files})
-    measures = {"gap_before_mm": gap, "moved_apart_mm": moved}
-    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, **measures}
+    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, "moved_apart_mm": moved}
+    report["gap_before_mm"] = gap
     for name, *steps in zip(SIDES, sides, even, strict=True):
-        report |= {f"{key}_{name}": value for one in steps for key, value in one.report.items() if key != "stalks"}
-    if stalks := [stalk for side in sides for stalk in side.report.get("stalks", [])]:
-        report["stalks"] = stalks
+        report |= {f"{key}_{name}": value for one in steps for key, value in one.report.items()}
     mesh = merged(left, right)
     return _upright(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, pose, week, report, warnings)
 
