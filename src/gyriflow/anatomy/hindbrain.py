@@ -47,8 +47,14 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
         if np.isin(labels, numbers).any()
     }
     hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
-    voxels = np.isin(labels, scheme.cerebrum).sum()
-    _require_outside(hindbrain, float(np.cbrt(voxels * abs(np.linalg.det(affine[:3, :3])))), scheme)
+    size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
+    for name, way in hindbrain.items():
+        if (share := np.linalg.norm(way) / size) < LEAST_OUTSIDE:
+            raise InputError(
+                f"what the scheme {scheme.name!r} calls the {name} lies inside what it calls the cerebrum",
+                found=f"its centre {share:.2f} of the cerebrum's size (the cube root of its volume) from the middle",
+                expected=f"{LEAST_OUTSIDE} or more",
+            )
     sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
     rotation = _turn_of_hindbrain(hindbrain)
     if sides is not None and hindbrain:
@@ -76,16 +82,6 @@ def judged_turn(rotation: Floats, witness: str, sided: bool) -> Pose:
         return turned(rotation, witness.removeprefix("the "), "ras", warning if sided else f"{warning}; {OR_MIRRORED}")
     doubt = f"{witness} {say} that the brain is turned by about {angle:.0f}°: {PITCH_KEPT}"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
-
-
-def _require_outside(hindbrain: dict[str, Floats], size: float, scheme: LabelScheme) -> None:
-    for name, way in hindbrain.items():
-        if (share := float(np.linalg.norm(way)) / size) < LEAST_OUTSIDE:
-            raise InputError(
-                f"what the scheme {scheme.name!r} calls the {name} lies inside what it calls the cerebrum",
-                found=f"its centre {share:.2f} of the cerebrum's size (the cube root of its volume) from the middle",
-                expected=f"{LEAST_OUTSIDE} or more",
-            )
 
 
 def _turn_of_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:

@@ -146,7 +146,7 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
 
 
 def _kept_as_ras(one: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
-    """Return the file's pose for a shape that fits others as well; InputError where it does not nearly fit near it.
+    """Return the file's pose for a shape that fits others as well; InputError where it fits worse near RAS+.
 
     Few random poses are so near to it: this is evidence where the shape leaves a choice.
     """

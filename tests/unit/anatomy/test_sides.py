@@ -72,7 +72,7 @@ def test_a_volume_without_a_hindbrain_has_the_surface_of_the_brain_that_stands_r
     np.testing.assert_allclose(turned, right, rtol=0.02)
 
 
-def test_smoothing_keeps_volume_and_area(bent):
+def test_smoothing_keeps_volume_and_area():
     labels, affine = phantom(22.0)
     surface = from_labels(labels, affine, SCHEMES["spina-bifida-atlas"], week=22.0, edge_length_mm=1.5)
     smoothing = surface.report["smoothing"]
