@@ -58,11 +58,7 @@ def labelled(change=lambda labels, affine: labels, scheme="spina-bifida-atlas", 
 
 def whole(mesh, suffix="surf.gii", **more):
     def made(folder, name):
-        if suffix == "vtk":
-            body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-            body.save(folder / f"{name}.vtk")
-        else:
-            write_surface(folder / f"{name}.{suffix}", mesh)
+        write_surface(folder / f"{name}.{suffix}", mesh)
         return {"pial": f"{name}.{suffix}"} | more
 
     return made
@@ -119,7 +115,7 @@ GOOD = {
     "cropped": labelled(odd_brains.crop),
     "upside_down": labelled(turn=rigid(180, 0, 0)),
     "backwards": labelled(odd_brains.add_sides, "dhcp-19", rigid(0, 0, 180)),
-    "pial_vtk": whole(with_polyp(WHOLE), "vtk"),
+    "pial_ply": whole(with_polyp(WHOLE), "ply"),
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
     "unequal": both_sides(LEFT, LARGER),
     "bent": whole(cerebrum_surface(odd_brains.bent_midline(APART, AFFINE), AFFINE)),
@@ -162,7 +158,7 @@ def measuring(checkout_copy, study):
 # what is said of brains that are used all the same
 WARNED = {
     "polyp": "lie outside it or hang on a thin stalk: left out",
-    "pial_vtk": "hung on a stalk",
+    "pial_ply": "hung on a stalk",
     "wide": "the hemispheres' areas differ by 1",
     "cropped": "the cerebrum touches the border of the volume",
     "upside_down": "the brain was turned by 180°",
@@ -171,7 +167,7 @@ WARNED = {
     "hypoplasia": "the hemispheres' areas differ by",
 }
 WARNINGS = trying(
-    {"polyp": 46, "pial_vtk": 46, "wide": 52, "cropped": 48, "upside_down": 49, "backwards": 49, "unequal": 52}
+    {"polyp": 46, "pial_ply": 46, "wide": 52, "cropped": 48, "upside_down": 49, "backwards": 49, "unequal": 52}
     | {"hypoplasia": 52}
 )
 
@@ -207,7 +203,7 @@ def test_what_hangs_below_the_brain_is_left_out(study):
     assert polyp["outside"]["ventricles_mL"] > 0.4
     assert polyp["volume_mL"] == pytest.approx(plain["volume_mL"], rel=0.005)
     assert polyp["extents_mm"][2] == pytest.approx(plain["extents_mm"][2], abs=1.0)
-    assert len(study.report("pial_vtk")["stalks"]) == 1
+    assert len(study.report("pial_ply")["stalks"]) == 1
 
 
 @pytest.mark.fault(47)

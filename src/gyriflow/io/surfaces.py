@@ -1,4 +1,4 @@
-"""Triangle surfaces (GIFTI, VTK, STL, PLY, OBJ, FreeSurfer), in mm, and maps and labels at their vertices (GIFTI).
+"""Triangle surfaces (GIFTI, FreeSurfer, STL, PLY, OBJ), in mm, and maps and labels at their vertices (GIFTI).
 
 Where a file says in which space its coordinates are, they are brought to scanner space.
 """
@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import nibabel as nib
@@ -22,40 +22,41 @@ from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed
 from ..parameters.terms import STRUCTURES, Side
-from .files import AGAIN, AnyPath, read_json, reading, replaced, require_finite
-
-if TYPE_CHECKING:
-    import pyvista as pv
+from .files import AnyPath, read_json, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
-VTK_SUFFIXES = (".vtk", ".vtp")
-SURFACE_KINDS = ".surf.gii, .vtk, .vtp, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
+SURFACE_KINDS = ".surf.gii, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
 FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
-    """Return the surface of a GIFTI, VTK, STL, PLY, OBJ or FreeSurfer file, in the order of corners of the file.
+    """Return the surface of a GIFTI, FreeSurfer, STL, PLY or OBJ file, in the order of corners of the file.
 
     Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
     there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
     vertices, and coordinates that are not those of the subject.
     """
+    return surface_and_space(path)[0]
+
+
+def surface_and_space(path: AnyPath) -> tuple[TriangleMesh, str | None]:
+    """Return a surface as `read_surface` does, and the space of its coordinates, None where the file does not say it.
+
+    The space is a NIfTI transform code's name, such as "NIFTI_XFORM_SCANNER_ANAT".
+    """
     path = Path(path)
-    suffix = path.suffix.lower()
     with reading(path, "a surface", SURFACE_KINDS):
-        if suffix in MESH_SUFFIXES:
-            vertices, faces = _read_with_trimesh(path)
-        elif suffix in VTK_SUFFIXES:
-            vertices, faces = _read_with_pyvista(path)
+        if path.suffix.lower() in MESH_SUFFIXES:
+            vertices, faces, space = *_read_with_trimesh(path), None
         elif _is_gifti(path):
-            vertices, faces = _read_gifti_surface(path)
+            vertices, faces, space = _read_gifti_surface(path)
         else:
-            vertices, faces = _read_freesurfer_surface(path)
+            vertices, faces, space = _read_freesurfer_surface(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
         found = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
         raise InputError("holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces")
@@ -66,21 +67,7 @@ def read_surface(path: AnyPath) -> TriangleMesh:
         found = f"indices {faces.min():.6g} to {faces.max():.6g}"
         expected = f"whole numbers from 0 to {len(vertices) - 1}"
         raise InputError("has faces that name vertices which do not exist", path=path, found=found, expected=expected)
-    return TriangleMesh(vertices, np.rint(faces).astype(np.int64))
-
-
-def declared(path: AnyPath) -> tuple[str | None, str | None]:
-    """Return what a surface's file says of itself: the space its coordinates are read in, and its structure.
-
-    Both are None where it does not say so. The space is a NIfTI transform code's name, such as
-    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
-    """
-    if Path(path).suffix.lower() in (*MESH_SUFFIXES, *VTK_SUFFIXES):
-        return None, None
-    structure = _structure(path)
-    if not _is_gifti(path):
-        return SCANNER if _volume(path)[2] is not None else None, structure
-    return to_scanner_space(coordinate_systems(path), path)[1], structure
+    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
@@ -88,18 +75,23 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
     InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
     """
-    meshes = read_one_hemisphere(left, "left"), read_one_hemisphere(right, "right")
-    spaces = [declared(path)[0] for path in (left, right)]
-    return *meshes, spaces[0] is not None and len(set(spaces)) == 1
+    _require_side(left, "left")
+    _require_side(right, "right")
+    (one, space), (other, other_space) = surface_and_space(left), surface_and_space(right)
+    return one, other, space is not None and space == other_space
 
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
     """Return the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
+    _require_side(path, side)
+    return read_surface(path)
+
+
+def _require_side(path: AnyPath, side: Side) -> None:
     named, expected = _structure(path), STRUCTURES[side]
     if named in STRUCTURES.values() and named != expected:
         remedy = "Swap `left` and `right`, or mend what the file says of itself (AnatomicalStructurePrimary, lh or rh)."
         raise InputError("is of the other hemisphere", path=path, found=named, expected=expected, remedy=remedy)
-    return read_surface(path)
 
 
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
@@ -177,8 +169,6 @@ def _is_gifti(path: AnyPath) -> bool:
 
 
 def _structure(path: AnyPath) -> str | None:
-    if Path(path).suffix.lower() in (*MESH_SUFFIXES, *VTK_SUFFIXES):
-        return None
     if not _is_gifti(path):
         return FREESURFER_SIDES.get(Path(path).name.split(".")[0])
     image = load_gifti(path)
@@ -189,49 +179,18 @@ def _structure(path: AnyPath) -> str | None:
     return named
 
 
-def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray]:
+def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None]:
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
     if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):
         found = f"{len(points)} arrays of points, {len(triangles)} of triangles"
         raise InputError("holds no surface", path=path, found=found, expected="one of each (.surf.gii)")
-    vertices = np.asarray(points[0].data, dtype=float)
-    matrix, space = to_scanner_space(coordinate_systems(path), path)
+    matrix, space = _to_scanner_space(_coordinate_systems(path), path)
     if space is None:
-        warn_of_tkr_ras(points[0].meta, path)
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], np.asarray(triangles[0].data)
-
-
-def _read_with_pyvista(path: Path) -> tuple[Floats, NDArray]:
-    import pyvista as pv
-
-    data = pv.read(path)
-    if not isinstance(data, pv.UnstructuredGrid | pv.PolyData) or not data.n_points or not data.n_cells:
-        raise InputError("holds no surface", path=path, found=type(data).__name__, expected="polygons (PolyData)")
-    _require_sound_cells(data, path)
-    surface = data.extract_surface(algorithm=None) if isinstance(data, pv.UnstructuredGrid) else data
-    surface = surface.triangulate()
-    return np.asarray(surface.points, dtype=float), np.asarray(surface.regular_faces)
-
-
-def _require_sound_cells(data: "pv.UnstructuredGrid | pv.PolyData", path: Path) -> None:
-    import pyvista as pv
-
-    arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else []
-    if isinstance(data, pv.PolyData):
-        arrays = [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
-    for cells in arrays:
-        corners, starts = (pv.convert_array(array) for array in (cells.GetConnectivityArray(), cells.GetOffsetsArray()))
-        named = len(corners) == 0 or 0 <= corners.min() <= corners.max() < data.n_points
-        whole = len(starts) == 0 or (
-            starts[0] == 0 and starts[-1] == len(corners) and np.all(np.diff(starts.astype(np.int64)) >= 0)
-        )
-        if not (named and whole):
-            found = f"points {corners.min()} to {corners.max()}" if len(corners) else "cells without points"
-            problem, expected = "has cells that name points which do not exist", f"0 to {data.n_points - 1}"
-            raise InputError(problem, path=path, found=found, expected=expected, remedy=AGAIN)
-    require_finite(np.asarray(data.points), path, "coordinates", "vertices")
+        _warn_of_tkr_ras(points[0].meta, path)
+    vertices = np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
+    return vertices, np.asarray(triangles[0].data), space
 
 
 def _read_with_trimesh(path: Path) -> tuple[Floats, NDArray]:
@@ -261,8 +220,7 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
     mesh = read_surface(path)
     triangles = np.sort(mesh.faces, axis=1)
     triangles = triangles[np.lexsort(triangles.T)]
-    digest = hashlib.sha256(np.ascontiguousarray(triangles)).hexdigest()
-    return len(mesh.vertices), len(mesh.faces), digest
+    return len(mesh.vertices), len(mesh.faces), hashlib.sha256(triangles.tobytes()).hexdigest()
 
 
 NO_REGION = 0
@@ -316,13 +274,9 @@ C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
 """FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in scanner space, in mm."""
 
 
-def coordinate_systems(path: AnyPath) -> list[System]:
-    """Return the coordinate systems of the points of a GIFTI file, all of them, in the file's order.
-
-    nibabel keeps one only. InputError where a matrix has not 16 finite numbers.
-    """
-    opener = nib.openers.ImageOpener(str(path), "rb")
-    with opener as stream:
+def _coordinate_systems(path: AnyPath) -> list[System]:
+    # all of them, in the file's order: nibabel keeps one only
+    with nib.openers.ImageOpener(str(path), "rb") as stream:
         root = ElementTree.parse(stream).getroot()
     systems: list[System] = []
     points = [array for array in root.iter("DataArray") if array.get("Intent") in ("NIFTI_INTENT_POINTSET", "1008")]
@@ -339,13 +293,12 @@ def coordinate_systems(path: AnyPath) -> list[System]:
     return systems
 
 
-def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
+def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
     """Return the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
 
     A rigid matrix into scanner or aligned space is applied. None is where the coordinates are in one of these already.
     Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is logged.
-    The space is None where the file does not say it. InputError for matrices into scanner space that change sizes, and
-    for coordinates in Talairach or MNI space that a matrix leads out of.
+    InputError for matrices into scanner space that change sizes.
     """
     moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
     own = next((data for data, _, _ in systems if data in SUBJECT), None)
@@ -353,16 +306,14 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
         for _, to, _ in moving:
             log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, own, to)
         return np.eye(4), own
-    for space in SUBJECT:
-        for data, to, matrix in moving:
-            if to != space:
-                continue
-            rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
-            if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
-                problem = f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors"
-                raise InputError(problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion")
-            log.warning("%s: the coordinate-system matrix of the file was applied, to %s", path, to)
-            return matrix, to
+    into_subject = (system for system in moving if system[1] in SUBJECT)
+    for data, to, matrix in sorted(into_subject, key=lambda system: SUBJECT.index(system[1])):
+        rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
+        if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
+            problem = f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors"
+            raise InputError(problem, path=path, found=f"\n{matrix}\n", expected="a rigid motion")
+        log.warning("%s: the coordinate-system matrix of the file was applied, to %s", path, to)
+        return matrix, to
     for _, to, matrix in moving:
         size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
         said = "%s: its matrix to %s, which scales by %.3g, was not applied: sizes are the subject's own"
@@ -373,12 +324,8 @@ def to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str 
     return np.eye(4), named or next((to for _, to, _ in systems if to in SUBJECT), None)
 
 
-def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
-    """Warn where points whose space a file does not say may be relative to the centre of a volume (tkr RAS).
-
-    `metadata` are those of the points. FreeSurfer's converter gives the volume's centre there, whichever space it
-    writes the points in.
-    """
+def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
+    # FreeSurfer's converter gives the volume's centre with the points, whichever space it writes them in
     try:
         centre = [float(metadata[key]) for key in C_RAS]
     except (KeyError, ValueError):
@@ -392,29 +339,19 @@ def warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
         log.warning(said, path, *centre)
 
 
-def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, Ints]:
-    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, in scanner space.
+def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, Ints, str | None]:
+    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, and their space.
 
-    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file.
-    Without it they stay relative to that centre, and a warning says so. InputError for any other kind of file.
+    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file, by which
+    they are brought to scanner space. Without it they stay relative to that centre, and a warning says so.
     """
-    vertices, faces, matrix = _volume(path)
-    if matrix is None:
-        log.warning("%s: says nothing of its volume: the coordinates are relative to its centre (tkr RAS)", path)
-        return vertices, faces
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces
-
-
-def _volume(path: AnyPath) -> tuple[Floats, Ints, Floats | None]:
-    # the warnings are about missing geometry, which is reported
-    with reading(path, "a surface", SURFACE_KINDS), warnings.catch_warnings(action="ignore", category=UserWarning):
+    # its warnings are about missing geometry, which is reported
+    with warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)
-    vertices, faces = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
     if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
-        return vertices, faces, None
+        log.warning("%s: says nothing of its volume: the coordinates are relative to its centre (tkr RAS)", path)
+        return np.asarray(vertices, dtype=float), faces, None
     axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
-    matrix = np.eye(4)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward
-    matrix[:3, :3] = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    matrix[:3, 3] = info["cras"]
-    return vertices, faces, matrix
+    rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER
