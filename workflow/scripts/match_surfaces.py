@@ -3,7 +3,7 @@
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.growth.matched_surfaces import match_surfaces, outward
-from gyriflow.io.registrations import write_matched_surfaces
+from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
@@ -18,4 +18,4 @@ with step(snakemake.log[0], *first, *second):
     found, report = match_surfaces(*surfaces)
     # correspondences are between the brains' own worlds, as registrations are
     between = between_moved(found, *(pose.inverse for pose in poses))
-    write_matched_surfaces(snakemake.output[0], between, report)
+    write_correspondence(snakemake.output[0], between, report)

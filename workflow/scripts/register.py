@@ -5,7 +5,7 @@ from dataclasses import asdict
 from gyriflow.growth.channels import channels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import judge, require_good
-from gyriflow.io.registrations import write_deformation
+from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_label_volume, read_values
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.step import step
@@ -24,4 +24,4 @@ with step(snakemake.log[0], files.earlier, files.later):
     quality = judge(*brains, found.deformation)
     require_good(quality, pair=f"{names.earlier} to {names.later}")
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}
-    write_deformation(snakemake.output[0], found.deformation, report | asdict(quality))
+    write_correspondence(snakemake.output[0], found.deformation, report | asdict(quality))

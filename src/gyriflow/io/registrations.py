@@ -14,31 +14,26 @@ from .files import AnyPath, new_hdf5, reading_hdf5
 AGAIN = "Register the brains, or match their surfaces, again."
 
 
-def write_deformation(path: AnyPath, deformation: Deformation, report: Mapping[str, Any]) -> None:
-    """Write the data sets matrix (4, 4), displacement (i, j, k, 3) in mm, float32, and affine (4, 4) of its grid.
+def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[str, Any]) -> None:
+    """Write what takes one brain to another; the `report` is kept as JSON in an attribute of that name.
 
-    A point p goes to matrix (p + displacement(p)). The `report` is kept as JSON in an attribute of that name.
+    A deformation has the data sets matrix (4, 4), displacement (i, j, k, 3) in mm, float32, and affine (4, 4) of its
+    grid: a point p goes to matrix (p + displacement(p)). Matched surfaces have first (n, 3) and second (n, 3) in mm,
+    and faces (m, 3).
     """
     with new_hdf5(path) as file:
-        file["matrix"] = deformation.matrix
-        file["affine"] = deformation.affine
-        file.create_dataset(
-            "displacement", data=deformation.displacement.astype(np.float32), compression="gzip", shuffle=True
-        )
-        file.attrs["report"] = json.dumps(dict(report))
-
-
-def write_matched_surfaces(path: AnyPath, matched: MatchedSurfaces, report: Mapping[str, Any]) -> None:
-    """Write the data sets first (n, 3) and second (n, 3) in mm, and faces (m, 3); the `report` as a deformation's."""
-    with new_hdf5(path) as file:
-        for name, points in (("first", matched.first.vertices), ("second", matched.second)):
-            file.create_dataset(name, data=points, compression="gzip", shuffle=True)
-        file.create_dataset("faces", data=matched.first.faces, compression="gzip", shuffle=True)
+        if isinstance(pair, Deformation):
+            file["matrix"], file["affine"] = pair.matrix, pair.affine
+            large = {"displacement": pair.displacement.astype(np.float32)}
+        else:
+            large = {"first": pair.first.vertices, "second": pair.second, "faces": pair.first.faces}
+        for name, values in large.items():
+            file.create_dataset(name, data=values, compression="gzip", shuffle=True)
         file.attrs["report"] = json.dumps(dict(report))
 
 
 def read_correspondence(path: AnyPath) -> Correspondence:
-    """Return what `write_deformation` or `write_matched_surfaces` has written; InputError for other files."""
+    """Return what `write_correspondence` has written; InputError for other files."""
     expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
     with reading_hdf5(path, "a correspondence of brains", expected, AGAIN) as file:
         if "faces" in file:

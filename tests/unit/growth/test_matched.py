@@ -12,7 +12,7 @@ from gyriflow.io.registrations import (
     WeeklyShapes,
     read_correspondence,
     read_weekly_shapes,
-    write_matched_surfaces,
+    write_correspondence,
     write_weekly_shapes,
 )
 
@@ -85,7 +85,7 @@ def test_regions_are_carried_along_matched_surfaces():
 
 
 def test_matched_surfaces_are_read_as_written(tmp_path):
-    write_matched_surfaces(tmp_path / "a.h5", GROWN, {"vertices": 3})
+    write_correspondence(tmp_path / "a.h5", GROWN, {"vertices": 3})
     read = read_correspondence(tmp_path / "a.h5")
     assert isinstance(read, MatchedSurfaces)
     assert np.array_equal(read.first.vertices, ATLAS.vertices)

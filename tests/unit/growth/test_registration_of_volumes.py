@@ -9,7 +9,7 @@ from gyriflow.geometry.deformations import Deformation, carry, transform_points
 from gyriflow.growth.channels import Channels, channels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import judge, require_good
-from gyriflow.io.registrations import read_correspondence, write_deformation
+from gyriflow.io.registrations import read_correspondence, write_correspondence
 
 VOXEL = 1.0
 CORTEX, WHITE, OTHER = 2, 1, 7
@@ -159,7 +159,7 @@ def test_images_are_compared_where_both_brains_have_one(pair):
 
 
 def test_deformations_are_read_as_written(tmp_path, found):
-    write_deformation(tmp_path / "a.h5", found.deformation, {"dice": 0.9})
+    write_correspondence(tmp_path / "a.h5", found.deformation, {"dice": 0.9})
     read = read_correspondence(tmp_path / "a.h5")
     assert np.array_equal(read.matrix, found.deformation.matrix)
     assert read.displacement == pytest.approx(found.deformation.displacement, abs=1e-6)

@@ -62,24 +62,25 @@ def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     assert server.asked == []
 
 
-BROKEN = [150_000] * downloads.TRIES
+BROKEN, OTHER = [150_000] * downloads.TRIES, "0" * 64
 
 
 @pytest.mark.fault(40)
 @pytest.mark.parametrize(
-    ("name", "content", "broken", "said"),
+    ("name", "content", "broken", "known", "said"),
     [
-        (LONG, LABELS, BROKEN, "cannot be fetched"),
-        (LONG, LABELS, [], rf"something else than the file; found the SHA-256 {sha256(LABELS)} instead of 0{{64}}"),
-        (LONG, b"<!DOCTYPE html><title>Log in</title>", [], "found no whole.* it begins with b'<!DOCTYPE html>"),
-        (SHORT, b"<!DOCTYPE html><title>Log in</title>", [], "found no whole.* it begins with b'<!DOCTYPE html>"),
+        (LONG, LABELS, BROKEN, OTHER, "cannot be fetched"),
+        (LONG, LABELS, [], OTHER, rf"something else than the file; found the SHA-256 {sha256(LABELS)} instead of 0"),
+        (LONG, b"<!DOCTYPE html><title>Log in</title>", [], None, "cannot be read.* it begins with b'<!DOCTYPE html>"),
+        (SHORT, b"<!DOCTYPE html><title>Log in</title>", [], None, "cannot be read.* it begins with b'<!DOCTYPE html>"),
+        (SHORT, SURFACE[:-20], [], None, "cannot be read"),
     ],
-    ids=["broken", "checksum", "page for an image", "page for a surface"],
+    ids=["broken", "checksum", "page for an image", "page for a surface", "half a surface"],
 )
-def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, name, content, broken, said):
+def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, name, content, broken, known, said):
     server.files[name], server.broken_after[name] = content, list(broken)
     with pytest.raises(StorageError, match=said) as caught:
-        fetched(tmp_path, server, name, sha256="0" * 64)
+        fetched(tmp_path, server, name, sha256=known)
     assert f"{server.url}/{name}" in str(caught.value)
     assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}
