@@ -53,15 +53,18 @@ def diffuse(
 
 
 def continue_harmonically(
-    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats
+    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats, tolerance: float = 1e-8
 ) -> Floats:
-    """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices."""
+    """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices.
+
+    The boundary is free elsewhere; `tolerance` is as in `diffuse`.
+    """
     unknown = np.setdiff1d(np.unique(cells), known)
     continued = np.zeros((len(vertices), values.shape[1]))
     continued[known] = values
     rows = stiffness_matrix(vertices, cells)[unknown]
     matrix, right = rows[:, unknown], -(rows[:, known] @ values)
-    continued[unknown] = conjugate_gradients(matrix, right, np.zeros_like(right), 1e-8)
+    continued[unknown] = conjugate_gradients(matrix, right, np.zeros_like(right), tolerance)
     return continued
 
 

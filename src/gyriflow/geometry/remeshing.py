@@ -19,7 +19,10 @@ SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """Return the (m,) mask of the faces that cut other faces."""
+    """Return the (m,) mask of the faces that cut other faces.
+
+    Unlike for `matching.faces_that_cross`, those that only touch or overlap in a plane do not, as of adjoined pieces.
+    """
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.triangles import Floats, TriangleMesh
@@ -24,7 +25,7 @@ def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[st
     with new_hdf5(path) as file:
         if isinstance(pair, Deformation):
             file["matrix"], file["affine"] = pair.matrix, pair.affine
-            large = {"displacement": pair.displacement.astype(np.float32)}
+            large: dict[str, NDArray] = {"displacement": pair.displacement.astype(np.float32)}
         else:
             large = {"first": pair.first.vertices, "second": pair.second, "faces": pair.first.faces}
         for name, values in large.items():

@@ -10,7 +10,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, edges, mean_edge_length, unit, vertex_areas, vertex_normals
@@ -101,20 +100,6 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     gaussian = (4.0 * a * c - b**2) / stretch**2
     half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
     return Curvature(mean + half_difference, mean - half_difference, fitted & ~one_sided, radii)
-
-
-def continue_smoothly(values: Floats, known: NDArray[np.bool_], stiffness: sparse.csc_matrix) -> Floats:
-    """Return (n,) values with the unknown ones replaced by the smoothest continuation of the known ones.
-
-    The continuation is harmonic (K f = 0 with the (n, n) stiffness matrix K) with a free boundary.
-    """
-    if known.all() or not known.any():
-        return values
-    unknown = np.flatnonzero(~known)
-    rows = sparse.csr_matrix(stiffness)[unknown]
-    filled = values.copy()
-    filled[unknown] = spsolve(sparse.csc_matrix(rows[:, unknown]), -rows[:, np.flatnonzero(known)] @ values[known])
-    return filled
 
 
 def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:

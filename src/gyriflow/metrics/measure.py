@@ -16,31 +16,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import MeshError
+from ..geometry.diffusion import continue_harmonically
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
-from ..parameters.terms import (
-    CURVATURE_RADIUS_MM,
-    SPANGY_MODES,
-)
+from ..parameters.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .curvature import (
-    RESOLVED_RADII,
-    Curvature,
-    continue_smoothly,
-    curvature,
-    curvature_integrals,
-    join,
-    mean_curvature_quantiles,
-)
-from .gyrification import (
-    Pieces,
-    cap,
-    envelope,
-    gyrification_index,
-    local_gyrification_index,
-    pieces_over,
-    sulcal_depth,
-)
+from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
+from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth
 from .laplace_beltrami import laplacian
 from .spangy import SpangyModes, Spectrum, first_eigenvalue, modes_of, spectrum, weyl_number
 from .thickness import at_part
@@ -128,13 +110,14 @@ def measure_hemisphere(
     modes, reach = modes_of(spangy_modes, stiffness, mass, first)
     weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
-    values = continue_smoothly(bend.shape_index, bend.reliable, stiffness)
+    away, shape_index = np.flatnonzero(bend.reliable), bend.shape_index[:, None]
+    proxy = continue_harmonically(mesh.vertices, mesh.faces, away, shape_index[away], tolerance=1e-12)[:, 0]
     return Hemisphere(
         **vars(folds),
         name=name,
         thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
         crossing=crossing_faces(mesh),
-        spectrum=spectrum(values, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=weyl),
+        spectrum=spectrum(proxy, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=weyl),
         weyl=weyl,
     )
 
@@ -221,10 +204,8 @@ def spectrum_rows(side: Hemisphere) -> list[Row]:
 
 
 def _rows_of(sides: Sequence[Hemisphere]) -> list[Row]:
-    areas = [vertex_areas(side.mesh) for side in sides]
-    return folding_rows(sides) + thickness_rows(
-        np.concatenate([side.thickness for side in sides]), np.concatenate(areas)
-    )
+    areas = np.concatenate([vertex_areas(side.mesh) for side in sides])
+    return folding_rows(sides) + thickness_rows(np.concatenate([side.thickness for side in sides]), areas)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,23 +259,14 @@ def measure_brain(
     curvature_radius_mm, spangy_modes
         See `curvature.curvature` and `spangy.modes_of`.
 
-    Raises
-    ------
-    MeshError
-        A surface looks inwards, or a hemisphere is not in one piece.
+    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _require_outward(whole, *meshes.values())
-    jobs = [
-        (
-            name,
-            mesh,
-            None if thickness_mm is None else at_part(thickness_mm, whole, mesh),
-            curvature_radius_mm,
-            spangy_modes,
-        )
-        for name, mesh in meshes.items()
-    ]
+    jobs = []
+    for name, mesh in meshes.items():
+        thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
+        jobs.append((name, mesh, thickness, curvature_radius_mm, spangy_modes))
     sides = _in_processes(jobs, threads) if threads > 1 else [measure_hemisphere(*job) for job in jobs]
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
@@ -318,11 +290,8 @@ def _require_outward(*meshes: TriangleMesh) -> None:
 
 
 def _in_processes(jobs: Sequence[tuple], processes: int) -> list[Hemisphere]:
-    """Measure hemispheres at the same time.
-
-    Each in a process, since PETSc cannot be used by threads; forked, since a new interpreter would run the calling
-    script again; what MPI leaves behind goes with the folder.
-    """
+    # PETSc cannot be used by threads; forked, since a new interpreter would run the calling script again; what MPI
+    # leaves behind goes with the folder
     with TemporaryDirectory(prefix="gyriflow-") as folder:
         before = os.environ.update, ({"TMPDIR": folder},)
         with ProcessPoolExecutor(min(processes, len(jobs)), get_context("fork"), *before) as pool:

@@ -39,10 +39,10 @@ class PublishedNorm:
     other schemes, "" where there is none; `side` the hemisphere of the structure, None where it is in both.
     """
 
-    mean: tuple[float, ...]
-    sd: tuple[float, ...]
-    weeks: tuple[float, float]
-    labels: tuple[int, ...]
+    mean: Sequence[float]
+    sd: Sequence[float]
+    weeks: Sequence[float]
+    labels: Sequence[int]
     unit: str
     subjects: int | None
     scheme: str = ""
@@ -53,13 +53,10 @@ class PublishedNorm:
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     """Return the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
     norms = {}
-    first, last = data["weeks"]
-    shared = {"unit": data["unit"], "subjects": data["subjects"], "scheme": data.get("scheme", "")}
+    shared = {key: data[key] for key in ("weeks", "unit", "subjects", "scheme") if key in data}
     for name, entry in data["structures"].items():
-        own: dict[str, Any] = {"mean": tuple(entry["mean"]), "sd": tuple(entry["sd"]), "labels": tuple(entry["labels"])}
-        own |= {key: entry[key] for key in ("tissue", "side") if key in entry}
-        norm = PublishedNorm(**own, weeks=(first, last), **shared)
-        lowest = float(np.polyval(norm.sd, np.linspace(first, last, 201)).min())
+        norm = PublishedNorm(**shared, **entry)
+        lowest = float(np.polyval(norm.sd, np.linspace(norm.weeks[0], norm.weeks[1], 201)).min())
         if lowest <= 0:
             raise InputError(f"the norm of {name} has no standard deviation", found=f"{lowest:.3g}", expected="above 0")
         norms[name] = norm
@@ -94,22 +91,13 @@ def published_scores(
 ) -> pd.DataFrame:
     """Return where the volumes of a brain stand among published ones.
 
-    Parameters
-    ----------
-    volumes
-        By structure, in the norms' unit; structures without a norm are left out.
-    others
-        Structures that are of labels of another scheme than the norms'.
-    sides
-        The hemispheres that the brain has.
+    Volumes are by structure, in the norms' unit; structures without a norm are left out. `others` are those of labels
+    of another scheme than the norms', `sides` the hemispheres that the brain has.
 
-    Returns
-    -------
-    DataFrame
-        structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution, 0 to
-        100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
-        norm was measured with labels of another scheme; "outside the norm's weeks", or "one hemisphere" where the norm
-        is of more than the brain has, then without expected, z and centile).
+    Columns structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution,
+    0 to 100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
+    norm was measured with labels of another scheme; "outside the norm's weeks", or "one hemisphere" where the norm is
+    of more than the brain has, then without expected, z and centile).
     """
     rows = []
     for name, value in volumes.items():
@@ -156,14 +144,10 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
     brains there are: t = (x − expected)/(s √(1 + h)), with s the scatter round the curve and h the leverage of the
     week. All brains of the table are scored; one of the reference is compared with the others.
 
-    Returns
-    -------
-    DataFrame
-        subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile (0 to
-        100), brains (of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of the
-        scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
-        reference's weeks", "too few brains" or "other hemispheres" (than the reference has, so compared with none),
-        then without z and centile.
+    Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
+    (0 to 100), brains (of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of the
+    scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the reference's
+    weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
     """
     known = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
@@ -173,10 +157,8 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
         others = known.get((row["hemisphere"], row["metric"]))
         if others is None:
             continue
-        if row["run"] == MEASURED:
-            others = others[others["subject"] != row["subject"]]
-        if not alike:
-            others = others.iloc[:0]
+        # a measured brain is compared with the others
+        others = others[alike & ((row["run"] != MEASURED) | (others["subject"] != row["subject"]))]
         weeks, values = others["week"].to_numpy(dtype=float), others["value"].to_numpy(dtype=float)
         *score, flag = _score(row["week"], row["value"], weeks, values)
         rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
@@ -194,13 +176,9 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     return sides.isin(sides[known])
 
 
-def _reference(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    known = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
-    return known[~known["metric"].isin(OF_THE_ANALYSIS)]
-
-
 def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
-    return list(_reference(metrics, reference).groupby(["hemisphere", "metric"], sort=False))
+    known = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    return list(known[~known["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
 
 
 class _Curve(NamedTuple):

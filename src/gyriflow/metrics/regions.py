@@ -35,17 +35,12 @@ def region_metrics(
 ) -> pd.DataFrame:
     """Return area and means of maps by region of each hemisphere, weighted by area.
 
-    Parameters
-    ----------
-    sides
-        The pial surfaces of "left" and "right", or of the only hemisphere.
-    maps
-        Per hemisphere arrays per vertex by name, as `measure.BrainMetrics.maps`; those of `MAP_UNITS` are used. NaN
-        is left out of means, and so is what lies near a cut where `reliable` is 0.
-    labels, names
-        Per hemisphere the (n,) label of each vertex, 0 for none, and the name of the region by label.
+    Sides are the pial surfaces of "left" and "right", or of the only hemisphere. Per hemisphere there are maps, as
+    `measure.BrainMetrics.maps`, of which those of `MAP_UNITS` are used, and the (n,) label of each vertex, 0 for none;
+    names are those of the regions by label. NaN is left out of means, and so is what lies near a cut where `reliable`
+    is 0.
 
-    Returns hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the
+    Columns hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the
     maps' names without their unit, with mean_ in front; a region that is all NaN or near a cut has NaN. InputError for
     labels that have no name, or are not as many as vertices.
     """

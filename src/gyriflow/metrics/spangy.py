@@ -85,10 +85,7 @@ def band_limits(first: float) -> Floats:
 
 
 def modes_of(
-    choice: SpangyModes,
-    stiffness: sparse.csc_matrix,
-    mass: sparse.csc_matrix,
-    first: float,
+    choice: SpangyModes, stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, first: float
 ) -> tuple[Modes, float]:
     """Return the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
 
@@ -126,10 +123,9 @@ def spectrum(
     """Return the band spectrum of a folding proxy, (n,) values per vertex.
 
     `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given. `weyl` is
-    Weyl's number, where known.
-
-    The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself: a vertex where the
-    proxy is positive belongs to the band that adds most, another to the band that takes most away, with a minus sign.
+    Weyl's number, where known. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself:
+    a vertex where the proxy is positive belongs to the band that adds most, another to the band that takes most away,
+    with a minus sign.
     """
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)
@@ -189,13 +185,10 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, band, power, complete,
     resolved. A measured brain is not compared with itself.
 
-    Returns
-    -------
-    DataFrame
-        subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance_B4,
-        spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok"; "B5 B6 not resolved": in one
-        of the two these bands are finer than its edges resolve; "B6 cut off": not complete in one of the two, then
-        without a value).
+    Columns subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance_B4,
+    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok"; "B5 B6 not resolved": in one of
+    the two these bands are finer than its edges resolve; "B6 cut off": not complete in one of the two, then without a
+    value).
     """
     complete, resolved, powers = (
         spectra.pivot_table(name, HEMISPHERE, "band", aggfunc="first").reindex(columns=range(1, BANDS + 1))

@@ -80,13 +80,10 @@ def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str
     Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit, and region where they are
     of regions; scans are the brains of each subject, by week.
 
-    Returns
-    -------
-    DataFrame
-        subject, run ("real", or a run that began at the earlier scan), from_brain, to_brain, from_week, to_week,
-        hemisphere, region ("" for whole hemispheres), metric, unit, from_value, to_value, change, change_per_week,
-        relative_change (change/abs(from_value)), measured_change (between the scans), difference (to_value less that of
-        the later scan; 0 for the scans themselves).
+    Columns subject, run ("real", or a run that began at the earlier scan), from_brain, to_brain, from_week, to_week,
+    hemisphere, region ("" for whole hemispheres), metric, unit, from_value, to_value, change, change_per_week,
+    relative_change (change/abs(from_value)), measured_change (between the scans), difference (to_value less that of the
+    later scan; 0 for the scans themselves).
     """
     table = metrics.assign(region=metrics["region"].fillna("") if "region" in metrics else "")
     what = ["hemisphere", "region", "metric", "unit"]

@@ -33,19 +33,9 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
     was cortex at the start, however much it has grown or been pressed. Thickness is then that of the layer between the
     pial surface and the carried border, as in measured brains (`geometry.matching.layer_thickness`).
 
-    Parameters
-    ----------
-    start
-        The mesh of the start, with m vertices.
-    depth : (m,) float
-        Distance to the pial surface at the start over the cortical thickness there: 1 at the border. As
-        `depth_of_weight` gives it from the field `cortex_weight` of a run's regions.
-    positions : (m, 3) float
-        Present positions of the vertices in mm.
-    pial
-        The present pial surface.
-
-    MeshError where no point is deeper than the cortex.
+    Of the m vertices of the mesh of the start, `depth` (m,) is the distance to the pial surface over the cortical
+    thickness there, 1 at the border, as `depth_of_weight` gives it; `positions` (m, 3) are the present ones in mm, as
+    is the pial surface. MeshError where no point is deeper than the cortex.
     """
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: linear_pieces(start)}, np.asarray(positions, dtype=float))
     grid.point_data["depth"] = depth

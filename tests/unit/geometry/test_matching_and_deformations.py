@@ -10,8 +10,9 @@ from gyriflow.geometry.deformations import (
     determinants,
     transform_points,
 )
-from gyriflow.geometry.diffusion import diffuse, vertex_sizes
+from gyriflow.geometry.diffusion import continue_harmonically, diffuse, vertex_sizes
 from gyriflow.geometry.matching import labels_at, layer_labels, match_points, values_at
+from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
 
 GRID = np.diag([2.0, 2.0, 2.0, 1.0])
@@ -106,6 +107,17 @@ def test_diffusion_in_a_bar_spreads_with_the_variance_of_the_gaussian_and_keeps_
     smooth = diffuse(bar.vertices, bar.tets, peak, 5.0)
     assert smooth @ mass == pytest.approx(peak @ mass)
     assert (smooth * mass) @ bar.vertices[:, 0] ** 2 / (smooth @ mass) == pytest.approx(25.0, rel=0.02)
+
+
+def test_a_harmonic_continuation_of_a_gradient_is_the_gradient():
+    bar = box_mesh((20, 4, 4), (20.0, 4.0, 4.0))
+    surface, _ = boundary_surface(bar)
+    for vertices, cells in ((bar.vertices, bar.tets), (surface.vertices, surface.faces)):
+        known = np.flatnonzero(np.abs(vertices[:, 0]) > 7.9)
+        given = np.stack([3 * vertices[:, 0], np.ones(len(vertices))], axis=1)
+        found = continue_harmonically(vertices, cells, known, given[known], tolerance=1e-12)
+        np.testing.assert_allclose(found, given, atol=1e-9)
+        np.testing.assert_array_equal(found[known], given[known])
 
 
 def test_labels_of_a_layer_below_a_surface():

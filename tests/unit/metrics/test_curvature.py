@@ -9,15 +9,8 @@ from shapes import sphere, torus
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.remeshing import remesh
-from gyriflow.geometry.triangles import (
-    TriangleMesh,
-    mean_edge_length,
-    merged,
-    signed_volume,
-    submesh,
-)
-from gyriflow.metrics.curvature import RESOLVED_RADII, continue_smoothly, curvature
-from gyriflow.metrics.laplace_beltrami import laplacian
+from gyriflow.geometry.triangles import TriangleMesh, mean_edge_length, merged, signed_volume, submesh
+from gyriflow.metrics.curvature import RESOLVED_RADII, curvature
 
 
 def torus_and_angle() -> tuple[TriangleMesh, np.ndarray]:
@@ -102,19 +95,6 @@ def test_cut_changes_curvature_only_where_it_is_marked_unreliable() -> None:
     from_cut = half.vertices[:, 0]
     assert not bend.reliable[from_cut < 1.5].any()
     assert bend.reliable[from_cut > 3.1].all()
-
-
-def test_continuation_of_a_constant_and_of_a_gradient() -> None:
-    mesh = grid(20)
-    stiffness, _ = laplacian(mesh)
-    known = ((mesh.vertices[:, :2] >= 3) & (mesh.vertices[:, :2] <= 16)).all(axis=1)
-    wrong = np.where(known, 3.0, 50.0)
-    np.testing.assert_allclose(continue_smoothly(wrong, known, stiffness), 3.0, rtol=1e-10)
-    slope = np.where(known, mesh.vertices[:, 0], 1e3)
-    filled = continue_smoothly(slope, known, stiffness)
-    np.testing.assert_array_equal(filled[known], mesh.vertices[known, 0])
-    assert filled.min() > 2.99  # nothing beyond the known values at 3 and 16
-    assert filled.max() < 16.01
 
 
 @pytest.mark.parametrize(("wavelength", "least", "most"), [(12.0, 0.95, 1.0), (7.9, 0.78, 0.88), (5.2, 0.3, 0.5)])
