@@ -18,9 +18,9 @@ with step(snakemake.log[0]):
     try:
         refuse_bad_mesh(mesh, summary, refused / "brain.xdmf", **params.gates)
     except MeshError:
-        write_tetrahedral_mesh(refused / "brain.xdmf", mesh, cell_fields=fields)
+        write_tetrahedral_mesh(refused / "brain.xdmf", mesh, fields)
         write_json(refused / "quality.json", summary)
         raise
-    write_tetrahedral_mesh(output.mesh, mesh, cell_fields=fields)
+    write_tetrahedral_mesh(output.mesh, mesh, fields)
     write_surface(output.surface, boundary_surface(mesh)[0])
     write_json(output.quality, summary)

@@ -25,11 +25,6 @@ class Fit:
     shift: Floats
     residual: float
 
-    @property
-    def matrix(self) -> Floats:
-        """The (4, 4) motion."""
-        return motion(self.rotation, self.shift)
-
 
 POINTS, ROUNDS, ARRIVED_MM = 4000, 60, 0.005
 """Of closest points: how many of either surface, most rounds, and the move that ends them."""
@@ -69,13 +64,11 @@ def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floa
 def step_towards_planes(
     points: Floats, normals: Floats, ahead: Floats, weights: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Return the rotation and shift by which points come nearest to planes in the least-squares sense.
+    """Return the rotation and shift by which (n, 3) points come nearest to planes in the least-squares sense.
 
-    One step of the point-to-plane iteration (Chen and Medioni 1992): a turn w and a shift t move a point p by
-    w × (p − c) + t. Directions in which nothing pulls, such as the turns of a sphere, stay.
-
-    The planes that (n, 3) points are to reach have unit `normals` and lie `ahead` (n,) along these; `weights` (n,) are
-    those of the squared distances.
+    One step of the point-to-plane iteration (Chen and Medioni 1992). The planes have unit `normals` and lie `ahead`
+    (n,) along these; `weights` (n,) are those of the squared distances. Directions in which nothing pulls, such as the
+    turns of a sphere, stay.
     """
     centre = points.mean(axis=0)
     rows = np.hstack([np.cross(points - centre, normals), normals])
@@ -122,8 +115,7 @@ def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floa
 def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
     """Return the (4, 4) rigid motion of a surface onto another in nearly the same pose, by iterative closest points.
 
-    It begins with the surfaces as they are, centroids of the vertices together. Each round moves points of both
-    surfaces towards the planes of their nearest faces on the other one.
+    Points of both surfaces move towards the planes of their nearest faces on the other one.
     """
     nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
     of_a, of_b = (one.vertices[:: max(1, len(one.vertices) // POINTS)] for one in (mesh, onto))
@@ -155,9 +147,8 @@ def fits_from_all_sides(
     """Return the fits that an alignment without a known start leads to, that from the first start first.
 
     An iteration finds the nearest pose that fits, which need not be the best. It is therefore begun `roughly` from
-    each of the (3, 3) rotations `starts`; the best few of the poses that differ, and that from the first start, are
-    made `better`, all alike, so that their residuals can be compared. `candidates` poses are; rotations that differ by
-    less than `apart_deg` are one pose.
+    each of the (3, 3) rotations `starts`; the best `candidates` of the poses that differ by more than `apart_deg`, and
+    that from the first start, are made `better`, all alike, so that their residuals can be compared.
     """
     rough = [roughly(start) for start in starts]
     apart: list[int] = []

@@ -36,10 +36,9 @@ def diffuse(
 ) -> Floats:
     """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
-    Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2. The integral of
-    the values over the mesh stays as it is. 0 returns them as they are. `vertices` are (n, 3) in mm, `cells` (m, 3)
-    triangles or (m, 4) tetrahedra, none inverted. Fewer implicit `steps` make tails longer than a Gaussian's; each is
-    solved to a relative `tolerance`.
+    Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2, which keep the
+    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. Fewer `steps`
+    make tails longer than a Gaussian's; each is solved to a relative `tolerance`.
     """
     if sigma_mm == 0:
         return values.copy()

@@ -22,7 +22,7 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Points of a surface that were found for n points, by the vertices of their face and barycentric weights (n, 3).
+    """Points of a surface for n points, by the vertices of their face and barycentric weights (n, 3).
 
     `agrees` (n,) is False where no normal near it agrees, and the nearest point of all was taken.
     """

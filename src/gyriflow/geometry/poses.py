@@ -20,11 +20,10 @@ class Pose:
     """Rigid motions (4, 4) in mm that pose a brain, and what they were judged by.
 
     `world` leads from the world of the brain's volumes, RAS+, to its surface; brains correspond in these worlds.
-    `files` lead from the coordinates of its surface files, whatever they are: by side ("left", "right") where there are
-    hemispheres, and of the "whole". `by` is what the pose was judged by: "file", "shape", "configuration", "default",
-    or parts of the labels. `together` is whether one motion holds for the whole brain; else the hemispheres were posed
-    separately. `evidence` are angles, residuals and distances that it rests on, in plain values for JSON, and
-    `warnings` what is doubtful about it.
+    `files` lead from the coordinates of its surface files: by side ("left", "right") where there are hemispheres, and
+    of the "whole". `by` is what the pose was judged by: "file", "shape", "configuration", "default", or parts of the
+    labels. `together` is False where the hemispheres were posed separately. `evidence` are angles, residuals and
+    distances that it rests on, in plain values for JSON, and `warnings` what is doubtful about it.
     """
 
     world: Floats = field(default_factory=lambda: np.eye(4))

@@ -74,7 +74,7 @@ class TetrahedralMesh:
     @property
     def order(self) -> int:
         """1 for linear, 2 for quadratic elements."""
-        return order_of(self.tets)
+        return 1 if self.tets.shape[1] == NODES_OF_ORDER[1] else 2
 
     @property
     def corners(self) -> Ints:
@@ -82,14 +82,9 @@ class TetrahedralMesh:
         return self.tets[:, : NODES_OF_ORDER[1]]
 
 
-def order_of(tets: NDArray[np.integer]) -> int:
-    """Return the order of the elements whose nodes are the rows of an array."""
-    return 1 if tets.shape[1] == NODES_OF_ORDER[1] else 2
-
-
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
-    if order_of(tets) == 2:
+    if tets.shape[1] == NODES_OF_ORDER[2]:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
     # the triple product of edges written out: faster than with NumPy's cross product
@@ -197,8 +192,7 @@ def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
 def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     """Return a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
 
-    Its first n vertices are the nodes. The (4 f, 3) triangles are those between the nodes 0 to n − 1, each face's four
-    as `boundary_faces` has them.
+    Its first n vertices are the nodes. The (4 f, 3) triangles are between these, as `boundary_faces` has them.
     """
     split = triangles.reshape(-1, 4, 3)
     nodes = np.concatenate([split[:, [0, 1, 2], [0, 1, 2]], split[:, 3]], axis=1)

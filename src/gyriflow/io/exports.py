@@ -62,6 +62,8 @@ PEOPLE = {
 TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
 OF_INPUT = {"Description": "As in the tables of the input"}
 SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
+Place = tuple[Path, str]
+"""What the paths of a brain's files begin with, and the entity `desc-` of simulated brains."""
 Names = Mapping[str, tuple[str, str | None]]
 """Subject and session of each measured brain, None where the study needs no sessions."""
 
@@ -93,12 +95,6 @@ class ExportedBrain:
     volume: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class _Place:
-    prefix: Path
-    desc: str
-
-
 def export_bids(
     folder: AnyPath,
     brains: Sequence[ExportedBrain],
@@ -124,7 +120,7 @@ def export_bids(
         sidecars |= _write_surfaces(place, brain, pose.inverse if pose.together else np.eye(4))
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
-            write_label_volume(f"{place.prefix}{place.desc}_dseg.nii.gz", _labels(brain, pose.inverse))
+            write_label_volume(f"{place[0]}{place[1]}_dseg.nii.gz", _labels(brain, pose.inverse))
             _write_tsv(folder / "dseg.tsv", pd.DataFrame(TISSUES, columns=["index", "name"]))
     for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
@@ -147,14 +143,14 @@ def export_bids(
     write_json(folder / "dataset_description.json", dataset)
 
 
-def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[_Place]:
-    taken: dict[_Place, ExportedBrain] = {}
+def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[Place]:
+    taken: dict[Place, ExportedBrain] = {}
     places = []
     for brain in brains:
         subject, session = names[brain.brain]
         stem = "_".join(filter(None, (subject, session)))
         simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
-        place = _Place(folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated)
+        place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
         places.append(place)
         if (other := taken.setdefault(place, brain)) is not brain:
             found = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
@@ -163,36 +159,38 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list
     return places
 
 
-def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[_Place]) -> dict[str, str]:
+def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[Place]) -> dict[str, str]:
     descriptions = {
-        place.desc[1:]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
-        for brain, place in zip(brains, places, strict=True)
-        if place.desc
+        desc[1:]: f"Run {brain.run} of the simulation, at {brain.week:.2f} weeks of gestation"
+        for brain, (_, desc) in zip(brains, places, strict=True)
+        if desc
     }
     if any(brain.white for brain in brains):
         descriptions["desc-white"] = "Map on the white surface; those without it are on the pial one"
     return descriptions
 
 
-def _write_surfaces(place: _Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
-    kinds = {"pial": (brain.surfaces, place.desc)} | ({"white": (brain.white, "")} if brain.white else {})
+def _write_surfaces(place: Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
+    prefix, simulated = place
+    kinds = {"pial": (brain.surfaces, simulated)} | ({"white": (brain.white, "")} if brain.white else {})
     for kind, (files, desc) in kinds.items():
         for side, path in files.items():
-            named = f"{place.prefix}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
+            named = f"{prefix}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
             write_surface(named, transformed(read_surface(path), back), STRUCTURES[side])
     for side, path in brain.regions.items():
-        _copy(path, f"{place.prefix}_hemi-{side[0].upper()}{place.desc or '_desc-regions'}_dseg.label.gii")
+        _copy(path, f"{prefix}_hemi-{side[0].upper()}{simulated or '_desc-regions'}_dseg.label.gii")
     return {kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in kinds}
 
 
 def _write_maps(
-    place: _Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
+    place: Place, brain: ExportedBrain, space: str, reference: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
     sidecars: dict[str, dict[str, Any]] = {}
+    prefix, simulated = place
     # files by side, the entities `space-` and `desc-`, and what sidecars say of the space
     kinds: tuple[tuple[Any, str, str, Mapping[str, Any]], ...] = (
-        (brain.maps, "", place.desc, {}),
-        (brain.template_maps, space, place.desc, reference),
+        (brain.maps, "", simulated, {}),
+        (brain.template_maps, space, simulated, reference),
         (brain.white_maps, "", "_desc-white", {}),
     )
     for files, entity, desc, more in kinds:
@@ -201,7 +199,7 @@ def _write_maps(
                 suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
                 sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
-                named = f"{place.prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
+                named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
                 write_vertex_maps(named, {quantity: values}, STRUCTURES[side])
     return sidecars
 
@@ -261,10 +259,7 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> Names:
 
 
 def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> None:
-    """Write participants.tsv, and sessions.tsv of each participant where there are any, with their sidecars.
-
-    Covariates that differ between a subject's brains are those of sessions.
-    """
+    # covariates that differ between a subject's brains are those of sessions
     first = ["participant_id", "session_id", "gestational_age", "brain"]
     people = pd.DataFrame(
         dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True)) | dict(brain.covariates)

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -121,11 +121,12 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     import pandas as pd  # takes half a second, as h5py does below, which most readers need not wait for
 
     with reading(path, "a tab-separated table", remedy=None):
-        table = _read_texts(path)
+        texts: dict[str, Any] = {"sep": "\t", "dtype": str, "keep_default_na": False, "encoding": "utf-8-sig"}
+        table = pd.read_csv(path, **texts)
         # rows that are longer than the heading have names before it, as R writes them, or tabs at their end
         if (table.iloc[:, -table.index.nlevels :] == "").all(axis=None) and not isinstance(table.index, pd.RangeIndex):
             with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):
-                table = _read_texts(path, index_col=False)
+                table = pd.read_csv(path, **texts, index_col=False)
     rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
     for number, row in enumerate(rows, start=2):
         for name, value in row.items():
@@ -135,12 +136,6 @@ def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
     if not rows:
         raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
     return rows
-
-
-def _read_texts(path: AnyPath, index_col: Literal[False] | None = None) -> "pd.DataFrame":
-    import pandas as pd
-
-    return pd.read_csv(path, sep="\t", dtype=str, keep_default_na=False, encoding="utf-8-sig", index_col=index_col)
 
 
 def read_table(path: AnyPath) -> "pd.DataFrame":

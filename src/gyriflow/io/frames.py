@@ -36,10 +36,8 @@ def write_frame(
     """Write the frame of a gestational week to a file of its own.
 
     Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n, 3); those of the elements, in the
-    order of the run's mesh, are (m,), (m, 3) or (m, 9). ValueError where those at the vertices differ in length.
+    order of the run's mesh, are (m,), (m, 3) or (m, 9).
     """
-    if len({len(values) for values in vertex_fields.values()}) != 1:
-        raise ValueError(f"fields at the vertices differ in length: {_lengths(vertex_fields)}")
     with new_hdf5(path) as file:
         frame = file.create_group(group_name(week))
         for name, values in vertex_fields.items():
@@ -52,15 +50,8 @@ def _single(values: NDArray) -> NDArray:
     return values.astype(np.float32) if values.dtype.kind == "f" else values
 
 
-def _lengths(fields: Mapping[str, NDArray]) -> str:
-    return ", ".join(f"{name} {len(values)}" for name, values in fields.items())
-
-
 def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None:
-    """Join the files of single frames, in the order of time, into `path` (.h5) with a .xdmf beside it.
-
-    ValueError where fields of the elements do not fit the (m, 4) or (m, 10) tetrahedra.
-    """
+    """Join the files of single frames of (m, 4) or (m, 10) tetrahedra, by time, into `path` (.h5) and a .xdmf."""
     path = Path(path)
     with new_hdf5(path) as file:
         file["tets"] = tets.astype(np.int32)
@@ -76,14 +67,9 @@ def _time_series(data_name: str, file: h5py.File) -> str:
     tets, grids = file["tets"], []
     for name in (name for name in file if name.startswith("week_")):
         frame, where = file[name], f"{data_name}:/{name}"
-        fields = {
-            field: (values, f"{where}/{field}")
-            for field, values in frame.items()
-            if field not in (POSITIONS, CELL_FIELDS)
-        }
+        names = set(frame) - {POSITIONS, CELL_FIELDS}
+        fields = {field: (frame[field], f"{where}/{field}") for field in sorted(names)}
         cell_fields = frame.get(CELL_FIELDS, {})
-        if any(len(values) != len(tets) for values in cell_fields.values()):
-            raise ValueError(f"fields of {len(tets)} elements in {name} have other lengths: {_lengths(cell_fields)}")
         of_cells = {field: (values, f"{where}/{CELL_FIELDS}/{field}") for field, values in cell_fields.items()}
         cells, points = (tets, f"{data_name}:/tets"), (frame[POSITIONS], f"{where}/{POSITIONS}")
         grids.append(grid(name, cells, points, fields, of_cells, float(name.removeprefix("week_"))))

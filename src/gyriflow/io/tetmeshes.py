@@ -60,23 +60,17 @@ def document(*domains: str) -> str:
 
 
 def write_tetrahedral_mesh(
-    path: AnyPath,
-    mesh: TetrahedralMesh,
-    vertex_fields: Mapping[str, NDArray] | None = None,
-    cell_fields: Mapping[str, NDArray] | None = None,
+    path: AnyPath, mesh: TetrahedralMesh, cell_fields: Mapping[str, NDArray] | None = None
 ) -> None:
-    """Write `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (n,) or (n, 3) by name."""
+    """Write `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (m,) or (m, 3) of its elements by name."""
     data = Path(path).with_suffix(".h5")
-    stored: dict[str, dict[str, Stored]] = {}
+    fields = {name: (np.asarray(values), f"{data.name}:/Cell/{name}") for name, values in (cell_fields or {}).items()}
     with new_hdf5(data) as file:
         file["tets"], file["vertices"] = mesh.tets, mesh.vertices
-        for centre, fields in (("Node", vertex_fields), ("Cell", cell_fields)):
-            stored[centre] = {}
-            for name, values in (fields or {}).items():
-                file[f"{centre}/{name}"] = values
-                stored[centre][name] = np.asarray(values), f"{data.name}:/{centre}/{name}"
+        for name, (values, _) in fields.items():
+            file[f"Cell/{name}"] = values
     cells, points = (mesh.tets, f"{data.name}:/tets"), (mesh.vertices, f"{data.name}:/vertices")
-    write_text(path, document(grid("mesh", cells, points, stored["Node"], stored["Cell"])))
+    write_text(path, document(grid("mesh", cells, points, {}, fields)))
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
@@ -117,21 +111,18 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
     """Write `path` (.xdmf) and the .h5 beside it."""
     data = Path(path).with_suffix(".h5")
     cells = {"tets": regions.mesh.tets, "facets": regions.facets}
-    tags = {
-        kind: {name: np.asarray(tag, dtype=np.int32) for name, tag in tagged.items()}
-        for kind, tagged in (("tets", regions.cell_tags), ("facets", regions.facet_tags))
-    }
+    tags = {"tets": regions.cell_tags, "facets": regions.facet_tags}
     with new_hdf5(data) as file:
         file["vertices"] = regions.mesh.vertices
         for kind, values in cells.items():
             file[kind] = values
             for name, tag in tags[kind].items():
-                file[f"{kind}_tags/{name}"] = tag
+                file[f"{kind}_tags/{name}"] = np.asarray(tag, dtype=np.int32)
         for name, field in regions.fields.items():
             file[f"fields/{name}"] = field
 
     def part(name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]) -> str:
-        of_cells = {tag: (tags[kind][tag], f"{data.name}:/{kind}_tags/{tag}") for tag in names}
+        of_cells = {tag: (np.asarray(tags[kind][tag], np.int32), f"{data.name}:/{kind}_tags/{tag}") for tag in names}
         of_vertices = {field: (values, f"{data.name}:/fields/{field}") for field, values in fields.items()}
         points = regions.mesh.vertices, f"{data.name}:/vertices"
         return grid(name, (cells[kind], f"{data.name}:/{kind}"), points, of_vertices, of_cells)

@@ -145,7 +145,9 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
         raise InputError(problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX)
     if len(given) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
-        distance = _farthest_corner(matrices["sform"] - matrices["qform"], image.shape)
+        difference = matrices["sform"] - matrices["qform"]
+        ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(3, -1)
+        distance = float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
         if not distance <= AGREEMENT_VOXELS * voxel:
             problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
             found = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
@@ -163,11 +165,6 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
         problem, expected = "has a unit of length that NIfTI does not know", "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
     return unit
-
-
-def _farthest_corner(difference: Floats, shape: tuple[int, ...]) -> float:
-    ends = np.array(np.meshgrid(*[[0, n - 1] for n in shape[:3]])).reshape(3, -1)
-    return float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
 
 
 def _checked_affine(affine: Floats, path: AnyPath) -> Floats:
