@@ -16,8 +16,7 @@ from gyriflow.errors import StorageError
 from gyriflow.folding.__main__ import require_space
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_weeks
-from gyriflow.io.maps import write_maps
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps, write_tetrahedral_mesh
 from gyriflow.parameters.folding import parameters_from
 
 pytestmark = pytest.mark.slow

@@ -1,10 +1,10 @@
 """The maps of a run's parameters at the vertices of the start brain's mesh."""
 
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
-from gyriflow.io.maps import read_surface_maps, read_volume_map, write_maps
 from gyriflow.io.registrations import read_weekly_shapes
-from gyriflow.io.surfaces import read_pose
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.surfaces import read_pose, read_surface_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
+from gyriflow.io.volumes import read_volume_map
 from gyriflow.mesh import maps as on_mesh
 from gyriflow.parameters.folding import FoldingSettings, target_maps
 from gyriflow.parameters.varying import bounds_of

@@ -6,9 +6,8 @@ from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.jobs import read_messages
-from gyriflow.io.maps import read_volume_map
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
-from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.volumes import read_label_volume, read_volume_map
 from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.report.quality import Brain, facts, quality_page, quality_row, tissue_groups
 from gyriflow.step import step

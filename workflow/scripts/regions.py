@@ -9,9 +9,8 @@ from gyriflow.folding.growth_models import growth_at_start
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.zones import cell_tags, facet_tags, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.maps import read_maps
 from gyriflow.io.surfaces import read_surface
-from gyriflow.io.tetmeshes import Regions, read_tetrahedral_mesh, write_regions
+from gyriflow.io.tetmeshes import Regions, read_maps, read_tetrahedral_mesh, write_regions
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.folding import parameters_from, require_maps
 from gyriflow.parameters.terms import REGION_FIELDS

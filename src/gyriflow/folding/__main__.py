@@ -15,8 +15,7 @@ from mpi4py import MPI
 from ..errors import GyriflowError, StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
-from ..io.maps import read_maps
-from ..io.tetmeshes import read_tetrahedral_mesh
+from ..io.tetmeshes import read_maps, read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
 from ..parameters.folding import FoldingParameters, parameters_from, require_maps
 from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES

@@ -6,7 +6,7 @@ Where a file says in which space its coordinates are, they are brought to scanne
 import hashlib
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -16,11 +16,12 @@ import nibabel as nib
 import numpy as np
 from nibabel.freesurfer.io import read_geometry
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiLabel, GiftiLabelTable, GiftiMetaData
+from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
-from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed
+from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
 from ..parameters.terms import STRUCTURES, Side
 from .files import AnyPath, read_json, reading, replaced, require_finite
 
@@ -153,6 +154,35 @@ def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
     """Return the named per-vertex values of a GIFTI shape file."""
     arrays = enumerate(load_gifti(path).darrays)
     return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
+
+
+def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh, Floats]:
+    """Return a surface and the values of a GIFTI shape or func file at its vertices.
+
+    InputError for missing or truncated files, more than one array, another number of values than of vertices, NaN and
+    infinite values, and STL surfaces, which have no order of vertices.
+    """
+    if str(surface_path).lower().endswith(".stl"):
+        problem = "is no surface that a map can belong to, since STL files do not number their vertices"
+        raise InputError(problem, path=surface_path, expected=f"the GIFTI, PLY or OBJ file that {path} was made on")
+    surface = read_surface(surface_path)
+    arrays = load_gifti(path).darrays
+    if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
+        found = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
+        problem, expected = "is not a map of one value per vertex", "one array of numbers (.shape.gii, .func.gii)"
+        raise InputError(problem, path=path, found=", ".join(found) or "none", expected=expected)
+    values = np.asarray(arrays[0].data, dtype=float).ravel()
+    if len(values) != len(surface.vertices):
+        expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
+        raise InputError("does not belong to its surface", path=path, found=f"{len(values)} values", expected=expected)
+    require_finite(values, path, "values", "vertices")
+    return surface, values
+
+
+def read_surface_maps(paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]) -> tuple[TriangleMesh, Floats]:
+    """Return surfaces side by side as one and the values of their maps, each read as by `read_surface_map`."""
+    pieces = [read_surface_map(*files) for files in zip(paths, surface_paths, strict=True)]
+    return merged(*(surface for surface, _ in pieces)), np.concatenate([values for _, values in pieces])
 
 
 def load_gifti(path: AnyPath) -> GiftiImage:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from ..geometry.triangles import Floats
 from .files import AnyPath, new_hdf5, reading_hdf5, require_finite, write_text
 
 XDMF_NUMBER = {"f": "Float", "i": "Int", "u": "UInt"}
@@ -87,8 +88,6 @@ def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
     return mesh
 
 
-# --- a run's mesh with its regions ------------------------------------------------------------------------------
-
 Tags = Mapping[str, NDArray[np.int32]]
 
 
@@ -141,3 +140,16 @@ def read_regions(path: AnyPath) -> Regions:
         kinds = ("fields", "tets_tags", "facets_tags")
         groups = [{name: values[:] for name, values in file[kind].items()} for kind in kinds]
         return Regions(mesh, file["facets"][:], *groups)
+
+
+def write_maps(path: AnyPath, maps: Mapping[str, Floats]) -> None:
+    """Write named (n,) values at the vertices of a mesh to an HDF5 file, a data set each."""
+    with new_hdf5(path) as file:
+        for name, values in maps.items():
+            file[name] = np.asarray(values, dtype=np.float64)
+
+
+def read_maps(path: AnyPath) -> dict[str, Floats]:
+    """Return the named (n,) values of a file of `write_maps`; InputError where it is missing or torn."""
+    with reading_hdf5(path, "maps", "an HDF5 file") as file:
+        return {name: np.asarray(values[:], dtype=np.float64) for name, values in file.items()}

@@ -34,6 +34,14 @@ class LabelVolume:
     affine: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class ScalarVolume:
+    """The (i, j, k) value of each voxel, NaN where the volume says nothing, and the (4, 4) affine to RAS+ mm."""
+
+    values: Floats
+    affine: Floats
+
+
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
     """Return the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
 
@@ -85,6 +93,16 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
         values = np.asanyarray(image.dataobj)
     values = _three_axes(values, path, content)
     return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
+
+
+def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> ScalarVolume:
+    """Return the values of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+
+    `affine_from` as in `read_label_volume`. InputError for missing or truncated files, more than three axes that are
+    longer than 1, unclear orientation.
+    """
+    values, affine = read_values(path, affine_from, "numbers")
+    return ScalarVolume(values.astype(float), affine)
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:

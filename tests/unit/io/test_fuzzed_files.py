@@ -17,7 +17,6 @@ from shapes import sphere
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_json, read_tab_separated, read_table
-from gyriflow.io.maps import ScalarVolume, read_maps, read_volume_map, write_maps
 from gyriflow.io.surfaces import (
     read_surface,
     read_vertex_labels,
@@ -26,7 +25,8 @@ from gyriflow.io.surfaces import (
     write_vertex_labels,
     write_vertex_maps,
 )
-from gyriflow.io.volumes import LabelVolume, read_label_volume
+from gyriflow.io.tetmeshes import read_maps, write_maps
+from gyriflow.io.volumes import LabelVolume, ScalarVolume, read_label_volume, read_volume_map
 from gyriflow.io.yaml_files import read_yaml
 
 pytestmark = pytest.mark.fault(12, 13, 62)

@@ -7,8 +7,9 @@ from nibabel.gifti import GiftiDataArray, GiftiImage
 from shapes import moved, rigid, sphere
 
 from gyriflow.errors import InputError
-from gyriflow.io.maps import read_maps, read_surface_map, read_surface_maps, read_volume_map, write_maps
-from gyriflow.io.surfaces import write_surface, write_vertex_maps
+from gyriflow.io.surfaces import read_surface_map, read_surface_maps, write_surface, write_vertex_maps
+from gyriflow.io.tetmeshes import read_maps, write_maps
+from gyriflow.io.volumes import read_volume_map
 
 
 @pytest.fixture

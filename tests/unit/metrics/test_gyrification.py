@@ -7,14 +7,7 @@ import trimesh
 from shapes import sphere
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import (
-    TriangleMesh,
-    area,
-    convex_hull,
-    is_closed,
-    signed_volume,
-    vertex_areas,
-)
+from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull, is_closed, signed_volume, vertex_areas
 from gyriflow.metrics.gyrification import (
     cap,
     envelope,
@@ -27,10 +20,6 @@ from gyriflow.metrics.gyrification import (
 
 def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
     return gyrification_index([mesh], [pieces_over(around, mesh)])
-
-
-def area_over(around: TriangleMesh, mesh: TriangleMesh) -> float:
-    return float(pieces_over(around, mesh).areas.sum())
 
 
 def half_sphere(radius: float = 25.0) -> TriangleMesh:
@@ -92,7 +81,7 @@ def test_cut_is_left_out_of_the_index() -> None:
     half = half_sphere()
     hull = convex_hull(half)
     assert area(hull) == pytest.approx(3 * np.pi * 25.0**2, rel=0.01)
-    assert area_over(hull, half) == pytest.approx(2 * np.pi * 25.0**2, rel=0.01)
+    assert pieces_over(hull, half).areas.sum() == pytest.approx(2 * np.pi * 25.0**2, rel=0.01)
     assert index(half, hull) == pytest.approx(1.0, abs=0.02)
     assert index(half, envelope(half)) == pytest.approx(1.0, abs=0.03)
 

@@ -58,15 +58,8 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
 
 
 def test_asymmetry_of_sides() -> None:
-    table = pd.DataFrame(
-        [
-            ("left", "frontal", "area", 30.0),
-            ("right", "frontal", "area", 10.0),
-            ("left", "insula", "area", 0.0),
-            ("right", "insula", "area", 0.0),
-        ],
-        columns=["hemisphere", "region", "metric", "value"],
-    )
+    table = pd.DataFrame({"hemisphere": ["left", "right"] * 2, "region": ["frontal"] * 2 + ["insula"] * 2})
+    table = table.assign(metric="area", value=[30.0, 10.0, 0.0, 0.0])
     found = asymmetry(table).set_index("region")["asymmetry_index"]
     assert found["frontal"] == pytest.approx(1.0)
     assert np.isnan(found["insula"])
