@@ -6,7 +6,7 @@ import pytest
 from nibabel.freesurfer.io import write_geometry
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
 from nibabel.nifti1 import intent_codes
-from shapes import sphere
+from shapes import moved, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import is_closed, signed_volume
@@ -14,6 +14,8 @@ from gyriflow.io.surfaces import (
     read_hemispheres,
     read_one_hemisphere,
     read_surface,
+    read_surface_map,
+    read_surface_maps,
     read_vertex_labels,
     read_vertex_maps,
     surface_and_space,
@@ -190,6 +192,41 @@ def test_labels_and_names_come_back(tmp_path):
     # the label of no region is none of the names
     assert names == {3: "frontal", 12: "insula"}
     assert nib.load(path).meta["AnatomicalStructurePrimary"] == "CortexLeft"
+
+
+@pytest.mark.parametrize("name", ["ball.surf.gii", "ball.ply", "ball.obj"])
+def test_maps_of_hemispheres_stand_side_by_side_each_value_at_its_vertex(tmp_path, ball, name):
+    left = moved(ball, -60.0)
+    paths, surfaces = (
+        [tmp_path / "a.shape.gii", tmp_path / "b.shape.gii"],
+        [tmp_path / "left.surf.gii", tmp_path / name],
+    )
+    for path, file, mesh in zip(paths, surfaces, (left, ball), strict=True):
+        write_surface(file, mesh)
+        write_vertex_maps(path, {"x": mesh.vertices[:, 0]})
+    surface, values = read_surface_maps(paths, surfaces)
+    assert values == pytest.approx(np.concatenate([left.vertices[:, 0], ball.vertices[:, 0]]), abs=1e-5)
+    assert surface.vertices[:, 0] == pytest.approx(values, abs=1e-5)
+    assert np.array_equal(surface.faces[len(ball.faces) :], ball.faces + len(ball.vertices))
+
+
+@pytest.mark.parametrize(
+    ("name", "counts", "surface", "said"),
+    [
+        ("a.shape.gii", [100], "ball.surf.gii", r"a\.shape\.gii.*100 values.*162.*ball\.surf\.gii"),
+        ("a.func.gii", [], "ball.surf.gii", r"a\.func\.gii.*one array"),
+        ("a.func.gii", [162, 162], "ball.surf.gii", r"a\.func\.gii.*one array"),
+        ("a.shape.gii", [162], "ball.stl", r"ball\.stl.*GIFTI"),
+        ("ball.surf.gii", None, "ball.surf.gii", r"POINTSET \(162, 3\), NIFTI_INTENT_TRIANGLE \(320, 3\)"),
+    ],
+)
+def test_what_is_no_map_of_a_surface_is_refused(tmp_path, ball, name, counts, surface, said):
+    write_surface(tmp_path / surface, ball)
+    if counts is not None:
+        arrays = [GiftiDataArray(np.ones(count, np.float32), intent="NIFTI_INTENT_SHAPE") for count in counts]
+        nib.save(GiftiImage(darrays=arrays), tmp_path / name)
+    with pytest.raises(InputError, match=said):
+        read_surface_map(tmp_path / name, tmp_path / surface)
 
 
 @pytest.mark.parametrize(

@@ -13,15 +13,16 @@ from written_frames import element_field
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
-from gyriflow.io.frames import (
-    join_frames,
-    read_field,
-    read_positions,
-    read_tets,
-    read_weeks,
-    write_frame,
+from gyriflow.io.frames import join_frames, read_field, read_positions, read_tets, read_weeks, write_frame
+from gyriflow.io.tetmeshes import (
+    Regions,
+    read_maps,
+    read_regions,
+    read_tetrahedral_mesh,
+    write_maps,
+    write_regions,
+    write_tetrahedral_mesh,
 )
-from gyriflow.io.tetmeshes import Regions, read_regions, read_tetrahedral_mesh, write_regions, write_tetrahedral_mesh
 
 
 def by_vtk(path):
@@ -57,6 +58,12 @@ def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, me
     write_tetrahedral_mesh(tmp_path / "bad.xdmf", TetrahedralMesh(points, np.array([tet])))
     with pytest.raises(InputError, match=rf"bad\.h5.*{message}"):
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
+
+
+def test_maps_on_a_mesh_come_back_exactly(tmp_path):
+    maps = {"thickness_mm": np.random.default_rng(0).normal(size=50), "growth_rate_per_s": np.full(50, 2e-7)}
+    write_maps(tmp_path / "maps.h5", maps)
+    np.testing.assert_equal(read_maps(tmp_path / "maps.h5"), maps)
 
 
 @pytest.mark.parametrize("read", [read_tetrahedral_mesh, read_regions])
@@ -128,14 +135,8 @@ def written(tmp_path_factory):
 def test_what_is_written_comes_back(written):
     path, mesh, facets, cell_tags, facet_tags = written
     back = read_regions(path)
-    np.testing.assert_array_equal(back.mesh.vertices, mesh.vertices)
-    np.testing.assert_array_equal(back.mesh.tets, mesh.tets)
-    np.testing.assert_array_equal(back.facets, facets)
-    for found, expected in ((back.cell_tags, cell_tags), (back.facet_tags, facet_tags)):
-        assert set(found) == set(expected)
-        for name, tag in expected.items():
-            np.testing.assert_array_equal(found[name], tag)
-    np.testing.assert_array_equal(back.fields["normal"], mesh.vertices)
+    found = back.mesh.vertices, back.mesh.tets, back.facets, back.cell_tags, back.facet_tags, back.fields["normal"]
+    np.testing.assert_equal(found, (mesh.vertices, mesh.tets, facets, cell_tags, facet_tags, mesh.vertices))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from shapes import rigid
 
 from gyriflow.errors import InputError
-from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.volumes import LabelVolume, read_label_volume, read_volume_map, write_label_volume
 
 AFFINE = np.array([[0.8, 0, 0, -10], [0, 0.9, 0, 5], [0, 0, 1.0, 20], [0, 0, 0, 1.0]])
 
@@ -40,13 +40,6 @@ def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
     volume = read_label_volume(tmp_path / "a.nii.gz")
     for label, index in ((7, (1, 2, 3)), (2, (3, 4, 5))):
         assert position(volume, label) == pytest.approx(AFFINE[:3, :3] @ index + AFFINE[:3, 3], abs=1e-4)
-
-
-@pytest.mark.fault(1)
-def test_oblique_affine_is_kept_whole(tmp_path, labels):
-    oblique = rigid(20, -30, 40) @ AFFINE
-    volume = read_label_volume(saved(tmp_path / "a.nii", labels, oblique))
-    assert volume.affine == pytest.approx(oblique, abs=1e-5)
 
 
 @pytest.mark.fault(4)
@@ -125,6 +118,17 @@ def test_what_is_no_volume_of_labels_in_the_world_is_refused(tmp_path, labels, n
     make(tmp_path / name, labels)
     with pytest.raises(InputError, match=said):
         read_label_volume(tmp_path / name)
+
+
+@pytest.mark.fault(1)
+def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
+    values = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
+    values[0, 0, 0] = np.nan
+    oblique = rigid(20, -30, 40) @ AFFINE
+    metres = np.diag([1e-3, 1e-3, 1e-3, 1.0]) @ oblique
+    volume = read_volume_map(saved(tmp_path / "a.nii.gz", values[..., None], metres, "meter"))
+    np.testing.assert_array_equal(volume.values, values)
+    assert volume.affine == pytest.approx(oblique, abs=1e-5)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2])

@@ -17,7 +17,8 @@ from gyriflow.metrics.norms import (
     structure_volumes,
 )
 
-NORMS = Path(__file__).parents[3] / "norms"
+FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
+NORMS = published_norms(yaml.safe_load(FILE.read_text()))
 
 
 def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, float]) -> tuple[pd.DataFrame, list[str]]:
@@ -32,9 +33,8 @@ def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, floa
 
 
 def test_published_volumes_of_cortex_and_white_matter() -> None:
-    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
     # at 29 weeks: 0.3052·841 − 11.828·29 + 123 and 0.0223·841 + 7.3471·29 − 145.28
-    found = published_scores({"cortex": 36.66 + 3.787, "white_matter": 86.54, "tail": 1.0}, 29.0, norms).set_index(
+    found = published_scores({"cortex": 36.66 + 3.787, "white_matter": 86.54, "tail": 1.0}, 29.0, NORMS).set_index(
         "structure"
     )
     assert found["expected"].tolist() == pytest.approx([36.66, 86.54], abs=0.01)
@@ -44,7 +44,7 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert found.loc["cortex", "z"] == pytest.approx(1.0, abs=0.01)
     assert found["centile"].tolist() == pytest.approx([84.13, 50.0], abs=0.3)
     assert np.isnan(found["brains"]).all()
-    assert published_scores({"cortex": 30.0}, 18.0, norms)["flag"].tolist() == ["outside the norm's weeks"]
+    assert published_scores({"cortex": 30.0}, 18.0, NORMS)["flag"].tolist() == ["outside the norm's weeks"]
 
 
 def test_quantiles_need_several_brains_of_a_week() -> None:
@@ -113,23 +113,21 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
 
 
 def test_one_hemisphere_is_not_scored_by_volumes_of_both() -> None:
-    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
     volumes = {"cortex": 20.0, "left_lateral_ventricle": 2.3, "right_lateral_ventricle": 2.3}
-    found = published_scores(volumes, 29.0, norms, sides=("left",)).set_index("structure")
+    found = published_scores(volumes, 29.0, NORMS, sides=("left",)).set_index("structure")
     assert found["flag"].tolist() == ["one hemisphere", "ok", "one hemisphere"]
     assert found.loc["cortex", ["expected", "sd", "z", "centile"]].isna().all()
     assert found.loc["left_lateral_ventricle", "z"] == pytest.approx(0.0, abs=0.1)
-    assert (published_scores(volumes, 29.0, norms)["flag"] == "ok").all()
+    assert (published_scores(volumes, 29.0, NORMS)["flag"] == "ok").all()
 
 
 def test_structures_of_the_norms_scheme_and_of_others() -> None:
-    norms = published_norms(yaml.safe_load((NORMS / "svrtk-volumes.yaml").read_text()))
-    own, others = structure_volumes({3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}, SCHEMES["dhcp-19"], norms)
+    own, others = structure_volumes({3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}, SCHEMES["dhcp-19"], NORMS)
     assert own == {"cortex": 9.0, "deep_grey": 3.0, "left_lateral_ventricle": 1.0}
     assert others == []
     # 2 is the cortex of FeTA and outer CSF of BOUNTI; it has no sides for the ventricles
-    found, others = structure_volumes({2: 8.0, 3: 40.0, 4: 3.0}, SCHEMES["feta-7"], norms)
+    found, others = structure_volumes({2: 8.0, 3: 40.0, 4: 3.0}, SCHEMES["feta-7"], NORMS)
     assert found == {"cortex": 8.0, "white_matter": 40.0}
     assert others == ["cortex", "white_matter"]
-    scores = published_scores(found | {"cortex": 9.0}, 21.0, norms, others)
+    scores = published_scores(found | {"cortex": 9.0}, 21.0, NORMS, others)
     assert scores["flag"].tolist() == ["other labels"] * 2

@@ -33,17 +33,6 @@ def test_bands_are_half_open() -> None:
     np.testing.assert_array_equal(bands_of_modes(values), [0, 1, 1, 2, 2, 3, 6, 6, -1])
 
 
-def test_power_of_one_mode_is_in_its_band(solved) -> None:
-    modes, mass = solved
-    band = bands_of_modes(modes.eigenvalues)
-    mode = np.flatnonzero(band == 3)[4]
-    found = spectrum(5.0 * modes.functions[:, mode], modes, mass, edge_length_mm=1.0)
-    power = found.bands.set_index("band")["power"]
-    assert power[3] == pytest.approx(25.0)
-    assert power.drop(3).sum() == pytest.approx(0.0, abs=1e-9)
-    assert found.captured == pytest.approx(1.0)
-
-
 def test_parseval_with_all_modes() -> None:
     mesh = ellipsoid((35.0, 25.0, 20.0), 2)
     stiffness, mass = laplacian(mesh)
