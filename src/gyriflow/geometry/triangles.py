@@ -134,9 +134,7 @@ def face_components(mesh: TriangleMesh) -> Ints:
     _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return rank[component]
+    return np.argsort(order)[component]
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:

@@ -73,10 +73,9 @@ class ExportedBrain:
     """A brain at a week, and its files by the sides that it has; regions may be empty.
 
     The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
-    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface. There
-    may be white surfaces with their own maps, and maps at the vertices of another brain, the template. The volume,
-    which simulated brains of labels have, names the start's `labels` with `affine_from`, in whose grid theirs are
-    written, and the `surface` and `thickness` of the whole brain.
+    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface.
+    `template_maps` are at the vertices of another brain. The volume, which simulated brains of labels have, names the
+    start's `labels` with `affine_from`, in whose grid theirs are written, and `surface` and `thickness` of the whole.
     """
 
     brain: str
@@ -105,9 +104,8 @@ def export_bids(
     """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
     Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
-    Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables`
-    have the columns subject, run and week; `units` are those of columns of `metrics_wide`. Suffixes of surfaces are
-    those that BEP011 proposes. InputError where two brains have the same names.
+    Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables` have
+    the columns subject, run and week; `units` are those of `metrics_wide`. InputError where two brains have one name.
     """
     folder = Path(folder)
     measured = [brain for brain in brains if brain.run == MEASURED]

@@ -50,8 +50,8 @@ def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> Non
 def replaced(path: AnyPath) -> Iterator[Path]:
     """Yield a temporary path beside `path` that takes its place when the block ends well.
 
-    The temporary name is hidden and has the same suffixes. After an error it is removed and an earlier file
-    stays as it was. Missing folders are made. StorageError where the system refuses to write.
+    After an error an earlier file stays as it was. Missing folders are made. StorageError where the system refuses to
+    write.
     """
     path = Path(path)
     temporary = path.with_name(f".{uuid.uuid4().hex[:12]}.{path.name}")

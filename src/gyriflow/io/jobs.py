@@ -22,17 +22,13 @@ MESSAGE = re.compile(
     r"|^(?:gyriflow: )?warning: (?P<warning>.+)|^gyriflow: (?P<error>.+(?:\n {2,}.+)*)",
     re.MULTILINE,
 )
-OF_LIBRARIES = "py.warnings"
-"""Who logs the warnings of libraries, which say nothing of brains."""
 OWN = ("", "root", "__main__")
 """Who says what is gyriflow's own, besides its modules."""
-UNEXPECTED = "unexpected error"
 RAISED = re.compile(r"^(\w[\w.]*(?:Error|Exception|Interrupt|Warning)\b.*)$", re.MULTILINE)
 OF_SNAKEMAKE = "WorkflowError"
 """How the names of exceptions end that say no more than that a step has failed; logs of jobs on a cluster end so."""
 LOGGED = re.compile(r"\d{4}-\d\d-\d\d \S+ (?:INFO|WARNING) ")
 KILLED = "it was killed, most probably because memory ran out: its log ends without a message"
-LINES_OF_OTHERS = 5
 _PLACES = (
     re.compile(r"results/brains/(?P<subject>[^/]+)/(?:metrics/)?logs/(?P<step>[^/]+)\.log"),
     re.compile(r"results/runs/(?P<run>[^/]+)/(?P<subject>[^/]+)/(?:.*/)?logs/(?P<step>[^/]+)\.log"),
@@ -52,7 +48,8 @@ def messages_in(text: str) -> Iterator[Message]:
     """Yield the warnings and errors in a log or a piece of it, but for warnings of libraries."""
     for match in MESSAGE.finditer(text):
         logger = match["logger"] or ""
-        if logger != OF_LIBRARIES:
+        # where Python logs the warnings of libraries, which say nothing of brains
+        if logger != "py.warnings":
             level = (match["level"] or ("warning" if match["warning"] else "error")).lower()
             content = match["logged"] or match["warning"] or match["error"] or ""
             yield Message(level, content.strip(), logger in OWN or logger.startswith("gyriflow"))
@@ -66,7 +63,7 @@ def cause(text: str) -> str:
     # what the program has said last is what it says on the terminal, before what was logged
     said = [match["error"].strip() for match in MESSAGE.finditer(text) if match["error"]]
     errors = said or [message.text for message in messages_in(text) if message.own and message.level == "error"]
-    if errors and not errors[0].startswith(UNEXPECTED):
+    if errors and not errors[0].startswith("unexpected error"):
         return errors[0]
     raised = [line for line in RAISED.findall(text) if not line.partition(":")[0].endswith(OF_SNAKEMAKE)]
     if raised:
@@ -74,7 +71,7 @@ def cause(text: str) -> str:
     lines = [line for line in text.splitlines() if line.strip()]
     if lines and LOGGED.match(lines[-1]):
         return KILLED
-    return "\n".join(lines[-LINES_OF_OTHERS:])
+    return "\n".join(lines[-5:])
 
 
 def events_in(text: str) -> list[dict[str, Any]]:

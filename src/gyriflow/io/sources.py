@@ -11,11 +11,10 @@ IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^
 
 
 def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
-    """Return a hash of all modules of this package that a Python program imports, the program itself left out.
+    """Return a hash of all modules of this package that a Python program imports, and of data files beside them.
 
-    Data files beside the modules count too, and further `modules`, which the program imports by a name that it is
-    given. Of its functions, a single one counts where each job calls another one. As a parameter of a rule the hash
-    makes a change of the code rerun exactly what depends on it.
+    Further `modules` are those that the program imports by a name that it is given. Of its functions, a single one
+    counts where each job calls another one. A parameter of a rule, it reruns what depends on a change of the code.
     """
     files = modules_behind(program, function).union(modules, *map(modules_behind, modules))
     files |= {data for folder in {module.parent for module in files} for data in _data_in(folder)}

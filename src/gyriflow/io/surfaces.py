@@ -241,8 +241,7 @@ def connectivity(path: Path) -> tuple[int, int, str]:
 
     Neither the order of the triangles nor that of their corners matters. InputError as for `read_surface`.
     """
-    state = path.stat() if path.exists() else None
-    return _connectivity(path, None if state is None else (state.st_mtime_ns, state.st_size))
+    return _connectivity(path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None)
 
 
 @cache
