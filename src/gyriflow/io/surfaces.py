@@ -42,22 +42,24 @@ def read_surface(path: AnyPath) -> TriangleMesh:
     there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
     vertices, and coordinates that are not those of the subject.
     """
-    return surface_and_space(path)[0]
+    return surface_space_structure(path)[0]
 
 
-def surface_and_space(path: AnyPath) -> tuple[TriangleMesh, str | None]:
-    """Return a surface as `read_surface` does, and the space of its coordinates, None where the file does not say it.
+def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, str | None]:
+    """Return a surface as `read_surface` does, the space of its coordinates and its structure.
 
-    The space is a NIfTI transform code's name, such as "NIFTI_XFORM_SCANNER_ANAT".
+    Both are None where the file does not say so. The space is a NIfTI transform code's name, such as
+    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
     """
     path = Path(path)
     with reading(path, "a surface", SURFACE_KINDS):
         if path.suffix.lower() in MESH_SUFFIXES:
-            vertices, faces, space = *_read_with_trimesh(path), None
-        elif _is_gifti(path):
-            vertices, faces, space = _read_gifti_surface(path)
+            vertices, faces, space, structure = *_read_with_trimesh(path), None, None
+        elif path.suffix.lower() == ".gii" or path.name.endswith(".gii.gz"):
+            vertices, faces, space, structure = _read_gifti_surface(path)
         else:
             vertices, faces, space = _read_freesurfer_surface(path)
+            structure = FREESURFER_SIDES.get(path.name.split(".")[0])
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
         found = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
         raise InputError("holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces")
@@ -68,7 +70,7 @@ def surface_and_space(path: AnyPath) -> tuple[TriangleMesh, str | None]:
         found = f"indices {faces.min():.6g} to {faces.max():.6g}"
         expected = f"whole numbers from 0 to {len(vertices) - 1}"
         raise InputError("has faces that name vertices which do not exist", path=path, found=found, expected=expected)
-    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space
+    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space, structure
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
@@ -76,23 +78,22 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
     InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
     """
-    _require_side(left, "left")
-    _require_side(right, "right")
-    (one, space), (other, other_space) = surface_and_space(left), surface_and_space(right)
+    (one, space), (other, other_space) = _read_side(left, "left"), _read_side(right, "right")
     return one, other, space is not None and space == other_space
 
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
     """Return the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
-    _require_side(path, side)
-    return read_surface(path)
+    return _read_side(path, side)[0]
 
 
-def _require_side(path: AnyPath, side: Side) -> None:
-    named, expected = _structure(path), STRUCTURES[side]
-    if named in STRUCTURES.values() and named != expected:
+def _read_side(path: AnyPath, side: Side) -> tuple[TriangleMesh, str | None]:
+    mesh, space, structure = surface_space_structure(path)
+    expected = STRUCTURES[side]
+    if structure in STRUCTURES.values() and structure != expected:
         remedy = "Swap `left` and `right`, or mend what the file says of itself (AnatomicalStructurePrimary, lh or rh)."
-        raise InputError("is of the other hemisphere", path=path, found=named, expected=expected, remedy=remedy)
+        raise InputError("is of the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
+    return mesh, space
 
 
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
@@ -194,22 +195,7 @@ def load_gifti(path: AnyPath) -> GiftiImage:
     return image
 
 
-def _is_gifti(path: AnyPath) -> bool:
-    return Path(path).suffix.lower() == ".gii" or Path(path).name.endswith(".gii.gz")
-
-
-def _structure(path: AnyPath) -> str | None:
-    if not _is_gifti(path):
-        return FREESURFER_SIDES.get(Path(path).name.split(".")[0])
-    image = load_gifti(path)
-    points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
-    if not points:
-        return None
-    named: str | None = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
-    return named
-
-
-def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None]:
+def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None, str | None]:
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
@@ -220,7 +206,8 @@ def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None]:
     if space is None:
         _warn_of_tkr_ras(points[0].meta, path)
     vertices = np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
-    return vertices, np.asarray(triangles[0].data), space
+    structure = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
+    return vertices, np.asarray(triangles[0].data), space, structure
 
 
 def _read_with_trimesh(path: Path) -> tuple[Floats, NDArray]:

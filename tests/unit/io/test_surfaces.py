@@ -18,7 +18,7 @@ from gyriflow.io.surfaces import (
     read_surface_maps,
     read_vertex_labels,
     read_vertex_maps,
-    surface_and_space,
+    surface_space_structure,
     write_surface,
     write_vertex_labels,
     write_vertex_maps,
@@ -72,7 +72,7 @@ def in_spaces(path, ball, *systems):
 @pytest.mark.fault(11)
 @pytest.mark.parametrize("to", [SCANNER, ALIGNED])
 def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
-    back, space = surface_and_space(in_spaces(tmp_path / "a.gii", ball, (U, to, TURN)))
+    back, space, _ = surface_space_structure(in_spaces(tmp_path / "a.gii", ball, (U, to, TURN)))
     assert back.vertices == pytest.approx(ball.vertices @ TURN[:3, :3].T + TURN[:3, 3], abs=1e-3)
     assert space == f"NIFTI_XFORM_{NAMES[to]}"
 
@@ -89,7 +89,7 @@ def test_rigid_matrix_into_scanner_space_is_applied(tmp_path, ball, to):
     ],
 )
 def test_other_matrices_leave_the_coordinates_and_that_is_said(tmp_path, ball, caplog, systems, said, expected):
-    back, space = surface_and_space(in_spaces(tmp_path / "a.gii", ball, *systems))
+    back, space, _ = surface_space_structure(in_spaces(tmp_path / "a.gii", ball, *systems))
     assert back.vertices == pytest.approx(ball.vertices, abs=1e-4)
     assert said in caplog.text
     assert space == expected
@@ -133,7 +133,7 @@ def volume(**changed):
 
 def test_freesurfer_surface_is_brought_to_scanner_space(tmp_path, ball):
     write_geometry(tmp_path / "lh.pial", ball.vertices, ball.faces, volume_info=volume())
-    back, space = surface_and_space(tmp_path / "lh.pial")
+    back, space, structure = surface_space_structure(tmp_path / "lh.pial")
     # Norig inv(Torig) of surfer.nmr.mgh.harvard.edu/fswiki/CoordinateSystems, voxels of 1 mm
     torig = np.array([[-1, 0, 0, 128], [0, 0, 1, -128], [0, -1, 0, 128], [0, 0, 0, 1.0]])
     norig = np.eye(4)
@@ -141,7 +141,7 @@ def test_freesurfer_surface_is_brought_to_scanner_space(tmp_path, ball):
     norig[:3, 3] = np.array(AXES["cras"]) - norig[:3, :3] @ np.full(3, 128.0)
     matrix = norig @ np.linalg.inv(torig)
     assert back.vertices == pytest.approx(ball.vertices @ matrix[:3, :3].T + matrix[:3, 3], abs=1e-3)
-    assert space == "NIFTI_XFORM_SCANNER_ANAT"
+    assert (space, structure) == ("NIFTI_XFORM_SCANNER_ANAT", "CortexLeft")
 
 
 @pytest.mark.fault(9)
