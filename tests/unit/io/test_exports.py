@@ -33,19 +33,14 @@ POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 @pytest.fixture
 def brain(tmp_path):
-    paths = {"surfaces": {}, "maps": {}, "regions": {}}
+    ends = {"surfaces": "pial.surf.gii", "maps": "shape.gii", "regions": "regions.label.gii"}
+    paths = {kind: {side: str(tmp_path / f"{side}.{end}") for side in ("left", "right")} for kind, end in ends.items()}
     for side, sign in (("left", -1), ("right", 1)):
         mesh = hemisphere(sign)
-        files = {
-            kind: str(tmp_path / f"{side}.{end}")
-            for kind, end in (("surfaces", "pial.surf.gii"), ("maps", "shape.gii"), ("regions", "regions.label.gii"))
-        }
-        write_surface(files["surfaces"], mesh)
         number = np.arange(len(mesh.vertices))
-        write_vertex_maps(files["maps"], {"sulcal_depth_mm": number / 7, "thickness_mm": number / 9})
-        write_vertex_labels(files["regions"], number % 2, {1: "frontal"})
-        for kind, path in files.items():
-            paths[kind][side] = path
+        write_surface(paths["surfaces"][side], mesh)
+        write_vertex_maps(paths["maps"][side], {"sulcal_depth_mm": number / 7, "thickness_mm": number / 9})
+        write_vertex_labels(paths["regions"][side], number % 2, {1: "frontal"})
     write_json(tmp_path / "surface.json", {"pose": Pose(POSE).plain()})
     return ExportedBrain(
         "case_1", "real", 22.43, "case_1", **paths, report=str(tmp_path / "surface.json"), covariates={}
@@ -83,15 +78,11 @@ def test_bids_derivatives(tmp_path, brain):
 
 
 def scans_of_two(brain):
+    scans = (("1", "1", 21.0, "F", "1.5"), ("1", "2", 24.43, "F", "3"), ("2", "1", 22.0, "M", "3"))
     return [
-        replace(
-            brain, brain=f"{subject}_{session}", subject=subject, week=week, covariates={"sex": sex, "tesla": tesla}
-        )
-        for subject, sex, scans in (
-            ("sub-01", "F", (("ses-1", 21.0, "1.5"), ("ses-2", 24.43, "3"))),
-            ("sub-02", "M", (("ses-1", 22.0, "3"),)),
-        )
-        for session, week, tesla in scans
+        replace(brain, brain=f"sub-0{subject}_ses-{session}", subject=f"sub-0{subject}", week=week, covariates=more)
+        for subject, session, week, sex, tesla in scans
+        for more in [{"sex": sex, "tesla": tesla}]
     ]
 
 
