@@ -11,7 +11,7 @@ from processes import all_end, below, command_of, kill
 
 from gyriflow.io.files import read_json
 
-from .conftest import SMALL_STUDY
+from .conftest import SMALL_STUDY, Workflow
 
 pytestmark = pytest.mark.slow
 
@@ -25,9 +25,10 @@ SUMMARY = "results/runs/reference/a/folding/summary.json"
 LOG = "results/runs/reference/a/logs/simulate.log"
 
 
-@pytest.fixture
-def meshed(workflow):
+@pytest.fixture(scope="module")
+def meshed(checkout_copy, tmp_path_factory):
     """A study whose surface and mesh count as made: an ellipsoid."""
+    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
     workflow.count_ellipsoid_as_meshed(STUDY, cells=10)
     return workflow
 
@@ -47,6 +48,19 @@ def started(workflow, until):
     return process
 
 
+@pytest.mark.fault(38)
+def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
+    process = started(meshed, until="step    2")
+    ranks = [pid for pid in below(process.pid) if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]]
+    kill(ranks[-1:])
+    printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 137, printed
+    assert re.search(r"\d+ elements, .* about \d+ MiB", printed)
+    assert "most probably because memory ran out" in printed
+    assert "most probably because memory ran out" in (meshed.directory / LOG).read_text()
+    assert not (meshed.directory / SUMMARY).exists()
+
+
 @pytest.mark.fault(33)
 @pytest.mark.promise(3)
 def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
@@ -64,16 +78,3 @@ def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
     summary = read_json(meshed.directory / SUMMARY)
     assert summary["resumed_after_step"] >= 3
     assert summary["steps"] == 84
-
-
-@pytest.mark.fault(38)
-def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
-    process = started(meshed, until="step    2")
-    ranks = [pid for pid in below(process.pid) if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]]
-    kill(ranks[-1:])
-    printed, _ = process.communicate(timeout=60)
-    assert process.returncode == 137, printed
-    assert re.search(r"\d+ elements, .* about \d+ MiB", printed)
-    assert "most probably because memory ran out" in printed
-    assert "most probably because memory ran out" in (meshed.directory / LOG).read_text()
-    assert not (meshed.directory / SUMMARY).exists()

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from processes import command_of
 
 pytestmark = pytest.mark.slow
 
@@ -61,12 +62,8 @@ def outside(tmp_path):
     conda.write_text(CONDA)
     conda.chmod(0o755)
     env = {name: value for name, value in os.environ.items() if name not in {"VIRTUAL_ENV", "CONDA_PREFIX"}}
-    env |= {
-        "PATH": f"{programs}:{env['PATH']}",
-        "GYRIFLOW_CACHE": str(tmp_path / "cache"),
-        "RECORD": str(tmp_path / "record"),
-    }
-    return env
+    files = {"GYRIFLOW_CACHE": str(tmp_path / "cache"), "RECORD": str(tmp_path / "record")}
+    return env | files | {"PATH": f"{programs}:{env['PATH']}"}
 
 
 OWN = f"9{os.getpid()}.25"
@@ -80,14 +77,10 @@ def run(*command, env=None, **options):
 def start(*command, env):
     """Starts ./run with signals as a shell starts it, whatever they are here."""
     return subprocess.Popen(
-        [RUN, *command],
-        env=env,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        [RUN, *command], env=env,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: [signal.signal(s, signal.SIG_DFL) for s in (signal.SIGINT, signal.SIGTERM)],
-    )
+    )  # fmt: skip
 
 
 def wait_until(condition, seconds=20.0):
@@ -102,27 +95,22 @@ def wait_until(condition, seconds=20.0):
 
 def running(word):
     """Returns the processes that have a word in their command line."""
-    found = []
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            command = (process / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if word.encode() in command and int(process.name) != os.getpid():
-            found.append(process.name)
-    return found
+    pids = [int(process.name) for process in Path("/proc").glob("[0-9]*")]
+    return [pid for pid in pids if pid != os.getpid() and any(word in part for part in command_of(pid))]
 
 
 # --- inside an environment -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("command", "code"), [("exit 0", 0), ("exit 7", 7), ("no-such-command", 127)])
-def test_exit_code_is_handed_on(command, code):
-    assert run("bash", "-c", command).returncode == code
-
-
-def test_arguments_reach_the_command_as_they_are():
+def test_arguments_and_exit_code_are_handed_on():
     assert run("printf", "%s|", "a b", "", "*", "$HOME", "'").stdout == "a b||*|$HOME|'|"
+    assert run("bash", "-c", "exit 7").returncode == 7
+    assert run("no-such-command").returncode == 127
+
+
+def test_blas_is_an_optimised_one():
+    loaded = run("python", "-c", "import petsc4py.PETSc; print(open('/proc/self/maps').read())").stdout
+    assert "openblas" in loaded or "mkl" in loaded
 
 
 # --- conda ---------------------------------------------------------------------------------------------------
@@ -130,11 +118,7 @@ def test_arguments_reach_the_command_as_they_are():
 
 @pytest.mark.parametrize(
     ("name", "create", "hook"),
-    [
-        ("conda", "env create", "shell.bash hook"),
-        ("mamba", "env create --yes", "shell hook --shell bash"),
-        ("micromamba", "create --yes", "shell hook --shell bash"),
-    ],
+    [("conda", "env create", "shell.bash hook"), ("micromamba", "create --yes", "shell hook --shell bash")],
 )
 def test_conda_environment_is_made_once_and_activated(outside, tmp_path, name, create, hook):
     (tmp_path / "programs" / "conda").rename(tmp_path / "programs" / name)
@@ -146,11 +130,8 @@ def test_conda_environment_is_made_once_and_activated(outside, tmp_path, name, c
     assert second.stderr == ""
     tag = hashlib.sha256((ROOT / "envs" / "gyriflow.yaml").read_bytes()).hexdigest()[:12]
     prefix = tmp_path / "cache" / f"conda-{tag}" / "conda"
-    assert (tmp_path / "record").read_text().splitlines() == [
-        f"{create} -p {prefix} -f {ROOT}/envs/gyriflow.yaml",
-        hook,
-        hook,
-    ]
+    made = f"{create} -p {prefix} -f {ROOT}/envs/gyriflow.yaml"
+    assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
 
 
 def test_signals_reach_a_command_in_conda(outside):
@@ -198,7 +179,7 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
         assert not running(OWN)
     # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
     for orphan in running(OWN):
-        os.kill(int(orphan), signal.SIGTERM)
+        os.kill(orphan, signal.SIGTERM)
     assert run("tool", "again", env=outside).stdout == "from the environment: again\n"
 
 
@@ -216,11 +197,8 @@ def tree(outside, tmp_path):
         pytest.skip("not in the Debian tree of this checkout, or not root")
     programs = tmp_path / "programs"
     (programs / "conda").unlink()
-    stand_ins = {
-        "apt-cache": "#!/bin/sh\n# knows no dolfinx\n",
-        "bwrap": "#!/bin/sh\necho 'bwrap: no rights here' >&2; exit 1\n",
-        "mount": MOUNT,
-    }
+    no_rights = "#!/bin/sh\necho 'bwrap: no rights here' >&2; exit 1\n"
+    stand_ins = {"apt-cache": "#!/bin/sh\n# knows no dolfinx\n", "bwrap": no_rights, "mount": MOUNT}
     for name, text in stand_ins.items():
         (programs / name).write_text(text)
         (programs / name).chmod(0o755)

@@ -1,4 +1,4 @@
-"""What a run tells on the terminal, and what it leaves in the log: real runs of one brain's surface."""
+"""What a run tells on the terminal, and what it leaves in the log; in a folder and of a file of any name."""
 
 import os
 import pty
@@ -8,13 +8,16 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from shapes import phantom, save_labels
 
 from gyriflow.cli.status import STATE
 from gyriflow.io.files import read_json
 
-from .conftest import SMALL_STUDY
+from .conftest import Workflow
 
-ONE_BRAIN = SMALL_STUDY | {"brains": SMALL_STUDY["brains"][:1]}
+# what a shell could take apart
+FOLDER = "-a b; touch pwned; $(touch pwned) `touch pwned` 'it\"s é {brain}"
+FILE = "$(touch pwned) 'x' \"y\"; touch pwned & -é.nii.gz"
 
 
 def on_a_terminal(workflow, *arguments):
@@ -35,13 +38,20 @@ def on_a_terminal(workflow, *arguments):
 
 
 @pytest.mark.slow
-def test_a_run_shows_a_bar_and_all_else_is_in_the_log(workflow):
-    arguments = ("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", ONE_BRAIN))
+@pytest.mark.fault(57)
+def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(checkout_copy, tmp_path):
+    workflow = Workflow(checkout_copy, tmp_path / FOLDER)
+    workflow.directory.mkdir()
+    save_labels(workflow.directory / "plain.nii.gz", *phantom(21.0, 2.0))
+    (workflow.directory / "plain.nii.gz").rename(workflow.directory / FILE)
+    brain = {"id": "a", "week": 21, "labels": FILE, "scheme": "spina-bifida-atlas"}
+    config = {"brains": [brain], "start": "a", "surface": {"edge_length_mm": 3.0}, "folding": {"end_week": 22}}
+    arguments = ("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", config))
     code, said = on_a_terminal(workflow, *arguments)
     assert code == 0, said
     assert "pial_from_labels a\r\x1b[2K" in said
     assert "gyriflow: done in" in said
-    (log,) = re.findall(r"all details: (\S+)", said)
+    (log,) = re.findall(r"all details: (.+?)\r?\n", said)
     assert "rule pial_from_labels:" in Path(log).read_text()
     state = read_json(workflow.directory / STATE)
     assert state["done"] == state["total"] > 2
@@ -53,3 +63,6 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log(workflow):
     # Snakemake's own messages are a word away
     as_before = workflow.run(*arguments, "--verbose")
     assert "Nothing to be done" in as_before.stdout + as_before.stderr
+    assert (workflow.directory / "results/brains/a/surface/pial.surf.gii").stat().st_size > 0
+    assert not list(tmp_path.rglob("pwned*"))
+    assert not (checkout_copy / "pwned").exists()
