@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.compare.placement import correlation
-from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
+from gyriflow.geometry.alignment import motion, rigid_fit, without_rigid_motion
 from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
@@ -50,7 +50,7 @@ ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 
 LABELS = "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
-START_WEEK = 21.0
+START_WEEK, END_WEEK = 21.0, 28.0
 SMOOTHING_VOXELS = 2.0
 BUMPS, BUMP_MM = 24, 0.15
 """Number of the waves, and the standard deviation of their sum."""
@@ -68,8 +68,15 @@ NODES_TO_CORTEX = (1.41, 2.0, 2.83, 4.0)
 """Thickness over the distance of nodes at the surface: halved, elements to the cortex of quadratic ones."""
 REPEATED = 2.0
 """The resolution at which a second mesh of quadratic elements is made."""
+THICKNESS_MM = 2.0
+DAY_S = 86400.0
 PARAMETERS = {
     "start_week": START_WEEK,
+    "end_week": END_WEEK,
+    "output_weeks": [START_WEEK, END_WEEK],
+    "step_s": DAY_S,
+    "thickness_mm": THICKNESS_MM,
+    "contact": {"kind": "global"},
     "fissure_x_mm": 0.0,
     # about as the atlas' areas and volumes grow from 21 to 29 GW, had nothing to be pressed together
     "growth_rate_per_s": 2.0e-7,
@@ -88,7 +95,8 @@ COMPARED = (
     "folding_index",
     *(f"spangy_B{band}_relative_power" for band in range(1, 6)),
 )
-DAY_S = 86400.0
+TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
+"""Of Newton's method and in time, of a study's run."""
 
 
 @cache
@@ -123,66 +131,6 @@ def bumps(points: Floats) -> Floats:
     return BUMP_MM * np.cos(phases).sum(axis=1) / np.sqrt(BUMPS / 2)
 
 
-def mesh_of(surface: TriangleMesh, order: int, spacing_mm: float, turned: bool = False) -> TetrahedralMesh:
-    """Return a mesh of elements of an order with nodes `spacing_mm` apart at the surface."""
-    motion = np.eye(4)
-    motion[:3, :3] = ROTATION if turned else np.eye(3)
-    mesh = tetrahedralise(
-        transformed(surface, motion),
-        surface_edge_mm=spacing_mm,
-        core_edge_mm=CORE * spacing_mm,
-        envelope_mm=0.1,
-        time_limit_s=1800,
-        mesher="tetgen",
-        order=order,
-    )
-    return TetrahedralMesh(mesh.vertices @ motion[:3, :3], mesh.tets)
-
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """What a run made of the measured surface at a week.
-
-    Attributes
-    ----------
-    surface
-        The measured surface, moved as the run moves its places; faces are the same in all runs.
-    mean_curvature : (n,) float
-        In 1/mm at its vertices.
-    values
-        Metrics by name, of `surface`; own_area and own_volume are those of the run's own mesh.
-    """
-
-    surface: TriangleMesh
-    mean_curvature: Floats
-    values: dict[str, float]
-
-
-@cache
-def measured_surface() -> TriangleMesh:
-    """Return the start surface with the edges at which a study measures."""
-    return remesh(start_surface(), MEASURED_EDGE_MM)
-
-
-def carried(frames: Path, week: float, modes: str = "B5") -> Carried:
-    """Return the measured surface as a run has moved it by a week, with its metrics."""
-    start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
-    own, nodes = boundary_surface(start)
-    now = read_positions(frames, week)[nodes]
-    before, after, faces = own.vertices, now, own.faces.astype(np.int64)
-    if start.order == 2:
-        matrix, faces = finer_surface(faces)
-        before, after = matrix @ before, matrix @ after
-    measured = measured_surface()
-    match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
-    surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
-    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, modes)
-    rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side)
-    values = {name: value for name, value, _ in rows}
-    values |= {f"own_{name}": value for name, value, _ in size_rows(TriangleMesh(after, faces), 0)[:2]}
-    return Carried(surface, side.bend.mean, values)
-
-
 @dataclass(frozen=True)
 class Case:
     """A mesh to be folded: order of its elements, node distances to the thickness, and whether it is the second one."""
@@ -196,26 +144,66 @@ class Case:
         return f"{ORDERS[self.order]}-{self.nodes:g}{'-turned' if self.turned else ''}"
 
 
+def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
+    """Return the mesh of a case."""
+    rotation, spacing_mm = ROTATION if case.turned else np.eye(3), THICKNESS_MM / case.nodes
+    mesh = tetrahedralise(
+        transformed(surface, motion(rotation)),
+        surface_edge_mm=spacing_mm,
+        core_edge_mm=CORE * spacing_mm,
+        envelope_mm=0.1,
+        time_limit_s=1800,
+        mesher="tetgen",
+        order=case.order,
+    )
+    return TetrahedralMesh(mesh.vertices @ rotation, mesh.tets)
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The measured surface as a run has moved it, with the mean curvature in 1/mm at its vertices, and metrics."""
+
+    surface: TriangleMesh
+    mean_curvature: Floats
+    values: dict[str, float]
+
+
+@cache
+def measured_surface() -> TriangleMesh:
+    """Return the start surface with the edges at which a study measures."""
+    return remesh(start_surface(), MEASURED_EDGE_MM)
+
+
+def carried(frames: Path, week: float) -> Carried:
+    """Return the measured surface as a run has moved it by a week, with its metrics."""
+    start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
+    own, nodes = boundary_surface(start)
+    before, after, faces = own.vertices, read_positions(frames, week)[nodes], own.faces.astype(np.int64)
+    if start.order == 2:
+        matrix, faces = finer_surface(faces)
+        before, after = matrix @ before, matrix @ after
+    measured = measured_surface()
+    match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
+    surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
+    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, "B5")
+    rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side)
+    return Carried(surface, side.bend.mean, {name: value for name, value, _ in rows})
+
+
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--folder", type=Path, required=True, help="for meshes and runs, which are kept")
     parser.add_argument("--run", type=Path, nargs="+", help="mesh and params.yaml of a run, with its maps.h5")
-    parser.add_argument("--run-steps-days", type=float, nargs="*", default=[0.25, 0.5, 1.0, 1.75])
-    parser.add_argument("--run-tolerances", type=float, nargs="*", default=[1e-6, 1e-5, 1e-4, 1e-3])
-    parser.add_argument("--thickness-mm", type=float, default=2.0)
     parser.add_argument("--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="to the thickness")
-    parser.add_argument("--orders", type=int, nargs="+", choices=(1, 2), default=[1, 2])
-    parser.add_argument("--end-week", type=float, default=28.0)
-    parser.add_argument("--step-days", type=float, default=1.0)
     return parser.parse_args()
 
 
-def mesh_file(folder: Path, case: Case, thickness_mm: float) -> Path:
+def mesh_file(folder: Path, case: Case) -> Path:
     """Return the file of a case's mesh, made where it is not there."""
     file = folder / f"{case.name}.xdmf"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        write_tetrahedral_mesh(file, mesh_of(start_surface(), case.order, thickness_mm / case.nodes, case.turned))
+        write_tetrahedral_mesh(file, mesh_of(start_surface(), case))
     return file
 
 
@@ -235,21 +223,13 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict
 
 def resolution_runs(arguments: argparse.Namespace) -> dict[Case, dict[str, Any]]:
     """Fold all cases, coarse ones first; what their runs took."""
-    pairs = [(nodes, order) for nodes in sorted(arguments.nodes) for order in sorted(arguments.orders)]
-    cases = [Case(order, nodes) for nodes, order in pairs]
-    if (REPEATED, 2) in pairs:
+    cases = [Case(order, nodes) for nodes in sorted(arguments.nodes) for order in ORDERS]
+    if REPEATED in arguments.nodes:
         cases.append(Case(2, REPEATED, turned=True))
-    parameters = PARAMETERS | {
-        "thickness_mm": arguments.thickness_mm,
-        "step_s": arguments.step_days * DAY_S,
-        "contact": {"kind": "global"},
-        "end_week": arguments.end_week,
-        "output_weeks": [START_WEEK, arguments.end_week],
-    }
     rows = {}
     for case in cases:
-        mesh = mesh_file(arguments.folder / "meshes", case, arguments.thickness_mm)
-        summary = fold(mesh, arguments.folder / "runs" / case.name, parameters)
+        mesh = mesh_file(arguments.folder / "meshes", case)
+        summary = fold(mesh, arguments.folder / "runs" / case.name, PARAMETERS)
         size = {"nodes": len(read_tetrahedral_mesh(mesh).vertices), "elements_to_cortex": case.nodes / case.order}
         rows[case] = {"run": case.name, **size, **{key: summary[key] for key in summary if key != "weeks"}}
         print(json.dumps(rows[case]), flush=True)
@@ -304,8 +284,8 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any
     mesh, file, *maps = arguments.run
     given = read_yaml(file)
     solver = given["solver"]
-    tolerances = {value: given | {"solver": solver | {"newton_tolerance": value}} for value in arguments.run_tolerances}
-    steps = {days: given | {"step_s": days * DAY_S} for days in arguments.run_steps_days}
+    tolerances = {value: given | {"solver": solver | {"newton_tolerance": value}} for value in TOLERANCES}
+    steps = {days: given | {"step_s": days * DAY_S} for days in STEPS_DAYS}
     return {
         "run_steps": errors("step_days", steps, arguments.folder / "run_steps", mesh, *maps),
         "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
@@ -316,11 +296,11 @@ def against_finest(arguments: argparse.Namespace, cases: list[Case]) -> list[dic
     """Return how all runs differ from the finest at the end."""
     finest = max((case for case in cases if not case.turned), key=lambda case: (case.nodes, case.order))
     frames = {case: arguments.folder / "runs" / case.name / "frames.h5" for case in cases}
-    start, exact = carried(frames[finest], START_WEEK), carried(frames[finest], arguments.end_week)
-    others = (case for case in cases if case is not finest)
+    start, exact = carried(frames[finest], START_WEEK), carried(frames[finest], END_WEEK)
     return [
-        {"run": case.name, "finest": finest.name} | difference(carried(frames[case], arguments.end_week), exact, start)
-        for case in others
+        {"run": case.name, "finest": finest.name} | difference(carried(frames[case], END_WEEK), exact, start)
+        for case in cases
+        if case is not finest
     ]
 
 

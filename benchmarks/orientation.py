@@ -1,7 +1,12 @@
 """How well hemispheres are posed: surfaces in known wrong poses against the truth, as one line of JSON.
 
 FOLDER holds pairs of surfaces whose names differ by `left` and `right` only, and `truth.json`: for each file the rigid
-motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`. `repose.py` makes more such folders.
+motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`.
+
+With --move OUT another such folder is made instead, with hemispheres moved at random: PLY files, which say nothing of
+their coordinates, every other one inside out, and their `truth.json`. FOLDER needs none where it is in RAS+ mm. With
+--asymmetry the right hemispheres are deformed first, smoothly and at random; what of this is a rigid motion is taken
+off again, so that the truth remains one.
 """
 
 import argparse
@@ -17,23 +22,43 @@ from gyriflow.anatomy.pial import PialSurface, from_hemispheres
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import GyriflowError
-from gyriflow.geometry.triangles import Floats, TriangleMesh, euler_number, is_closed, signed_volume
-from gyriflow.io.files import read_json
-from gyriflow.io.surfaces import read_hemispheres, read_surface
+from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    euler_number,
+    flipped,
+    is_closed,
+    signed_volume,
+    transformed,
+)
+from gyriflow.io.files import read_json, write_json
+from gyriflow.io.surfaces import read_hemispheres, read_surface, write_surface
 
 Files = tuple[Path, Path]
 
 SIDES = ("left", "right")
 WEEKS = np.arange(18.0, 45.5, 0.5)
-MAX_ASYMMETRY = 0.05
+FAR_MM = 50.0
+# of deformations: the stretch, and how many waves there are, of how many radians per cube root of the volume
+STRETCH, WAVES, WAVE_NUMBER = 0.04, 60, 2.0
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--move", type=Path, metavar="OUT", help="folder for hemispheres that are moved at random")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--together", action="store_true", help="one motion for both hemispheres of a brain")
+    parser.add_argument("--asymmetry", type=float, default=0.0, metavar="MM", help="root mean square deformation")
+    parser.add_argument("--scale", type=float, default=1.0, help="size of the brains, in their own")
+    arguments = parser.parse_args()
+    folder = arguments.folder
+    truth = read_json(folder / "truth.json") if (folder / "truth.json").exists() else {}
+    if arguments.move:
+        write_json(arguments.move / "truth.json", moved_at_random(arguments, truth))
+        return
     logging.disable(logging.WARNING)
-    folder = parser.parse_args().folder
-    truth = read_json(folder / "truth.json")
     began = time.perf_counter()
     surfaces, refused = {}, []
     for brain in pairs_of_files(folder):
@@ -56,7 +81,7 @@ def posed(brain: Files) -> PialSurface:
     """Returns the pial surface of two files, coarse, as the workflow makes it."""
     left, right, declared = read_hemispheres(*brain)
     edge = max(1.2, abs(signed_volume(left)) ** (1 / 3) / 25)
-    settings = {"week": _week(left), "edge_length_mm": edge, "max_asymmetry": MAX_ASYMMETRY}
+    settings = {"week": _week(left), "edge_length_mm": edge, "max_asymmetry": 0.05}
     return from_hemispheres(left, right, coordinates="auto", declared=declared, **settings)
 
 
@@ -108,6 +133,50 @@ def _week(left: TriangleMesh) -> float:
 
 def _worst(values: Floats) -> float:
     return round(float(np.max(values)), 3)
+
+
+def moved_at_random(arguments: argparse.Namespace, known: dict) -> dict[str, dict]:
+    """Writes the hemispheres of a folder, moved, and returns their truth; `known` is that of the folder, or empty."""
+    random, truth = np.random.default_rng(arguments.seed), {}
+    for files in pairs_of_files(arguments.folder):
+        shared = any_motion(random)
+        for path, side in zip(files, SIDES, strict=True):
+            mesh = transformed(read_surface(path), np.array(known[path.name]["to_ras"]) if known else np.eye(4))
+            mesh = flipped(mesh) if signed_volume(mesh) < 0 else mesh
+            mesh = TriangleMesh(arguments.scale * mesh.vertices, mesh.faces)
+            if arguments.asymmetry and side == "right":
+                mesh = deformed(mesh, arguments.asymmetry, random)
+            moved = shared if arguments.together else any_motion(random)
+            turned = len(truth) % 2 == 1
+            mesh = transformed(mesh, moved)
+            name = path.name.split(".surf")[0].removesuffix(path.suffix) + ".ply"
+            write_surface(arguments.move / name, flipped(mesh) if turned else mesh)
+            truth[name] = {"to_ras": np.linalg.inv(moved).tolist(), "inside_out": turned}
+    return truth
+
+
+def any_motion(random: np.random.Generator) -> np.ndarray:
+    """Returns a random rigid motion, (4, 4): any rotation, and a shift of a few centimetres."""
+    return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0.0, FAR_MM, 3))
+
+
+def deformed(mesh: TriangleMesh, rms_mm: float, random: np.random.Generator) -> TriangleMesh:
+    """Returns the surface stretched by up to 4 % along each axis and bent by random waves, without a rigid motion.
+
+    `rms_mm` is the root mean square length of the waves' displacements. The volume is kept.
+    """
+    points = mesh.vertices
+    centre, size = points.mean(axis=0), signed_volume(mesh) ** (1 / 3)
+    waves = random.normal(0.0, WAVE_NUMBER / size, (WAVES, 3))
+    phases = (points - centre) @ waves.T + random.uniform(0.0, 2 * np.pi, WAVES)
+    bends = np.cos(phases) @ random.normal(0.0, 1.0, (WAVES, 3))
+    bends -= bends.mean(axis=0)
+    bends *= rms_mm / np.sqrt((bends**2).sum(axis=1).mean())
+    there = (points - centre) * (1.0 + random.uniform(-STRETCH, STRETCH, 3)) + bends
+    there -= there.mean(axis=0)
+    there *= size / signed_volume(TriangleMesh(there, mesh.faces)) ** (1 / 3)
+    back, _ = Rotation.align_vectors(points - centre, there)
+    return TriangleMesh(back.apply(there) + centre, mesh.faces)
 
 
 if __name__ == "__main__":

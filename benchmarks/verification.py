@@ -40,10 +40,10 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 def consistency() -> dict:
-    from verification_cases.consistency import patch_residual, remainders
+    from verification_cases.consistency import patch_residual, slopes_of_remainders
 
     return {
-        name: {"patch_residual": patch_residual(order=order), "slopes": remainders(order=order).slopes()}
+        name: {"patch_residual": patch_residual(order=order), "slopes": slopes_of_remainders(order=order)}
         for order, name in ORDERS.items()
     }
 
@@ -73,7 +73,7 @@ def elements() -> list[dict]:
             # the coarsest meshes also where tissue is nearly incompressible
             for poisson_ratio in POISSON_RATIOS[: 4 if cells == counts[0] else 2]:
                 case = Waved(CONTRASTS[0], RATE_GROWTH, 1, poisson_ratio=poisson_ratio, order=order)
-                found.append(asdict(fastest_wave(case, cells)))
+                found.append(fastest_wave(case, cells))
     return found
 
 
@@ -207,8 +207,7 @@ def differences_between_ranks() -> dict:
 
 
 def main(only: list[str], figures: Path | None) -> None:
-    from verification_cases.figures import draw
-    from verification_cases.summary import memory_of, plain, rates_of
+    from verification_cases.summary import draw, memory_of, plain, rates_of
 
     found: dict = {}
     for part in only:

@@ -1,7 +1,5 @@
 """Energy, forces and stiffness that belong together: Taylor's remainders, and the patch test."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -57,21 +55,12 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> Problem:
     return problem
 
 
-@dataclass(frozen=True, eq=False)
-class Remainders:
-    """|E(u + hv) − E(u) − h E'(u)v| and |r(u + hv) − r(u) − h K(u)v| at `LENGTHS`: both fall as h²."""
+def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Floats:
+    """Return the (4, 2) orders in which Taylor's remainders fall, of a problem with all parts.
 
-    energy: Floats
-    residual: Floats
-
-    def slopes(self) -> Floats:
-        """Return the (4, 2) slopes of their logarithms."""
-        values = np.stack([self.energy, self.residual], axis=1)
-        return np.diff(np.log(values), axis=0) / np.diff(np.log(LENGTHS))[:, None]
-
-
-def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
-    """Return Taylor's remainders of a problem with all parts: layers, kept stress, a clamped base, both planes."""
+    These are |E(u + hv) − E(u) − h E'(u)v| and |r(u + hv) − r(u) − h K(u)v| at `LENGTHS`, with layers, kept stress, a
+    clamped base and both planes.
+    """
 
     def zone_of(centre):
         zone = np.full(len(centre), FREE)
@@ -93,15 +82,15 @@ def remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Remainders:
     energy = problem.energy()
     problem.residual(residual)
     problem.tangent().matrix.mult(direction, change)
-    by_energy, by_residual = [], []
+    remainders = []
     for h in LENGTHS:
         problem.set_displacement(u + h * v)
-        by_energy.append(abs(problem.energy() - energy - h * residual.dot(direction)))
+        of_energy = abs(problem.energy() - energy - h * residual.dot(direction))
         problem.residual(other)
         other.axpy(-1.0, residual)
         other.axpy(-h, change)
-        by_residual.append(other.norm())
-    return Remainders(np.array(by_energy), np.array(by_residual))
+        remainders.append([of_energy, other.norm()])
+    return np.diff(np.log(remainders), axis=0) / np.diff(np.log(LENGTHS))[:, None]
 
 
 def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> float:
