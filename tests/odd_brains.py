@@ -23,30 +23,26 @@ def positions(labels: Labels, affine: Floats) -> Floats:
 
 def without_callosum(labels: Labels, affine: Floats) -> Labels:
     """Returns a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
-    x, _, z = positions(labels, affine)
-    top = z[labels == DEEP_GREY].mean()
-    made = np.where(labels == CALLOSUM, WHITE, labels)
-    return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 1.5) & (z > top), CSF, made).astype(np.int32)
+    return apart(labels, affine, above_mm=positions(labels, affine)[2][labels == DEEP_GREY].mean())
 
 
-def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0) -> Labels:
+def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float = -np.inf) -> Labels:
     """Returns unconnected hemispheres, with a gap of CSF between them."""
-    x, _, _ = positions(labels, affine)
+    x, _, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
-    return np.where(np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm), CSF, made).astype(np.int32)
+    gap = np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm) & (z > above_mm)
+    return np.where(gap, CSF, made).astype(np.int32)
 
 
 def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
     """Returns a brain without a fissure in front, with one ventricle for two and no corpus callosum."""
     x, y, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
-    extent = [np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z)]
-    fused = (np.abs(x) < 6.0) & (y > 0.0) & (labels == CSF)
-    hull = (x / extent[0]) ** 2 + (y / extent[1]) ** 2 + (z / extent[2]) ** 2 < 0.72
-    made = np.where(fused & hull, WHITE, made)
-    rim = (x / extent[0]) ** 2 + (y / extent[1]) ** 2 + (z / extent[2]) ** 2 > 0.60
-    made = np.where(fused & hull & rim, CORTEX, made)
-    single = (x / (0.45 * extent[0])) ** 2 + ((y - 2.0) / (0.45 * extent[1])) ** 2 + ((z - 2.0) / 7.0) ** 2 < 1.0
+    a, b, c = (np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z))
+    radius = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2
+    fused = (np.abs(x) < 6.0) & (y > 0.0) & (labels == CSF) & (radius < 0.72)
+    made = np.where(fused, np.where(radius > 0.60, CORTEX, WHITE), made)
+    single = (x / (0.45 * a)) ** 2 + ((y - 2.0) / (0.45 * b)) ** 2 + ((z - 2.0) / 7.0) ** 2 < 1.0
     return np.where(single & np.isin(made, (WHITE, VENTRICLES, CORTEX)), VENTRICLES, made).astype(np.int32)
 
 
@@ -84,26 +80,19 @@ def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, vent
     made = warp(labels, affine, came_from)
     if ventricle:
         x, y, z = positions(made, affine)
-        extent = [np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z)]
-        fluid = ((x - 0.45 * extent[0]) / (0.3 * extent[0])) ** 2 + (y / (0.6 * extent[1])) ** 2 + (
-            (z - 2.0) / (0.35 * extent[2])
-        ) ** 2 < 1.0
+        a, b, c = (np.abs(axis[np.isin(made, CEREBRUM)]).max() for axis in (x, y, z))
+        fluid = (x / (0.3 * a) - 1.5) ** 2 + (y / (0.6 * b)) ** 2 + ((z - 2.0) / (0.35 * c)) ** 2 < 1.0
         made = np.where(fluid & np.isin(made, (WHITE, DEEP_GREY)), VENTRICLES, made)
     return made.astype(np.int32)
 
 
 def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: Side = "right") -> Labels:
     """Returns hemispheres apart, one of them shrunk to a share of its volume: hypoplasia."""
-    whole = apart(labels, affine)
-    factor = share ** (1 / 3)
-
-    def came_from(place: Floats) -> Floats:
-        return np.stack(
-            [1.5 * SIGN[side] + (place[0] - 1.5 * SIGN[side]) / factor, place[1] / factor, place[2] / factor]
-        )
-
+    whole, factor = apart(labels, affine), share ** (1 / 3)
+    wall = np.array([1.5 * SIGN[side], 0.0, 0.0])[:, None, None, None]
     x, _, _ = positions(labels, affine)
-    return np.where(SIGN[side] * x > 0, warp(whole, affine, came_from), whole).astype(np.int32)
+    small = warp(whole, affine, lambda place: wall + (place - wall) / factor)
+    return np.where(SIGN[side] * x > 0, small, whole).astype(np.int32)
 
 
 def add_sides(labels: Labels, affine: Floats) -> Labels:
@@ -156,11 +145,9 @@ def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, F
     axis = int(np.abs(up).argmax())
     along = np.flatnonzero(brain.any(axis=tuple(n for n in range(3) if n != axis)))
     count = round(share * len(along))
-    first = np.zeros(3)
     if up[axis] > 0:
-        stop = along[-1] + 1 - count
-        return labels.take(range(stop), axis), affine
-    first[axis] = along[0] + count
+        return labels.take(range(along[-1] + 1 - count), axis), affine
+    first = along[0] + count
     moved = affine.copy()
-    moved[:3, 3] += affine[:3, :3] @ first
-    return labels.take(range(int(first[axis]), labels.shape[axis]), axis), moved
+    moved[:3, 3] += affine[:3, axis] * first
+    return labels.take(range(first, labels.shape[axis]), axis), moved

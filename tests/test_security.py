@@ -11,12 +11,10 @@ SOURCES = sorted([*(CHECKOUT / "src").rglob("*.py"), *(CHECKOUT / "workflow").rg
 RULES = sorted([*(CHECKOUT / "workflow" / "rules").glob("*.smk"), CHECKOUT / "Snakefile"])
 
 UNPICKLING = {"pickle", "cPickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
-CALLS = {"eval", "exec", "compile", "__import__"}
-"""Built-in functions that make code of text."""
-METHODS = {
-    ("os", "system"), ("os", "popen"), ("tempfile", "mktemp"), ("pd", "read_pickle"), ("pandas", "read_pickle"),
-    ("yaml", "full_load"), ("yaml", "unsafe_load"), ("yaml", "load_all"), ("shutil", "unpack_archive"),
-    ("tarfile", "open"), ("zipfile", "ZipFile"), ("pv", "read_pickle"),
+CALLS = {
+    "eval", "exec", "compile", "__import__", "os.system", "os.popen", "tempfile.mktemp", "tarfile.open",
+    "pd.read_pickle", "pandas.read_pickle", "pv.read_pickle", "yaml.full_load", "yaml.unsafe_load", "yaml.load_all",
+    "shutil.unpack_archive", "zipfile.ZipFile",
 }  # fmt: skip
 TRUE_IS_BAD = {"shell", "allow_pickle"}
 SAFE_LOADERS = {"SafeLoader", "CSafeLoader", "_StrictLoader"}
@@ -26,27 +24,15 @@ def dangers(source):
     """Returns what a source has that makes code of data, or files that others may read."""
     found = []
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            found += [name.name for name in node.names if name.name.split(".")[0] in UNPICKLING]
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in UNPICKLING:
-            found.append(node.module)
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else [name.name for name in node.names]
+            found += [module for module in modules if module.split(".")[0] in UNPICKLING]
         elif isinstance(node, ast.Call):
-            function = node.func
-            if isinstance(function, ast.Name) and function.id in CALLS:
-                found.append(function.id)
-            if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-                called = (function.value.id, function.attr)
-                if called in METHODS:
-                    found.append(".".join(called))
-                loader = {k.arg: getattr(k.value, "id", getattr(k.value, "attr", "")) for k in node.keywords}
-                if called == ("yaml", "load") and loader.get("Loader") not in SAFE_LOADERS:
-                    found.append("yaml.load")
-            found += [
-                keyword.arg
-                for keyword in node.keywords
-                if keyword.arg in TRUE_IS_BAD
-                and not (isinstance(keyword.value, ast.Constant) and not keyword.value.value)
-            ]
+            called = ast.unparse(node.func)
+            given = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+            unsafe = called == "yaml.load" and given.get("Loader", "").split(".")[-1] not in SAFE_LOADERS
+            found += [called] if unsafe or called in CALLS else []
+            found += [name for name in TRUE_IS_BAD & set(given) if given[name] not in ("False", "None")]
     return found
 
 
