@@ -119,7 +119,7 @@ BAD = {
     "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
     "swapped": (both_sides(RIGHT, LEFT), "the left hemisphere lies to the right of the right one"),
 }
-NAMED = ("agenesis", "holoprosencephaly", "wide", "hypoplasia", "shifted", "hemispherectomy")
+NAMED = ("holoprosencephaly", "wide", "hypoplasia", "hemispherectomy")
 """The pathologies that go on to metrics."""
 REFUSED = trying(dict.fromkeys(BAD, 41) | {"swapped": 9})
 HEMISPHERECTOMY = alone("left", odd_brains.one_hemisphere)

@@ -25,12 +25,7 @@ STUDY = {
     "start": "b21",
     "surface": {"edge_length_mm": 2.5},
     "mesh": COARSE | {"surface_edge_mm": 2.5},
-    "folding": {
-        "end_week": 23,
-        "thickness_mm": 4.0,
-        "step_s": 302400,
-        "preset": "measured",
-    },
+    "folding": {"end_week": 23, "thickness_mm": 4.0, "step_s": 302400, "preset": "measured"},
     "metrics": {"curvature_radius_mm": 6, "spangy_modes": 60},
 }
 # files of one study are in unlike poses, as those of some programs are
@@ -81,9 +76,8 @@ def in_week_21(results, points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["hemispheres", "hemisphere"])
-def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres, kind):
-    name = write_study(workflow, hemispheres, kind)
+def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres):
+    name = write_study(workflow, hemispheres)
     outcome = workflow.run("results/brains/b21/mesh/carried.h5", "--cores", "2", "--configfile", name)
     assert outcome.returncode == 0, outcome.stderr[-3000:]
     results = workflow.directory / "results"
@@ -100,8 +94,9 @@ def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres, kind):
 
 
 @pytest.mark.slow
-def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres):
-    jobs = workflow.jobs("all", "validate", "--configfile", write_study(workflow, hemispheres))
+@pytest.mark.parametrize("kind", ["hemispheres", "hemisphere"])
+def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres, kind):
+    jobs = workflow.jobs("all", "validate", "--configfile", write_study(workflow, hemispheres, kind))
     assert [jobs[rule] for rule in ("match_surfaces", "onset", "named_sulci")] == [2, 1, 1]
     assert jobs["carried_mesh"] == 1
     assert "register" not in jobs

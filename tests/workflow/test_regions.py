@@ -1,4 +1,4 @@
-"""Regions, centiles, change and export with the real commands, on phantoms whose regions are known."""
+"""Regions, change and export with the real commands, on phantoms whose regions are known."""
 
 import numpy as np
 import pandas as pd
@@ -7,11 +7,7 @@ from phantoms import CORTEX, phantom_labels
 from shapes import LPS, hemisphere, save_gifti
 
 from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.io.surfaces import (
-    read_surface,
-    read_vertex_labels,
-    read_vertex_maps,
-)
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 
@@ -33,7 +29,8 @@ STUDY = {
     },
 }
 NAMES = ["front", "back"]
-TARGETS = ["metrics", "export", "results/study/figures/regions.png"]
+TABLES = ("metrics", "regions", "asymmetry", "change")
+TARGETS = ["export", "results/study/figures/regions.png", *(f"results/study/{name}.csv" for name in TABLES)]
 
 
 def middle(points: np.ndarray) -> float:

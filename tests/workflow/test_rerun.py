@@ -69,7 +69,6 @@ SETTINGS = {
         BOTH_RUNS | MESH | CURVES | {"pial_from_labels": 2, "cortical_thickness": 2, "measure": 6},
     ),
     "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"folded_surface": 6, "measure": 6}),
-    "new run": ({"runs": {"third": {"thickness_mm": 2.0}}}, ONE_RUN),
     # the number of ranks changes no result: the report alone, as it shows the configuration
     "ranks": ({"folding": {"ranks": 1}}, REPORT),
     "new brain": (
@@ -92,10 +91,6 @@ def test_exactly_what_depends_on_a_change_of_the_configuration_runs_again(finish
 
 
 CODE = {
-    "placement": (
-        ["src/gyriflow/compare/placement.py"],
-        RESULTS | {"validation": 2, "registration_ceiling": 1},
-    ),
     "figure": (["src/gyriflow/report/growth.py"], RESULTS | {"growth_figure": 1}),
     "solver": (
         ["src/gyriflow/folding/contact.py"],
