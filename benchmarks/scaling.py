@@ -20,9 +20,15 @@ from pathlib import Path
 import numpy as np
 from graded_brain import FEWEST_TETS, brain_mesh
 
-THICKNESS_MM = 3.0
-CONTACT_GAP_MM = 5.6
-"""Sets the contact planes just off the walls of the fissure, so that they meet in the step that is not counted."""
+PARAMETERS = {
+    "start_week": 21.0,
+    "end_week": 36.0,
+    "output_weeks": [21.0, 36.0],
+    "fissure_x_mm": 0.0,
+    "thickness_mm": 3.0,
+    # planes just off the walls of the fissure, so that they meet in the step that is not counted
+    "contact": {"kind": "planes", "gap_mm": 5.6},
+}
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
@@ -37,15 +43,6 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def reference_parameters():
-    """Return the paper's parameters for the synthetic brain."""
-    from gyriflow.parameters.folding import parameters_from
-
-    values = {"start_week": 21.0, "end_week": 36.0, "output_weeks": [21.0, 36.0], "fissure_x_mm": 0.0}
-    contact = {"kind": "planes", "gap_mm": CONTACT_GAP_MM}
-    return parameters_from(values | {"thickness_mm": THICKNESS_MM, "contact": contact})
-
-
 def do_steps(mesh_file: Path, steps: int) -> None:
     """Do the steps on the ranks of this run and print what they took, as JSON."""
     from mpi4py import MPI
@@ -55,11 +52,12 @@ def do_steps(mesh_file: Path, steps: int) -> None:
     from gyriflow.folding.simulation import Folding
     from gyriflow.folding.zones import zones_of_run
     from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+    from gyriflow.parameters.folding import parameters_from
     from gyriflow.units import M_PER_MM
 
     comm = MPI.COMM_WORLD
     mesh = comm.bcast(read_tetrahedral_mesh(mesh_file) if comm.rank == 0 else None, root=0)
-    p = reference_parameters()
+    p = parameters_from(PARAMETERS)
     zones = comm.bcast(zones_of_run(mesh, p) if comm.rank == 0 else None, root=0)
     folding = Folding(comm, mesh, zones, p)
     state, seconds = State.at_start(mesh.vertices * M_PER_MM, p.step_s), []
