@@ -13,7 +13,7 @@ from gyriflow.geometry.deformations import MatchedSurfaces
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import write_json
-from gyriflow.io.registrations import write_matched_surfaces
+from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.surfaces import write_surface, write_vertex_labels
 from gyriflow.study.resolve import resolve
 
@@ -50,7 +50,7 @@ def test_sulci_of_real_brains_and_of_a_run_begin_in_their_weeks(workflow):
     for file in files["reports"]:
         write_json(workflow.directory / file, {"pose": Pose().plain()})
     for file, (one, other) in zip(files["correspondences"], pairwise(shapes["real"]), strict=True):
-        write_matched_surfaces(workflow.directory / file, MatchedSurfaces(one, other.vertices), {})
+        write_correspondence(workflow.directory / file, MatchedSurfaces(one, other.vertices), {})
     table = "results/runs/reference/b/metrics/onset.csv"
     outcome = workflow.run(table, "--allowed-rules", "onset", "--cores", "1", "--configfile", name)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
