@@ -5,7 +5,7 @@ from boxes import COMM, MATERIAL, set_layers, smooth_displacement
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
-from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
@@ -44,7 +44,7 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
     set_layers(problem, np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
-    contact = SelfContact(domain, problem.displacement, zones.facets, ContactSettings(stiffness, distance))
+    contact = SelfContact(domain, problem.displacement, zones.facets, stiffness, distance)
     problem.contributions.append(contact)
     return problem, contact
 

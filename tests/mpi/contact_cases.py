@@ -7,7 +7,6 @@ from boxes import COMM, everywhere_known, smooth_displacement
 from contact_bodies import (
     GAP_MM,
     HEIGHT_MM,
-    MU,
     SIDE_MM,
     approach,
     in_a_tube,
@@ -20,7 +19,7 @@ from scipy.optimize import brentq
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import MeshError
-from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
@@ -104,7 +103,7 @@ def test_a_surface_that_crosses_itself_is_refused():
     mesh = TetrahedralMesh(mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets)
     facets, _ = boundary_faces(mesh)
     with pytest.raises(MeshError, match="crosses itself"):
-        SelfContact(Domain(COMM, mesh), np.zeros((1, 3)), facets, ContactSettings(1000.0, 0.2))
+        SelfContact(Domain(COMM, mesh), np.zeros((1, 3)), facets, 1000.0, 0.2)
 
 
 def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
@@ -122,7 +121,7 @@ def test_no_pair_is_missed_where_the_distance_has_grown():
     zones = in_a_tube(mesh)
     _, contact = problem_with_contact(mesh, zones, distance=0.15)
     few = contact.pair_count()
-    contact.settings = ContactSettings(2 * MU, 0.5)
+    contact._given_mm = 0.5
     contact.mesh_moved()
     _, other = problem_with_contact(mesh, zones, distance=0.5)
     assert contact.pair_count() == other.pair_count() > few
@@ -136,7 +135,7 @@ def test_large_random_steps_of_a_groove_cross_nothing():
     facets, _ = boundary_faces(mesh)
     domain = Domain(COMM, mesh)
     displacement = np.zeros((len(domain.vertex_of_node), 3))
-    contact = SelfContact(domain, displacement, facets, ContactSettings(1000.0, 0.1))
+    contact = SelfContact(domain, displacement, facets, 1000.0, 0.1)
     used = np.unique(facets)
     number = np.searchsorted(used, facets).astype(np.int32)
     surface = ipctk.CollisionMesh(mesh.vertices[used], ipctk.edges(number), number)

@@ -13,7 +13,7 @@ from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stre
 from mpi4py import MPI
 from shapes import box_mesh
 
-from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import PLAIN
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
@@ -90,7 +90,7 @@ def pressed_blocks(comm, growth, distance):
     mesh = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
     zones = in_a_tube(mesh)
     problem = problem_on(mesh, zones, dr=growth, comm=comm)
-    contact = SelfContact(problem.domain, problem.displacement, zones.facets, ContactSettings(2000.0, distance))
+    contact = SelfContact(problem.domain, problem.displacement, zones.facets, 2000.0, distance)
     problem.contributions.append(contact)
     return problem, contact, mesh
 

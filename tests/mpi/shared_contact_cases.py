@@ -6,7 +6,7 @@ from boxes import COMM
 from contact_bodies import GAP_MM, MU, two_blocks
 from mpi4py import MPI
 
-from gyriflow.folding.contact import ContactSettings, SelfContact
+from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic
 from gyriflow.units import M_PER_MM
@@ -16,7 +16,7 @@ def contact_in(comm, mesh, distance=0.15):
     """Returns a domain, an array for the displacement of its nodes, and the contact of the mesh with itself."""
     domain = Domain(comm, mesh)
     displacement = np.zeros((len(domain.vertex_of_node), 3))
-    contact = SelfContact(domain, displacement, boundary_faces(mesh)[0], ContactSettings(2 * MU, distance))
+    contact = SelfContact(domain, displacement, boundary_faces(mesh)[0], 2 * MU, distance)
     return domain, displacement, contact
 
 

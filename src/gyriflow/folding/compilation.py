@@ -6,7 +6,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from mpi4py import MPI
@@ -34,15 +34,11 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
     options = {"cffi_extra_compile_args": COMPILER_ARGUMENTS, "cache_dir": str(cache)}
-    if comm.rank == 0:
-        cache.mkdir(parents=True, exist_ok=True)
-        with (cache / "lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+    with ExitStack() as held:
+        if comm.rank == 0:
+            cache.mkdir(parents=True, exist_ok=True)
+            fcntl.flock(held.enter_context((cache / "lock").open("w")), fcntl.LOCK_EX)
             drop_torn_entries(cache)
-            comm.barrier()
-            yield options
-            comm.barrier()
-    else:
         comm.barrier()
         yield options
         comm.barrier()

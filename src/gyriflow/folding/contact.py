@@ -20,8 +20,6 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import MeshError
 from ..geometry.tetrahedra import finer_surface
 from ..geometry.triangles import Floats, TriangleMesh, edges, mean_length
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps, value_range
 from ..units import M_PER_MM, MM_PER_M
 from .domain import Domain
 from .surface_parts import SearchRange, SurfacePart, part_of_surface, shared_out
@@ -57,27 +55,6 @@ flat on, interval bisection, the other choice, takes minutes."""
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 
-@dataclass(frozen=True)
-class ContactSettings:
-    """The barrier's stiffness in Pa at the start, and the distance d̂ in mm below which parts of the surface repel.
-
-    With `adaptive` the stiffness follows the gaps from step to step. As a distance, None takes `DISTANCE_PER_EDGE` of
-    the mean edge length at each step's start, but no more than the smallest gap at the start of the run: what does not
-    grow must stay where it is.
-    """
-
-    stiffness_pa: float
-    distance_mm: float | None = None
-    adaptive: bool = False
-
-
-def contact_settings(parameters: FoldingParameters, maps: Maps) -> ContactSettings:
-    """Returns the settings of a run, with the stiffness that belongs to the stiffest cortex."""
-    p = parameters
-    stiffest = value_range(p.shear_modulus_cortex_pa, maps, p.start_week, p.end_week)[1]
-    return ContactSettings(STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm, adaptive=True)
-
-
 @dataclass(frozen=True, eq=False)
 class ContactCache:
     """What is near at a displacement (s, 3) in m of the whole surface.
@@ -107,16 +84,24 @@ class SelfContact:
     an even pressure would press the nodes unevenly, and quadratic elements would be pressed into waves of their size.
 
     `displacement` (k, 3) in m of the local nodes is what all methods refer to: the problem's own array; `facets` (f, 3)
-    are vertex indices of the file. `distance_mm` and `stiffness_pa` are the present distance d̂ and stiffness κ.
-    MeshError where the surface crosses itself at the start.
+    are vertex indices of the file. `stiffness_pa` and `distance_mm` are the barrier's stiffness κ at the start, and the
+    distance d̂ below which parts of the surface repel; as attributes they are the present ones. As a distance, None
+    takes `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but no more than the smallest gap at the
+    start of the run: what does not grow must stay where it is. MeshError where the surface crosses itself at the start.
     """
 
     def __init__(
-        self, domain: Domain, displacement: Floats, facets: NDArray[np.int64], settings: ContactSettings
+        self,
+        domain: Domain,
+        displacement: Floats,
+        facets: NDArray[np.int64],
+        stiffness_pa: float,
+        distance_mm: float | None = None,
     ) -> None:
         ipctk.set_num_threads(1)  # else threads would be in the way of another rank's
         self.domain = domain
-        self.settings = settings
+        self.stiffness_pa = self._softest_pa = stiffness_pa
+        self._given_mm = distance_mm
         self._displacement = displacement
         self._vertices, faces = np.unique(facets, return_inverse=True)
         faces = faces.reshape(-1, 3)
@@ -142,7 +127,6 @@ class SelfContact:
         self._part_range: SearchRange | None = None
         self._candidates_range: SearchRange | None = None
         self._widest_mm = np.inf
-        self.stiffness_pa = settings.stiffness_pa
         self.mesh_moved()
         surface, part = self._surface_at(self._start)
         if domain.comm.allreduce(ipctk.has_intersections(surface, part.at(self._start)), op=MPI.LOR):
@@ -150,7 +134,7 @@ class SelfContact:
                 "the pial surface of the mesh crosses itself, which contact could not undo",
                 remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
-        if settings.distance_mm is None:
+        if distance_mm is None:
             gap = self._state_at(np.zeros_like(self._start)).gap
             # rounding must not make a pair of what is just at the limit
             self._widest_mm = BESIDE * domain.comm.allreduce(gap, op=MPI.MIN)
@@ -162,22 +146,22 @@ class SelfContact:
         # the same whatever a rank's processor rounds
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
         of_edges = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
-        self.distance_mm = self.settings.distance_mm or min(of_edges, self._widest_mm)
+        self.distance_mm = self._given_mm or min(of_edges, self._widest_mm)
         self._barrier = ipctk.BarrierPotential(BARRIER, self.distance_mm, self.stiffness_pa, use_physical_barrier=True)
         self._surface: ipctk.CollisionMesh | None = None
         self._known: ContactCache | None = None
 
     def adapt(self, rows: Sequence[dict]) -> None:
         """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
-        self.stiffness_pa = self.settings.stiffness_pa
-        if not (rows and self.settings.adaptive):
+        self.stiffness_pa = self._softest_pa
+        if not rows:
             return
         row = rows[-1]
         part, last = row["min_distance_mm"] / row["contact_distance_mm"], row["contact_stiffness_pa"]
         if part < CLOSE:
-            last = min(2 * last, STIFFEST * self.settings.stiffness_pa)
+            last = min(2 * last, STIFFEST * self._softest_pa)
         elif not part <= WIDE:  # also where nothing is near
-            last = max(last / 2, self.settings.stiffness_pa)
+            last = max(last / 2, self._softest_pa)
         self.stiffness_pa = last
 
     def _on_surface(self, local: Floats) -> Floats:

@@ -1,12 +1,16 @@
 """The distributed mesh of the solver, and the way between its numbering and that of the mesh file.
 
 Every rank also holds the positions of all vertices in the file's order: searches on the pial surface then give the same
-answer on every rank, and output needs no further communication.
+answer on every rank, and output needs no further communication. What differs between versions of dolfinx (0.9 to 0.11)
+and of the PETSc that comes with them is in this file.
 """
+
+import os
 
 import basix.ufl
 import dolfinx
 import numpy as np
+import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -22,7 +26,10 @@ from ..geometry.tetrahedra import (
 )
 from ..geometry.triangles import Floats
 from ..units import M_PER_MM
-from .versions import create_mesh, geometry_nodes
+
+# read by Scotch when it first shares out a mesh: else a run would not give the same numbers twice
+for name in ("SCOTCH_RANDOM_FIXED_SEED", "SCOTCH_DETERMINISTIC", "SCOTCH_PTHREAD_NUMBER"):
+    os.environ.setdefault(name, "1")
 
 # dolfinx numbers the nodes on edges from the last edge to the first
 TO_DOLFINX = {1: [0, 1, 2, 3], 2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4]}
@@ -33,21 +40,13 @@ AT_NODES = shape_slopes(NODE_PLACES)
 class Domain:
     """A tetrahedral mesh spread over the ranks of a communicator, in metres.
 
-    A vertex is a node of the mesh file here: a corner of elements or, where they are quadratic, a node on an edge.
+    A vertex is a node of the mesh file here: a corner of elements or, where they are quadratic (`order` 2), a node on
+    an edge. `mesh` is the updated reference, which moves with every step, `space` that of displacements in m on it.
 
-    Attributes
-    ----------
-    order
-        1 where elements and displacement are linear, 2 where both are quadratic.
-    mesh, space
-        The updated reference, which moves with every step, and the displacements in m on it.
-    positions, part, node_of_vertex : (n, 3) float, (n,) int, (n,) int
-        Of all vertices in the file's order, equal on every rank: positions in m, the connected part of the mesh, and
-        the global node, rank by rank.
-    vertex_of_node : (k,) int
-        File index of each local node, the `owned` ones first, then ghosts.
-    cells, tet_of_cell, volumes : (c, 4) or (c, 10) int, (c,) int, (c,) float
-        Local nodes of the local elements in the order of the file, their index there, and their volumes in m³.
+    Of all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
+    (n,), and the global `node_of_vertex` (n,), rank by rank. `vertex_of_node` (k,) is the file index of each local
+    node, the `owned` ones first, then ghosts. Of the local elements: nodes in the order of the file, `cells` (c, 4) or
+    (c, 10), their index there, `tet_of_cell` (c,), and their `volumes` (c,) in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -58,14 +57,18 @@ class Domain:
         tets = mesh.tets[:, TO_DOLFINX[self.order]]
         cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        self.mesh = create_mesh(comm, cells, points, element)
+        # by keywords, whose order changed between versions; without ghost cells, the default in all of them
+        self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
         self.owned = self.space.dofmap.index_map.size_local
         nodes = self.owned + self.space.dofmap.index_map.num_ghosts
         self._geometry_node = np.empty(nodes, dtype=np.int64)
-        self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes(self.mesh).ravel()
+        # a list of one array for each type of cell from 0.11 on, where `dofmap` is on its way out
+        by_cell_type = getattr(self.mesh.geometry, "dofmaps", None)
+        geometry_nodes = by_cell_type[0] if isinstance(by_cell_type, list) else self.mesh.geometry.dofmap
+        self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self.part = connected_parts(mesh)
         self._counts = [3 * owned for owned in comm.allgather(self.owned)]

@@ -9,18 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
 from ..errors import SolverError
+from ..geometry.triangles import Floats
 from .domain import Domain
 from .problem import Problem
-from .rigid import rigid_motions
 from .surface_parts import shared_out
-from .tangent import Tangent
-
-Floats = NDArray[np.float64]
+from .tangent import Tangent, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
 PLAIN, SHIFTED = range(2)
@@ -52,13 +49,6 @@ class TwoLevelPreconditioner:
     """The sum D⁻¹ + Q (QᵀAQ)⁻¹ Qᵀ of block Jacobi and a coarse level: a two-level additive Schwarz method.
 
     Q holds the rigid motions of parts of the mesh (Nicolaides 1987, for elasticity), A is the elastic part alone.
-
-    Parameters
-    ----------
-    domain
-        The mesh, whose positions are those of the present step.
-    tangent
-        What is preconditioned.
     """
 
     def __init__(self, domain: Domain, tangent: Tangent) -> None:
@@ -130,16 +120,9 @@ def positive_inverses(matrices: Floats) -> Floats:
 
 
 class LinearSolver:
-    """Finds descent directions from one tangent after the other.
+    """Finds descent directions from one tangent of a problem after the other.
 
-    What it keeps from one solve to the next decides how a direction is found.
-
-    Parameters
-    ----------
-    problem
-        Whose tangents are solved with.
-    max_iterations
-        Iterations after which a solve has failed.
+    What it keeps from one solve to the next decides how a direction is found. A solve fails after `max_iterations`.
     """
 
     def __init__(self, problem: Problem, max_iterations: int) -> None:
@@ -155,23 +138,10 @@ class LinearSolver:
     def solve(
         self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
     ) -> LinearCount:
-        """Leaves in `direction` a solution of J d = −r that descends.
+        """Leaves in `direction` a solution of J d = −r that descends, with the tangent J and the residual r.
 
-        Parameters
-        ----------
-        tangent
-            J; where it is indefinite, it may be made convex, and is shifted.
-        residual
-            r.
-        reduction
-            Part of the right-hand side that may be left.
-        convexify
-            Whether its further parts may be made convex where conjugate gradients fail with the true ones.
-
-        Raises
-        ------
-        NotConvergedError
-            Where no shift helps.
+        `reduction` is the part of the right-hand side that may be left. Where J is indefinite, it is shifted; with
+        `convexify` its further parts are made convex before that. NotConvergedError where no shift helps.
         """
         iterations = 0
         self._cg.setTolerances(rtol=reduction)

@@ -104,10 +104,7 @@ class NewtonSolver:
     def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
         """Solves for the displacement from the first good one of some guesses (k, 3) in m; it is left in the problem.
 
-        Raises
-        ------
-        NotConvergedError
-            Where the residual does not fall below the tolerance.
+        NotConvergedError where the residual does not fall below the tolerance.
         """
         problem, count = self.problem, StepCount()
         self.inverting = None

@@ -3,7 +3,7 @@
 With `domain` and `tangent`, the only files that use dolfinx: what differs between its versions is kept to them.
 """
 
-from typing import Literal, Protocol
+from typing import Literal
 
 import basix.ufl
 import dolfinx
@@ -18,29 +18,14 @@ from ..mechanics.materials import Material
 from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
 from .compilation import form_compiler
+from .contact import SelfContact
 from .domain import Domain
 from .points import IntegrationPoints
-from .rigid import RigidMotions
-from .tangent import ElasticMatrix, KeptTangent, Tangent
+from .tangent import ElasticMatrix, KeptTangent, RigidMotions, Tangent
 from .zones import Zones
 
 FACET_DEGREE = {1: 2, 2: 4}
 """Degree of integration on facets by the order of the elements."""
-
-
-class Contribution(Protocol):
-    """A further part of the energy at the problem's present displacement, such as contact between folds.
-
-    `energy` is in J and the same on every rank; `add_residual` adds its derivative in N to the owned components;
-    `stiffness` is the second derivative in N/m, or one made positive semidefinite, None where it is zero; fixed
-    components need no care. `largest_step` is the part of (k, 3) local displacements that can safely be added, at most
-    1, equal on all ranks.
-    """
-
-    def energy(self) -> float: ...
-    def add_residual(self, out: PETSc.Vec) -> None: ...
-    def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None: ...
-    def largest_step(self, direction: Floats) -> float: ...
 
 
 class Problem:
@@ -50,8 +35,9 @@ class Problem:
     present mesh may be stretched elastically (`set_stretch`). `quadrature_degree` is that of the polynomials that are
     integrated exactly; None takes what the elements' order needs.
 
-    Attributes: the unknown displacement `u` in m, further `contributions` to the energy, whether the body is `free`,
-    and the q `points` of each element at which stiffness, growth and kept stretch are taken.
+    Attributes: the unknown displacement `u` in m, further `contributions` to the energy, such as contact between
+    folds, whether the body is `free`, and the q `points` of each element at which stiffness, growth and kept stretch
+    are taken.
     """
 
     def __init__(
@@ -65,7 +51,7 @@ class Problem:
         remembers_stress: bool = False,
     ) -> None:
         self.domain = domain
-        self.contributions: list[Contribution] = []
+        self.contributions: list[SelfContact] = []
         mesh = domain.mesh
         self.u = dolfinx.fem.Function(domain.space)
         self.points = IntegrationPoints.of_degree(domain.order, quadrature_degree)

@@ -15,7 +15,7 @@ from ..parameters.folding import FoldingParameters, require_maps
 from ..parameters.varying import Maps, value_at, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
-from .contact import SelfContact, contact_settings
+from .contact import STIFFNESS_PER_MODULUS, SelfContact
 from .diagnosis import (
     contact_row,
     elements_through,
@@ -71,14 +71,14 @@ class Folding:
             quadrature_degree=quadrature_degree,
             remembers_stress=p.stress_memory_gw > 0,
         )
+        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
-            settings = contact_settings(p, self.maps)
-            self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, settings)
+            barrier = STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm
+            self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, *barrier)
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
-        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
         floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
         self.solver = NewtonSolver(self.problem, newton, floor)
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)

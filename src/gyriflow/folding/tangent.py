@@ -1,7 +1,7 @@
 """The tangent of one iterate: what it does to a displacement, and the blocks on its diagonal.
 
 The elastic part has the same places at every iterate. Contact couples other nodes each time and stays a small matrix of
-its own. No solver needs all entries in one matrix.
+its own. No solver needs all entries in one matrix. Where nothing holds a body, its rigid motions are taken out.
 """
 
 from collections.abc import Sequence
@@ -9,12 +9,58 @@ from collections.abc import Sequence
 import dolfinx
 import numpy as np
 from dolfinx.la import BlockMode
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from .rigid import RigidMotions
+from ..geometry.triangles import Floats
+from .domain import Domain
 
-Floats = NDArray[np.float64]
+
+def rigid_motions(positions: Floats, part: NDArray[np.int64]) -> Floats:
+    """Returns the (n, 3, 6) translations and rotations of points at (n, 3) positions.
+
+    Rotations are about the centres of the parts that the (n,) numbers name, scaled by the size of the largest one.
+    """
+    counts = np.bincount(part)
+    centres = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1) / np.maximum(counts, 1)[:, None]
+    arm = positions - centres[part]
+    arm /= np.abs(arm).max()
+    motions = np.zeros((len(positions), 3, 6))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        motions[:, i, i] = 1.0
+        motions[:, j, 3 + i], motions[:, k, 3 + i] = -arm[:, k], arm[:, j]
+    return motions
+
+
+class RigidMotions:
+    """The translations and rotations, orthonormal, of the parts of the present mesh that vertices belong to by (n,)
+    numbers."""
+
+    def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
+        self.comm = domain.comm
+        motions = rigid_motions(domain.positions, part)
+        modes = []
+        for number in range(int(part.max()) + 1):
+            whole = np.where((part == number)[:, None, None], motions, 0.0)
+            orthonormal = np.linalg.qr(whole.reshape(-1, 6))[0].reshape(-1, 3, 6)
+            modes.append(orthonormal[domain.vertex_of_node[: domain.owned]])
+        self.modes: Floats = np.concatenate(modes, axis=2).reshape(3 * domain.owned, -1)
+
+    def remove(self, values: Floats) -> None:
+        """Takes the rigid motions out of the owned components of a vector, in place."""
+        amounts = self.comm.allreduce(self.modes.T @ values, op=MPI.SUM)
+        values -= self.modes @ amounts
+
+    def null_space(self, like: PETSc.Vec) -> PETSc.NullSpace:
+        """Returns the motions as PETSc vectors of the layout of `like`."""
+        vectors = []
+        for mode in self.modes.T:
+            vector = like.duplicate()
+            vector.array[:] = mode
+            vectors.append(vector)
+        return PETSc.NullSpace().create(vectors=vectors, comm=self.comm)
 
 
 class ElasticMatrix:
@@ -23,23 +69,10 @@ class ElasticMatrix:
     dolfinx fills its own block matrices about twice as fast as PETSc's. Products go to the blocks on and above the
     diagonal: half of the memory to read, three fifths of the time.
 
-    Parameters
-    ----------
-    form
-        The form of the tangent.
-    fixed : (owned, 3) bool
-        Components of the owned nodes whose rows and columns are those of the unit matrix.
-
-    Attributes
-    ----------
-    products : PETSc.Mat
-        The matrix for products.
-    nodes, columns : (b,) int
-        Owned node, counted on this rank, and global node of each block of the owned rows, row by row.
-    row_ends : (owned + 1,) int
-        Where the blocks of each row begin and end.
-    fixed : (all nodes, 3) bool
-        The fixed components by global nodes.
+    `form` is that of the tangent, `fixed` (owned, 3) the components of the owned nodes whose rows and columns are those
+    of the unit matrix; as an attribute it is (all nodes, 3), by global nodes. `products` is the matrix for products. Of
+    the (b,) blocks of the owned rows, row by row, `nodes` are the owned nodes, counted on this rank, and `columns` the
+    global ones; `row_ends` (owned + 1,) says where each row begins and ends.
     """
 
     def __init__(self, form: dolfinx.fem.Form, fixed: NDArray[np.bool_]) -> None:
@@ -93,19 +126,8 @@ class ElasticMatrix:
 class KeptTangent:
     """The elastic tangent of a step, kept from one displacement to the next while it predicts how forces change.
 
-    Parameters
-    ----------
-    matrix
-        The tangent.
-    like
-        A vector of the displacement's layout.
-
-    Attributes
-    ----------
-    kept : bool
-        Whether the last one was that of an earlier displacement.
-    assembled : int
-        How often it has been assembled.
+    `like` is a vector of the displacement's layout. `kept` says whether the last tangent was that of an earlier
+    displacement, `assembled` how often it has been assembled.
     """
 
     def __init__(self, matrix: ElasticMatrix, like: PETSc.Vec) -> None:
@@ -153,23 +175,8 @@ class KeptTangent:
 class Tangent:
     """The tangent of one iterate, which acts on displacements as a matrix of type python.
 
-    There is one for all iterates. Where the body is unconstrained, rigid motions are taken out of its products.
-
-    Parameters
-    ----------
-    elastic
-        Its elastic part.
-    like
-        A vector of the displacement's layout.
-
-    Attributes
-    ----------
-    matrix : PETSc.Mat
-        What acts so, symmetric.
-    parts : sequence of PETSc.Mat
-        Further parts in N/m, without entries in rows and columns of fixed components.
-    motions : RigidMotions or None
-        The motions that are taken out.
+    There is one for all iterates: the symmetric `matrix`. `like` is a vector of the displacement's layout. Further
+    `parts`, in N/m, have no entries in rows and columns of fixed components. `motions` are taken out of all products.
     """
 
     def __init__(self, elastic: KeptTangent, like: PETSc.Vec) -> None:

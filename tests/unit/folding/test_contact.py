@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
-from gyriflow.folding.contact import STIFFEST, ContactSettings, SelfContact
+from gyriflow.folding.contact import STIFFEST, SelfContact
 from gyriflow.folding.domain import Domain
 from gyriflow.geometry.tetrahedra import boundary_faces
 
@@ -13,14 +13,10 @@ START_PA = 1000.0
 
 
 @pytest.fixture(scope="module")
-def domain():
-    return Domain(MPI.COMM_SELF, ellipsoid_mesh(2, (4.0, 4.0, 4.0)))
-
-
-def contact_of(domain, *, adaptive):
-    facets, _ = boundary_faces(ellipsoid_mesh(2, (4.0, 4.0, 4.0)))
-    settings = ContactSettings(START_PA, 0.2, adaptive=adaptive)
-    return SelfContact(domain, np.zeros((len(domain.vertex_of_node), 3)), facets, settings)
+def contact():
+    mesh = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
+    domain = Domain(MPI.COMM_SELF, mesh)
+    return SelfContact(domain, np.zeros((len(mesh.vertices), 3)), boundary_faces(mesh)[0], START_PA, 0.2)
 
 
 def after(part, stiffness_pa):
@@ -44,8 +40,7 @@ def after(part, stiffness_pa):
         (np.nan, 1.5, 1.0),
     ],
 )
-def test_the_barrier_becomes_stiffer_where_folds_come_close_and_softer_where_they_part(domain, part, before, then):
-    contact = contact_of(domain, adaptive=True)
+def test_the_barrier_becomes_stiffer_where_folds_come_close_and_softer_where_they_part(contact, part, before, then):
     # only the last step counts
     contact.adapt([after(0.01, START_PA), after(part, before * START_PA)])
     assert contact.stiffness_pa == then * START_PA
