@@ -14,8 +14,9 @@ from shapes import ellipsoid_mesh
 
 from gyriflow.errors import StorageError
 from gyriflow.folding.__main__ import require_space
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_field, read_positions, read_weeks
+from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps, write_tetrahedral_mesh
 from gyriflow.parameters.folding import parameters_from
 
@@ -50,13 +51,21 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     assert {p.name for p in tight_run.iterdir()} == {
         ".lock", "frames.h5", "frames.xdmf", "steps.csv", "summary.json", "zones.json"
     }  # fmt: skip
-    assert read_weeks(tight_run / "frames.h5") == [21.0, 21.25, 21.5]
+    frames = tight_run / "frames.h5"
+    assert read_weeks(frames) == [21.0, 21.25, 21.5]
     steps = pd.read_csv(tight_run / "steps.csv")
     assert steps["week"].iloc[-1] == pytest.approx(21.5)
     assert (steps["min_J"] > 0).all()
-    moved = read_positions(tight_run / "frames.h5", 21.5) - read_positions(tight_run / "frames.h5", 21.0)
-    np.testing.assert_allclose(moved, read_field(tight_run / "frames.h5", 21.5, "displacement_mm"), atol=1e-12)
-    assert read_json(tight_run / "summary.json")["steps"] == len(steps)
+    moved = read_positions(frames, 21.5) - read_positions(frames, 21.0)
+    np.testing.assert_allclose(moved, read_field(frames, 21.5, "displacement_mm"), atol=1e-12)
+    summary = read_json(tight_run / "summary.json")
+    assert summary["steps"] == len(steps)
+    ratios = [
+        np.quantile(radius_ratios(TetrahedralMesh(read_positions(frames, week), read_tets(frames))), 0.01)
+        for week in summary["weeks"]
+    ]
+    assert summary["radius_ratio_01"] == pytest.approx(ratios)
+    assert len(set(ratios)) == 3
 
 
 def test_every_output_week_is_hit_although_steps_do_not_divide_it(tight_run):

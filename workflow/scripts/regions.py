@@ -4,8 +4,8 @@ import numpy as np
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.folding.checks import refuse_impossible
-from gyriflow.folding.growth import GrowthInputs
-from gyriflow.folding.growth_models import growth_at_start
+from gyriflow.folding.growth import GrowthInputs, StepStart
+from gyriflow.folding.growth_models import growth_model
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.zones import cell_tags, facet_tags, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh
@@ -23,7 +23,8 @@ with step(snakemake.log[0]):
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    growth = growth_at_start(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
+    model = growth_model(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
+    growth = model(StepStart(mesh.vertices, 0.0, parameters.step_s))
     of_start = parameters.start_week, REGION_FIELDS, growth.logarithm()
     fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, *of_start)
     boundary = TriangleMesh(mesh.vertices, zones.facets)

@@ -34,7 +34,6 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
             side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
         },
         "order": mesh.order,
-        "growing_vertices": int((zones.growth > 0).sum()),
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
     }

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from ..geometry.triangles import Floats
 from ..parameters.terms import ELEMENTS_NEEDED
 from ..units import MM_PER_M
@@ -15,8 +14,6 @@ from .newton import NewtonSolver
 from .zones import Zones
 
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-WORST = 0.01
-"""Part of the elements whose quality the step table tells."""
 
 
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
@@ -29,12 +26,6 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
     lengths = sum(float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum()) for i, j in EDGES)
     total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
     return float(thickness * count / total) if count else math.nan
-
-
-def worst_quality(domain: Domain) -> float:
-    """Returns the radius ratio that all but the worst hundredth of the present elements are above."""
-    ratios = radius_ratios(TetrahedralMesh(domain.local(domain.positions), domain.cells))
-    return float(np.quantile(domain.gathered_cells(ratios[:, None]), WORST))
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:

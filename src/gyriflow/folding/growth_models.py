@@ -3,7 +3,7 @@
 from functools import partial
 
 from ..parameters.folding import FoldingParameters
-from .growth import Floats, Growth, GrowthByRates, GrowthInputs, GrowthModel, StepStart
+from .growth import Floats, GrowthByRates, GrowthInputs, GrowthModel
 from .steering import SteeredGrowth
 from .targets import GrowthToTargets
 
@@ -12,13 +12,6 @@ def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Float
     """Returns the model of a run that starts at (n, 3) positions."""
     if p.targets:
         return GrowthToTargets.of(p, inputs).growth
-    return (
-        SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth
-        if p.growth.model == "sizes"
-        else partial(GrowthByRates, p)
-    )
-
-
-def growth_at_start(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats) -> Growth:
-    """Returns the growth of the first step of a run that starts at (n, 3) positions."""
-    return growth_model(p, inputs, positions_mm)(StepStart(positions_mm, 0.0, p.step_s))
+    if p.growth.model == "sizes":
+        return SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth
+    return partial(GrowthByRates, p)

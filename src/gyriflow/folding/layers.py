@@ -133,16 +133,10 @@ class Tissue:
     fall from 1 to 0 within an element. There the depth is quadratic between the nodes; what jumps between them, growth
     and maps, is linear between them.
 
-    Attributes
-    ----------
-    cells, vertices : (c, 4) or (c, 10) int, (k,) int
-        Local nodes of the elements, and their numbers among the vertices of the whole mesh.
-    nodes, depth : (k, 3) and (k,) float
-        Positions of the local nodes and their distances to the pial surface, in m.
-    nearest : (k,) int or (k, 3) float
-        The pial vertices nearest to the nodes of linear elements; normals at the nodes of quadratic ones.
-    weight, growing, maps
-        Cortical weight, 1 where tissue grows, else 0, and parameters' maps: (k,) at nodes or (c, q) at the points.
+    `cells` (c, 4) or (c, 10) are the local nodes of the elements, `vertices` (k,) their numbers in the whole mesh,
+    `nodes` (k, 3) their positions and `depth` (k,) their distances to the pial surface, in m. `nearest` are the pial
+    vertices (k,) nearest to the nodes of linear elements, or normals (k, 3) at those of quadratic ones. Cortical
+    `weight`, `growing` (1, else 0) and parameters' `maps` are (k,) at nodes or (c, q) at the points.
     """
 
     cells: NDArray[np.integer]

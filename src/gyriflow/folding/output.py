@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from ..errors import StorageError
 from ..geometry.triangles import Floats
-from ..io.frames import write_frame
 from ..mechanics.materials import MATERIALS
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps, value_at
-from ..units import MM_PER_M, week_tag
+from ..units import week_tag
 from .growth import increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus
 from .stress import unpacked
@@ -132,30 +131,6 @@ def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
         "radial_growth_per_step": (tensors * outwards).sum(axis=(1, 2)),
         "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
     }
-
-
-def save_frame(
-    folder: Path,
-    week: float,
-    positions: Floats,
-    start: Floats,
-    zones: Zones,
-    parameters: FoldingParameters,
-    maps: Maps,
-    contact: dict[str, Floats],
-    elements: dict[str, Floats],
-    log_growth: Floats | None,
-) -> None:
-    """Writes the frame of a week from positions (n, 3) in m, with the fields that the parameters name.
-
-    `contact` and `elements` hold the (n,) and (m,) fields of the last step; `log_growth` as for `layer_fields`.
-    """
-    fields: dict[str, NDArray] = {"positions": positions * MM_PER_M}
-    if "displacement" in parameters.fields:
-        fields["displacement_mm"] = (positions - start) * MM_PER_M
-    fields |= layer_fields(fields["positions"], zones, parameters, maps, week, parameters.fields, log_growth)
-    fields |= contact
-    write_frame(frame_path(folder, week), week, fields, elements)
 
 
 def peak_memory_mib() -> float:

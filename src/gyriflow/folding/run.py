@@ -12,14 +12,14 @@ import pandas as pd
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from ..io.files import write_json, write_table
-from ..io.frames import join_frames
+from ..io.frames import join_frames, read_positions, write_frame
 from ..parameters.folding import FoldingParameters
 from ..parameters.varying import Maps
-from ..units import M_PER_MM, SECONDS_PER_GW
+from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import FRAMES, STEPS, SUMMARY, frame_path, peak_memory_mib, progress_line, save_frame, say, warn
+from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, progress_line, say, warn
 from .simulation import Folding, advance
 from .steering import missed_curves
 from .zones import Zones
@@ -49,17 +49,21 @@ def run(
         for note in (message, *foreign_checkpoints(out, folder), shortened_steps(parameters)):
             if note:
                 say(note)
-    start = mesh.vertices * M_PER_MM
-    weeks = parameters.output_weeks
+    start, weeks, wanted = mesh.vertices * M_PER_MM, parameters.output_weeks, parameters.fields
 
     def save(week: float, state: State) -> State:
         """Writes the frame of a week and returns the state to go on with; all ranks have to take part."""
-        contact, elements = folding.fields.of_contact(parameters.fields), folding.fields.of_elements(parameters.fields)
+        contact, elements = folding.fields.of_contact(wanted), folding.fields.of_elements(wanted)
         # a mean over the steps since the last frame: before the first one, that step's
         grown = folding.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
-        shown = folding.growth.parameters
         if comm.rank == 0:
-            save_frame(folder, week, state.positions, start, zones, shown, maps, contact, elements, grown)
+            fields = {"positions": state.positions * MM_PER_M}
+            if "displacement" in wanted:
+                fields["displacement_mm"] = (state.positions - start) * MM_PER_M
+            shown = zones, folding.growth.parameters, maps, week, wanted, grown
+            write_frame(
+                frame_path(folder, week), week, fields | layer_fields(fields["positions"], *shown) | contact, elements
+            )
         return replace(state, grown=None, grown_s=0.0)
 
     if state is None:
@@ -94,6 +98,8 @@ def run(
         steps = [row["seconds"] for row in state.rows]
         reached = parameters.start_week + state.time_s / SECONDS_PER_GW
         weeks = tuple(week for week in weeks if week <= reached + 1e-9)
+        join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
+        meshes = (TetrahedralMesh(read_positions(out / FRAMES, week), mesh.tets) for week in weeks)
         summary = {
             "tets": len(mesh.tets),
             "dofs": 3 * len(mesh.vertices),
@@ -108,11 +114,11 @@ def run(
             "peak_memory_MiB": memory,
             "min_J": min((row["min_J"] for row in state.rows), default=math.nan),
             "weeks": list(weeks),
+            "radius_ratio_01": [float(np.quantile(radius_ratios(one), 0.01)) for one in meshes],
             "reached_week": reached,
             "diverged": diverged,
             "resumed_after_step": first,
         }
-        join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
         write_table(out / STEPS, pd.DataFrame(list(state.rows)))
         write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)

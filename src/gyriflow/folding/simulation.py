@@ -22,7 +22,6 @@ from .diagnosis import (
     resolution_warning,
     unconverged_warning,
     worst_places,
-    worst_quality,
 )
 from .domain import Domain
 from .growth import Growth, GrowthInputs, StepStart
@@ -119,7 +118,6 @@ class Folding:
         }
         after = state.after(u, step_s, row, left, self.growth.learnt(size), self.growth.logarithm())
         self.domain.place(after.positions)
-        row["radius_ratio_01"] = worst_quality(self.domain)
         row["seconds"] = time.monotonic() - began
         return after
 

@@ -30,16 +30,10 @@ FOLLOWED = 0.005
 
 @dataclass(frozen=True, eq=False)
 class SteeredStep(GrowthByRates):
-    """Growth of a step whose rates are set so that it leads to a size.
+    """Growth of a step whose rates are set so that it leads from the size `before` to the size `aim`.
 
-    Attributes
-    ----------
-    before, aim
-        The size at the step's start, and that to be reached at its end.
-    free : (2,) float
-        Rates of the logarithms of area and volume, in 1/s, that growth would make if nothing held it.
-    limited
-        Whether bounds of the rates keep the brain from its curves.
+    `free` (2,) are the rates of the logarithms of area and volume, in 1/s, that growth would make if nothing held it;
+    `limited` says whether bounds of the rates keep the brain from its curves.
     """
 
     before: Size

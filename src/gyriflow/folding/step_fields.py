@@ -1,8 +1,13 @@
-"""The fields that a step has left: stress, strain and contact pressure, as frames write them."""
+"""The fields that a step has left: stress, strain and contact pressure, as frames write them, and their measures.
+
+The tensors of a step, elastic deformation and stress, come from the problem that was solved (`Problem.outcome`). Arrays
+of tensors are (c, 3, 3), of scalars (c,).
+"""
 
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats
 from ..parameters.folding import FoldingParameters
@@ -12,14 +17,6 @@ from .contact import SelfContact
 from .domain import Domain
 from .layers import PialSearch
 from .problem import Problem
-from .stress import (
-    areal_stretch,
-    deformation_gradients,
-    green_lagrange_maximum,
-    hencky_equivalent,
-    pressure,
-    von_mises,
-)
 from .zones import Zones
 
 
@@ -27,12 +24,7 @@ class StepFields:
     """What the last step has left; names of fields are those of the parameter `fields`, those of arrays have units.
 
     Where stress is forgotten, that of a step, its strain and its contact pressure are in proportion to the step, and
-    are given per week.
-
-    Attributes
-    ----------
-    step_s : float
-        Length of the last step.
+    are given per week. `step_s` is the length of the last step.
     """
 
     def __init__(
@@ -90,3 +82,51 @@ class StepFields:
         if self._remembers:
             return fields
         return {f"{name}_per_gw": values * (SECONDS_PER_GW / self.step_s) for name, values in fields.items()}
+
+
+def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:
+    """Returns the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
+
+    Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the elements have a volume before.
+    `slopes` (q, n, 3) are the gradients of the nodes' shape functions in the regular element, at the points.
+    """
+    # the transposed maps from the regular element: those after = those before · Fᵀ
+    first, second = (np.matmul(slopes.transpose(0, 2, 1), x[cells][:, None]) for x in (before, after))
+    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).swapaxes(-1, -2)
+
+
+def pressure(stress: Floats) -> Floats:
+    """Returns the (c,) pressures −tr(σ)/3, positive where tissue is pressed, in the unit of the stress."""
+    return -np.trace(stress, axis1=1, axis2=2) / 3
+
+
+def von_mises(stress: Floats) -> Floats:
+    """Returns the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the stress."""
+    mean = (np.trace(stress, axis1=1, axis2=2) / 3)[:, None, None] * np.eye(3)
+    return np.sqrt(1.5) * np.linalg.norm(stress - mean, axis=(1, 2))
+
+
+def principal_stretches(F: Floats) -> Floats:
+    """Returns the (c, 3) principal stretches of (c, 3, 3) deformation gradients, ascending."""
+    # twice as fast as singular values
+    return np.sqrt(np.linalg.eigvalsh(F @ F.transpose(0, 2, 1)))
+
+
+def hencky_equivalent(F: Floats) -> Floats:
+    """Returns the (c,) equivalent strains √(2/3 dev h : dev h) of the Hencky strain h = ln V.
+
+    It is 0 where the shape is unchanged, and the logarithm of the stretch in a bar drawn out at constant volume.
+    """
+    h = np.log(principal_stretches(F))
+    return np.sqrt(2 / 3) * np.linalg.norm(h - h.mean(axis=1, keepdims=True), axis=1)
+
+
+def green_lagrange_maximum(F: Floats) -> Floats:
+    """Returns the (c,) largest principal values of the Green-Lagrange strain (FᵀF − I)/2."""
+    return (principal_stretches(F)[:, -1] ** 2 - 1) / 2
+
+
+def areal_stretch(F: Floats, N: Floats) -> Floats:
+    """Returns the (c,) ratios of areas, after to before, of planes with unit normals N (c, 3) before: det F·|F⁻ᵀ·N|."""
+    rows = np.linalg.solve(F.transpose(0, 2, 1), N[:, :, None])[:, :, 0]
+    return np.linalg.det(F) * np.linalg.norm(rows, axis=1)

@@ -26,21 +26,14 @@ WALL_MM, WALL_COSINE = 2.0, 0.7
 class Zones:
     """The zones of a brain mesh.
 
-    Attributes
-    ----------
-    facets, facet_zone : (f, 3) int, (f,) int
-        Pial facets, outward, as vertex indices, the four of a quadratic element's face together. Their zone: FREE,
-        CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where tissue is cut off flat and
-        there is no cortex; MEDIAL_WALL where the only hemisphere faces the one that is not there.
-    growth : (n,) float
-        1 where tissue grows, 0 where it does not.
-    planes_mm
-        The planes that the left, and that the right hemisphere may not pass.
-    free
-        Whether nothing is fixed on purpose, so that rigid motions are to be removed.
-    anchors : (k,) int, (k, 3) bool
-        Vertices, and which of their components are fixed beside the zones', so that a body whose only support is a
-        sliding wall makes no rigid motion. They take no force: as few are fixed as there are such motions.
+    `facets` (f, 3) are the pial ones, outward, as vertex indices, the four of a quadratic element's face together.
+    `facet_zone` (f,) is FREE, CLAMPED, LEFT_CONTACT, RIGHT_CONTACT or BETWEEN_PLANES; BASE, SIDE_X or SIDE_Y where
+    tissue is cut off flat and there is no cortex; MEDIAL_WALL where the only hemisphere faces the one that is not
+    there. `growth` (n,) is 1 where tissue grows, else 0. The left, and the right hemisphere may not pass `planes_mm`.
+
+    In a `free` body nothing is fixed on purpose, so that rigid motions are to be removed. `anchors` are (k,) vertices,
+    and which of their (k, 3) components are fixed beside the zones', so that a body whose only support is a sliding
+    wall makes no rigid motion. They take no force: as few are fixed as there are such motions.
     """
 
     facets: NDArray[np.int64]

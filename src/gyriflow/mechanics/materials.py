@@ -12,20 +12,12 @@ from ufl.core.expr import Expr
 class Material(ABC):
     """An isotropic hyperelastic material; everything that the model needs of it follows from its energy.
 
-    Energies count per volume of the updated reference, without the factor det Fg: the paper's choice.
-
-    Attributes
-    ----------
-    poisson_ratio
-        ν, the same in all tissue; −1 < ν < 0.5, else ValueError.
+    Energies count per volume of the updated reference, without the factor det Fg: the paper's choice. Poisson's ratio
+    ν is the same in all tissue.
     """
 
     poisson_ratio: float
     name: ClassVar[str]
-
-    def __post_init__(self) -> None:
-        if not -1 < self.poisson_ratio < 0.5:
-            raise ValueError(f"Poisson's ratio must lie between -1 and 0.5, found {self.poisson_ratio}")
 
     @property
     def bulk_to_shear_ratio(self) -> float:

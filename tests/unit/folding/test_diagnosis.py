@@ -6,10 +6,10 @@ from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.folding.checks import stiffness_warning
-from gyriflow.folding.diagnosis import elements_through, resolution_warning, unconverged_warning, worst_quality
+from gyriflow.folding.diagnosis import elements_through, resolution_warning, unconverged_warning
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
 
 def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
@@ -25,15 +25,6 @@ def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
     domain.place(2 * domain.positions)
     assert elements_through(domain, 2 * depth, 3e-3) == pytest.approx(1.5 / edge)
     assert np.isnan(elements_through(domain, depth + 1.0, 3e-3))
-
-
-def test_quality_is_that_of_the_worst_hundredth_as_the_mesh_is():
-    mesh = box_mesh((4, 4, 4), (4.0, 4.0, 4.0))
-    domain = Domain(MPI.COMM_SELF, mesh)
-    regular = worst_quality(domain)
-    assert regular == pytest.approx(np.quantile(radius_ratios(mesh), 0.01))
-    domain.place(domain.positions * [1.0, 1.0, 0.2])
-    assert worst_quality(domain) < 0.5 * regular
 
 
 def rows(*through):

@@ -10,7 +10,7 @@ from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.errors import SolverError
 from gyriflow.folding.growth import GrowthByRates, GrowthInputs, Size, StepStart
-from gyriflow.folding.growth_models import growth_at_start
+from gyriflow.folding.growth_models import growth_model
 from gyriflow.folding.output import growth_along
 from gyriflow.folding.steering import SteeredStep, free_growth, joined, missed_curves, steered_rates
 from gyriflow.folding.stress import packed
@@ -47,10 +47,11 @@ def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {"area_cm2": {21.0: area, 22.0: 1.13 * area}, "volume_ml": {21.0: volume, 22.0: 1.2 * volume}}
     p = parameters_from(RUN | GROWING | {"growth": {"model": "sizes", **curves}})
-    step = growth_at_start(p, inputs, mesh.vertices)
+    first = StepStart(mesh.vertices, 0.0, p.step_s)
+    step = growth_model(p, inputs, mesh.vertices)(first)
     assert step.free * SECONDS_PER_GW == pytest.approx([math.log(1.13), math.log(1.2)], rel=1e-6)
     # a prescribed growth is the run's own
-    assert growth_at_start(plain, inputs, mesh.vertices).parameters == plain
+    assert growth_model(plain, inputs, mesh.vertices)(first).parameters == plain
 
 
 def test_free_growth_of_a_body_is_known():

@@ -13,17 +13,16 @@ from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import Problem
-from gyriflow.folding.stress import (
+from gyriflow.folding.step_fields import (
     areal_stretch,
     deformation_gradients,
     green_lagrange_maximum,
     hencky_equivalent,
-    left_stretch,
     pressure,
     principal_stretches,
-    relaxed,
     von_mises,
 )
+from gyriflow.folding.stress import left_stretch, relaxed
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import MATERIALS, Material, NeoHookean
