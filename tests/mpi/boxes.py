@@ -73,28 +73,6 @@ class EvenGrowth(Growth):
         return np.tile(np.eye(3) / (1 + self.by), (cells, points, 1, 1))
 
 
-def taylor_errors(problem, u, v):
-    """Returns what energy and forces at u + h v miss of their expansions at u, for two h, (2, 2), and |J h v|.
-
-    The part v of the displacement is zero where that is fixed.
-    """
-    residual, other, direction, change = (problem.new_vector() for _ in range(4))
-    direction.array[:] = v[: problem.domain.owned].ravel()
-    problem.set_displacement(u)
-    energy = problem.energy()
-    problem.residual(residual)
-    problem.tangent().matrix.mult(direction, change)
-    errors = []
-    for h in (0.2, 0.1):
-        problem.set_displacement(u + h * v)
-        first = abs(problem.energy() - energy - h * residual.dot(direction))
-        problem.residual(other)
-        other.axpy(-1.0, residual)
-        other.axpy(-h, change)
-        errors.append((first, other.norm()))
-    return np.array(errors), h * change.norm()
-
-
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):
     """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(comm, mesh)

@@ -15,23 +15,13 @@ from shapes import box_mesh
 
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.linear_solver import PLAIN
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
 from gyriflow.units import M_PER_MM, MM_PER_M
 
-TIGHT = {"newton_tolerance": 1e-12}
-RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0], "solver": TIGHT}
-
 
 def at_the_bottom(centre):
     return centre[:, 2] < -2.9
-
-
-def growing_problem(comm=COMM):
-    mesh = curved_box()
-    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002}
-    return problem_on(mesh, zones_of(mesh, at_the_bottom), comm=comm, **layers)
 
 
 def test_volumes_and_facets_are_those_of_the_curved_elements():
@@ -44,17 +34,6 @@ def test_volumes_and_facets_are_those_of_the_curved_elements():
     counts = COMM.allreduce(np.bincount(tags.values, minlength=5))
     np.testing.assert_array_equal(4 * counts, np.bincount(zones.facet_zone, minlength=5))
     np.testing.assert_allclose(domain.gathered(domain.local(domain.positions)[: domain.owned]), mesh.vertices * 1e-3)
-
-
-def test_newton_converges_quadratically_and_conjugate_gradients_as_on_linear_elements():
-    problem = growing_problem()
-    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-12, krylov_tolerance=1e-10), residual_floor=0.0)
-    count = solver.solve(np.zeros_like(problem.displacement))
-    assert count.newton <= 7
-    assert count.residual <= 1e-12
-    assert count.rung == PLAIN
-    # ten digits in each of the linear solves
-    assert count.krylov <= 50 * count.newton
 
 
 def test_iterations_do_not_grow_with_the_mesh():

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from mpi4py import MPI
+from boxes import COMM
+from contact_bodies import after_steps
 from shapes import ellipsoid_mesh
 
 from gyriflow.folding.checkpoint import State
@@ -14,7 +15,6 @@ from gyriflow.folding.zones import zones_of_run
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
-COMM = MPI.COMM_WORLD
 DAY_S = 86_400.0
 
 
@@ -34,16 +34,10 @@ def following(growth, **changes):
     return folding, State.at_start(mesh.vertices * M_PER_MM, DAY_S)
 
 
-def grown(folding, state, steps):
-    for _ in range(steps):
-        state = folding.step(state, DAY_S)
-    return state
-
-
 @pytest.mark.parametrize("growth", [(0.10, 0.145), pytest.param((0.02, 0.03), marks=pytest.mark.one_rank)])
 def test_area_and_volume_meet_their_curves_at_the_end_of_each_week(growth):
     folding, state = following(growth)
-    state = grown(folding, state, 14)
+    state = after_steps(folding, state, 14)
     for row in (state.rows[6], state.rows[13]):
         assert row["area_cm2"] == pytest.approx(row["area_aim_cm2"], rel=5e-3)
         assert row["volume_ml"] == pytest.approx(row["volume_aim_ml"], rel=1e-3)
@@ -57,18 +51,18 @@ def test_area_and_volume_meet_their_curves_at_the_end_of_each_week(growth):
 @pytest.mark.one_rank
 def test_a_brain_shrinks_where_that_is_allowed():
     folding, state = following((-0.10, -0.15), allow_negative_growth=True)
-    row = grown(folding, state, 9).rows[-1]
+    row = after_steps(folding, state, 9).rows[-1]
     assert row["volume_ml"] == pytest.approx(row["volume_aim_ml"], rel=5e-3)
     assert row["core_growth_rate_per_s"] < 0
-    row = grown(*following((-0.10, -0.15)), 1).rows[-1]
+    row = after_steps(*following((-0.10, -0.15)), 1).rows[-1]
     assert (row["growth_rate_per_s"], row["core_growth_rate_per_s"], row["growth_limited"]) == (0.0, 0.0, 1)
 
 
 def test_what_a_step_lacked_is_corrected_after_a_resumption_too():
     folding, state = following((0.10, 0.15))
-    middle = grown(folding, state, 3)
-    whole = grown(folding, middle, 2)
-    resumed = grown(following((0.10, 0.15))[0], middle, 2)
+    middle = after_steps(folding, state, 3)
+    whole = after_steps(folding, middle, 2)
+    resumed = after_steps(following((0.10, 0.15))[0], middle, 2)
     assert resumed.learnt == pytest.approx(whole.learnt, rel=1e-6)
     assert resumed.rows[-1]["growth_rate_per_s"] == pytest.approx(whole.rows[-1]["growth_rate_per_s"], rel=1e-6)
     np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-3 * M_PER_MM)

@@ -7,7 +7,7 @@ import pytest
 from boxes import COMM, curved_box, distorted_box, problem_on, zones_of
 from shapes import box_mesh
 
-from gyriflow.folding.linear_solver import NotConvergedError
+from gyriflow.folding.linear_solver import PLAIN, NotConvergedError
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 
 
@@ -15,8 +15,8 @@ def at_the_bottom(centre):
     return centre[:, 2] < -2.99
 
 
-def growing_problem(contact=False, **changes):
-    mesh = distorted_box()
+def growing_problem(contact=False, mesh=None, **changes):
+    mesh = mesh or distorted_box()
     # walls that stand on the wrong side of their planes: contact acts from the start
     walls = {"left": lambda c: c[:, 0] < -3.99, "right": lambda c: c[:, 0] > 3.99, "planes": (-5.0, 5.0)}
     zones = zones_of(mesh, at_the_bottom, **(walls if contact else {}))
@@ -51,14 +51,19 @@ def test_a_body_that_does_not_grow_does_not_move():
     assert (problem.displacement == 0).all()
 
 
-def test_newton_converges_quadratically_with_tight_linear_solves():
-    problem = growing_problem()
+@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
+def test_newton_converges_quadratically_with_tight_linear_solves(mesh):
+    problem = growing_problem(mesh=mesh)
     solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-12, krylov_tolerance=1e-10), residual_floor=0.0)
     count = solver.solve(np.zeros_like(problem.displacement))
     assert count.newton <= 7
     assert count.residual <= 1e-12
+    assert count.rung == PLAIN
+    # ten digits in each of the linear solves
+    assert count.krylov <= 50 * count.newton
 
 
+@pytest.mark.one_rank
 def test_a_failed_solve_says_so():
     problem = growing_problem()
     solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-14, max_newton=1), residual_floor=0.0)

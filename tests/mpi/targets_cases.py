@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from boxes import COMM
-from contact_bodies import in_a_tube, problem_with_contact, two_blocks
+from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blocks
 from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.folding.checkpoint import State
@@ -49,12 +49,6 @@ def towards(targets, **changes):
     return folding, State.at_start(BODY.vertices * M_PER_MM, DAY_S)
 
 
-def grown(folding, state, steps):
-    for _ in range(steps):
-        state = folding.step(state, DAY_S)
-    return state
-
-
 def volume(vertices):
     return cell_sizes(vertices, linear_pieces(BODY)).sum()
 
@@ -70,10 +64,10 @@ def away(state, target):
 def test_shapes_a_week_apart_are_met_in_any_pose():
     targets = {22.0: bent(1), 23.0: bent(2)}
     folding, start = towards(targets)
-    first = grown(folding, start, 7)
+    first = after_steps(folding, start, 7)
     assert away(start, targets[22.0]) > 0.9
     assert away(first, targets[22.0]) < 0.05
-    last = grown(folding, first, 7)
+    last = after_steps(folding, first, 7)
     assert away(last, targets[23.0]) < 0.05
     # each step tells how far it begins from the next shape
     told = [row["to_target_mm"] for row in last.rows]
@@ -91,21 +85,22 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
 
     motion = rigid(20, -35, 50, shift=(8.0, -3.0, 5.0))
     turned = {week: transform_points(at, motion) for week, at in targets.items()}
-    again = grown(towards(turned)[0], start, 2)
-    np.testing.assert_allclose(again.positions, grown(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
+    again = after_steps(towards(turned)[0], start, 2)
+    np.testing.assert_allclose(again.positions, after_steps(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
 
 
 def test_a_step_across_a_target_goes_on_towards_the_next_one():
     shapes = {21.5: bent(0.5), 22.0: bent(1.5), 23.0: bent(2)}
     folding, start = towards(shapes)
-    before = grown(folding, start, 3)
+    before = after_steps(folding, start, 3)
     # half a day before 21.5, and half a day after it
-    across = grown(folding, before, 1)
+    across = after_steps(folding, before, 1)
     assert away(across, shapes[21.5]) > 0.1
     assert away(across, 6 / 7 * shapes[21.5] + 1 / 7 * shapes[22.0]) < 0.05
-    assert away(grown(folding, across, 3), shapes[22.0]) < 0.05
+    assert away(after_steps(folding, across, 3), shapes[22.0]) < 0.05
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("stretches", [[1.05, 0.98, 1.1], [1.02, 0.99, 1.04]])
 def test_growth_of_an_even_stretch_is_that_stretch(stretches):
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]

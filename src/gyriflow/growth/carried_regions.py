@@ -48,12 +48,8 @@ def renumber(labels: NDArray[np.integer], names: Mapping[int, str], numbers: Map
 def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.integer], affine: Floats) -> dict[str, Ints]:
     """Returns for vertices in mm the region of the nearest voxel that has one, 0 where none is within 4 mm.
 
-    Parameters
-    ----------
-    points
-        (n, 3) vertices of the pial surfaces of both hemispheres, by side.
-    regions, affine
-        (i, j, k) numbers, 0 for none, and the (4, 4) matrix from index to the points' space.
+    `points` are the (n, 3) vertices of the pial surfaces by side, `regions` (i, j, k) numbers, 0 for none, and `affine`
+    (4, 4) leads from index to the points' space.
 
     InputError where no point of a side is near a region, or the regions lie elsewhere than the surfaces.
     """

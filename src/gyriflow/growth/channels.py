@@ -25,18 +25,11 @@ BRIGHT = 0.99
 
 @dataclass(frozen=True, eq=False)
 class Channels:
-    """A brain on a grid of cubic voxels along the axes of RAS+.
+    """A brain on a grid (i, j, k) of cubic voxels along the axes of RAS+.
 
-    Attributes
-    ----------
-    affine : (4, 4) float
-        Index to RAS+ position in mm.
-    tissue : (i, j, k) uint8
-        Bits of the masks as they are: `CEREBRUM` and `CORTEX`.
-    cerebrum : (i, j, k) float32
-        Smoothed mask, from 0 to 1.
-    cortex, intensity : (i, j, k) float32, optional
-        The same of the cortex; intensity of the image, about 1 where the cerebrum is brightest.
+    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits of the masks as they are, `CEREBRUM` and
+    `CORTEX`; `cerebrum` and `cortex` are smoothed masks from 0 to 1, `intensity` is that of the image, about 1 where
+    the cerebrum is brightest.
     """
 
     affine: Floats
@@ -62,16 +55,9 @@ def channels(
 ) -> Channels:
     """Returns the channels of a brain from its label volume, and from its image where there is one.
 
-    Parameters
-    ----------
-    labels, affine
-        (i, j, k) tissue labels and the (4, 4) matrix from index to RAS+ mm; any grid, turned or sheared.
-    cerebrum, cortex
-        Numbers that make them.
-    image
-        Intensities and their own affine.
-    voxel_mm
-        Edge of the grid that is made; the volume's smallest one if None.
+    `labels` (i, j, k) are on any grid, turned or sheared, `affine` (4, 4) leads from index to RAS+ mm; `cerebrum` and
+    `cortex` are the numbers that make them. `image` has intensities and their own affine. `voxel_mm` is the edge of the
+    grid that is made, the volume's smallest one if None.
 
     InputError where no voxel belongs to the cerebrum, where the cortex is named and missing, where the cerebrum is cut
     by the edge of the volume, and where the image does not reach over it.

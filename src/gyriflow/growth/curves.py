@@ -40,17 +40,9 @@ CERTAIN = 1.96
 class Curve:
     """A positive quantity over the weeks.
 
-    Between its points the logarithm is a monotone cubic (Fritsch and Butland 1984); beyond them the rate of growth of
-    the end goes on.
-
-    Attributes
-    ----------
-    weeks : (k,) float
-        Ascending.
-    values : (k,) float
-        In any unit.
-    sd : (k,) float
-        Standard deviation of the logarithm; NaN where the data do not tell, 0 for a given table.
+    Between its points, at ascending weeks (k,), the logarithm is a monotone cubic (Fritsch and Butland 1984); beyond
+    them the rate of growth of the end goes on. Values (k,) are in any unit; `sd` (k,) is the standard deviation of the
+    logarithm, NaN where the data do not tell, 0 for a given table.
     """
 
     weeks: Floats
@@ -60,16 +52,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A curve through measured weeks, and what each week has to do with it.
-
-    Attributes
-    ----------
-    curve
-    weeks, measured : (n,) float
-        What it was fitted to.
-    weights : (n,) float
-        From 1 to 0, for a week that leaps.
-    """
+    """A curve, the (n,) weeks and measured values that it was fitted to, and their weights: 0 for a week that leaps."""
 
     curve: Curve
     weeks: Floats

@@ -42,18 +42,10 @@ MIRROR = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """A deformation that was found, and how.
+    """A deformation that takes points of the earlier brain to the later one, and how it was found.
 
-    Attributes
-    ----------
-    deformation
-        Takes points of the earlier brain to the later one.
-    turned_deg
-        By how much the later brain was turned before the affine registration began.
-    seconds
-        Time that it took.
-    channels
-        Names of the channels compared.
+    `turned_deg` is by how much the later brain was turned before the affine registration began, `channels` are those
+    that were compared.
     """
 
     deformation: Deformation

@@ -66,14 +66,8 @@ def carry_sharply(
     the boundary is fitted onto that brain's surface week by week, and the inside goes along harmonically. Matched
     surfaces need no fit: a run of them is followed from where the boundary lies on the first.
 
-    Parameters
-    ----------
-    mesh
-        Of the first brain, in the space that it corresponds in.
-    pairs
-        Leading from each brain to the next.
-    surfaces
-        The pial surfaces of the others in the spaces that these correspond in; None: nothing is fitted.
+    The mesh is of the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial ones of the
+    others, all in the spaces that these correspond in. Without surfaces nothing is fitted.
 
     InputError where points leave the grid of a registration, or the boundary lies beside matched surfaces.
     """
@@ -120,18 +114,10 @@ def expected_positions(
     """Returns the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
 
     A brain moves as the atlas does from where the atlas is at its week, and keeps what sets it apart from the atlas, in
-    proportion to the size, as far as that is smooth (`own_mm`); what is finer fades (`FADING_GW`).
+    proportion to the size, as far as that is smooth (`own_mm`, with 0 all of it); what is finer fades (`FADING_GW`).
 
-    Parameters
-    ----------
-    mesh
-        The start brain's, in mm.
-    atlas
-        (k, n, 3) positions of its vertices in the atlas' weeks.
-    weeks, also
-        Those k weeks, ascending, and further ones that are wanted.
-    own_mm
-        What sets the brain apart is smoothed by this much; with 0 all of it is kept.
+    The mesh is the start brain's, in mm, `atlas` (k, n, 3) the positions of its vertices in the atlas' k ascending
+    `weeks`; `also` are further weeks that are wanted.
 
     InputError where the start is long before the first week or not before the last one.
     """
@@ -175,14 +161,8 @@ def predict_shapes(
     this brain with all that sets the start apart from it, and `displaced`, the start moved as registration alone sees
     the atlas move.
 
-    Parameters
-    ----------
-    mesh
-        The start brain's, in the space that it corresponds in.
-    pairs
-        Leading from the start to the atlas' first week, and from each of these weeks to the next.
-    surfaces, weeks, also
-        The atlas' pial surfaces in the spaces that they correspond in, their weeks, and further ones that are wanted.
+    The mesh is the start brain's; `pairs` lead from the start to the atlas' first week, and from each of its `weeks` to
+    the next. `surfaces` are the atlas' pial ones, all in the spaces that they correspond in. `also` are further weeks.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces)[1:]

@@ -40,18 +40,9 @@ def followed_sizes(
 ) -> dict[str, dict[float, float]]:
     """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
 
-    Parameters
-    ----------
-    growth
-        The settings: for each of `SIZES`, and for the thickness if given, `measured` or a table of values by week.
-    curves
-        Columns series, quantity, week, value of the curves through measured brains; needed where one is `measured`.
-    series
-        That of the start brain; InputError where it is in none.
-    weeks
-        Output weeks of the run.
-    shrink
-        Whether a given table may shrink.
+    `growth` has for each of `SIZES`, and for the thickness if given, `measured` or a table of values by week, which may
+    decrease with `shrink`. Where one is `measured`, `curves` has the columns series, quantity, week and value;
+    InputError where the start brain's `series` is not among them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}

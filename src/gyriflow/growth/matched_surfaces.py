@@ -69,16 +69,8 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
     """Returns the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
 
     Each vertex keeps its place beside the point of the first matched surface that is nearest with an agreeing
-    normal, turned as the whole surface is, and moves as that point does.
-
-    Parameters
-    ----------
-    mesh
-        A surface of the first week: of the same brain, with other triangles.
-    chain
-        Pairs of successive weeks.
-
-    InputError where the surface lies elsewhere.
+    normal, turned as the whole surface is, and moves as that point does. The surface is of the first week: of the same
+    brain, with other triangles. InputError where it lies elsewhere.
     """
     faces = chain[0].first.faces
     surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])

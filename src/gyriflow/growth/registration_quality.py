@@ -21,20 +21,11 @@ MOST_FOLDED = 0.005
 class Quality:
     """Measures of how good a registration is.
 
-    Attributes
-    ----------
-    dice_cerebrum, dice_cortex
-        Overlap 2|A∩B|/(|A| + |B|) of the masks of the earlier brain with those of the later brain taken back; NaN
-        without a cortex.
-    least_determinant, folded_share
-        Least determinant of the map's gradient in the earlier cerebrum, and the share of its volume where it is ≤ 0.
-    log_growth_sd
-        Standard deviation of the log determinant there, folded places left out.
-    volume_ratio
-        Volume of the later cerebrum over that of the earlier one, as the map has it.
-    rim_mm, inside_mm
-        95 % quantiles of the displacement at the rim of its grid and inside the cerebrum. The rim is to be the smaller:
-        nothing is compared there.
+    Dice is the overlap 2|A∩B|/(|A| + |B|) of the masks of the earlier brain with those of the later brain taken back,
+    NaN without a cortex. Of the determinant of the map's gradient in the earlier cerebrum: the least one, the share of
+    the volume where it is ≤ 0, the standard deviation of its logarithm elsewhere, and its mean, the ratio of volumes as
+    the map has it. `rim_mm` and `inside_mm` are 95 % quantiles of the displacement at the rim of its grid and inside
+    the cerebrum. The rim is to be the smaller: nothing is compared there.
     """
 
     dice_cerebrum: float

@@ -4,16 +4,13 @@ import logging
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates
+from numpy.typing import ArrayLike
+from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.matching import barycentric, nearest_on
-from ..geometry.triangles import TriangleMesh, corners, face_areas, transformed
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..geometry.triangles import Floats, Ints, TriangleMesh, corners, face_areas, transformed
 
 log = logging.getLogger(__name__)
 
@@ -80,14 +77,10 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     missing = ~np.isfinite(values)
     if missing.any():
-        finite = np.isfinite(data)
-        reach = distance_transform_edt(~finite, sampling=np.linalg.norm(matrix[:3, :3], axis=0))
-        voxels = np.clip(np.rint(index[missing]).astype(int), 0, np.array(data.shape) - 1)
-        depth = f", up to {reach[tuple(voxels.T)].max():.1f} mm from the nearest number" if finite.any() else ""
         raise InputError(
             "a map has no number in parts of the start brain",
             path=path,
-            found=f"{int(missing.sum())} vertices at voxels that are NaN or infinite{depth}",
+            found=f"{int(missing.sum())} vertices at voxels that are NaN or infinite",
             expected=expected,
         )
     return values

@@ -20,10 +20,6 @@ from ..geometry.tetrahedra import TetrahedralMesh
 
 log = logging.getLogger(__name__)
 
-PACKAGES = {"pytetwild": "pytetwild", "tetgen": "libigl"}
-"""The package that each mesher comes with."""
-MISSING = 77
-"""Exit code of a process whose mesher is not installed."""
 LAST_WORDS = 1000
 """So many of the last characters that a mesher prints stand in the message of its failure; all of them are logged."""
 
@@ -37,7 +33,7 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
     """Return the mesh that a mesher, "pytetwild" or "tetgen", makes in a process of its own; its lines are logged.
 
     `arrays` are `vertices` (n, 3) and `faces` (m, 3) of the surface, and what the mesher needs besides. MeshError where
-    it is not installed, dies or takes longer than `time_limit_s`, with its last words.
+    it is missing, dies or takes longer than `time_limit_s`, with its last words.
     """
     sent = io.BytesIO()
     np.savez(sent, **arrays)
@@ -51,17 +47,12 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
             found=f"its last words: {last or 'none'}",
             remedy="Mesh with longer edges, or with another mesh.mesher.",
         )
-    if code == MISSING:
-        raise MeshError(
-            f"the mesher {name} is not installed",
-            found=words[-1],
-            remedy=f"Install {PACKAGES[name]} as envs/requirements.txt names it, or choose another mesh.mesher.",
-        )
     if code != 0:
         raise MeshError(
             f"the mesher {name} failed with exit code {code}",
             found=last or "no message",
-            remedy="A negative code is a signal: -9 means that memory ran out.",
+            remedy="A negative code is a signal: -9 means that memory ran out. What cannot be imported is to be "
+            "installed as envs/requirements.txt names it.",
         )
     with np.load(io.BytesIO(output)) as received:
         return TetrahedralMesh(received["vertices"], received["tets"])
@@ -132,11 +123,7 @@ def _mesh_from_standard_input(name: str) -> None:
     output = os.dup(1)
     os.dup2(2, 1)  # what the mesher prints must not mix with the arrays
     with np.load(io.BytesIO(sys.stdin.buffer.read())) as arrays:
-        try:
-            vertices, tets = MESHERS[name](arrays)
-        except ImportError as error:
-            print(error, file=sys.stderr)
-            sys.exit(MISSING)
+        vertices, tets = MESHERS[name](arrays)
     used, local = np.unique(tets, return_inverse=True)
     sent = io.BytesIO()
     np.savez(sent, vertices=vertices[used], tets=local.reshape(-1, 4))

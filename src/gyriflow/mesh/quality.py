@@ -14,9 +14,17 @@ from ..errors import MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, radius_ratios, signed_volumes
-from ..geometry.triangles import TriangleMesh, area, corners, face_areas, face_normals, mean_edge_length, signed_volume
+from ..geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    area,
+    corners,
+    face_areas,
+    face_normals,
+    mean_edge_length,
+    signed_volume,
+)
 
-Floats = NDArray[np.float64]
 QUANTILE = 0.99
 GAP_MM = 3.0
 """Walls that face each other within this distance are those of a gap."""

@@ -52,21 +52,15 @@ def test_rates_that_change_with_the_weeks_are_those_of_the_middle_of_a_step():
     np.testing.assert_allclose(inverse[0, 0], np.diag([1 / (1 + 2.5 / 7 * 1e-6 * day)] * 2 + [1.0]), rtol=1e-12)
 
 
-def test_distance_is_to_the_triangles_not_to_the_vertices():
+def test_distance_is_to_the_triangles_not_to_the_vertices_within_reach():
     # one coarse cell: the middle of a wall is far from every vertex
-    search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
+    search = PialSearch(
+        *(lambda mesh: (mesh.vertices, boundary_faces(mesh)[0]))(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
+    )
     points = np.array([[0.0, 0.0, 0.0], [4.0, 1.0, 2.0], [0.0, -3.0, 0.0]])
     np.testing.assert_allclose(search.distance(points), [5.0, 1.0, 2.0], atol=1e-12)
-
-
-def test_far_beyond_reach_the_distance_is_that_of_the_nearest_vertex():
-    search = search_of(box_mesh((4, 4, 4), (10.0, 10.0, 10.0)))
-    assert search.distance(np.zeros((1, 3)), reach=1.0)[0] == pytest.approx(5.0)
-
-
-def test_within_reach_of_a_triangle_whose_vertices_are_beyond_it_the_distance_is_the_triangles():
-    search = search_of(box_mesh((1, 1, 1), (10.0, 10.0, 10.0)))
-    assert search.distance(np.array([[4.0, 0.0, 0.0]]), reach=1.5)[0] == pytest.approx(1.0)
+    assert search.distance(points[1:2], reach=1.5)[0] == pytest.approx(1.0)
+    assert search.distance(points[:1], reach=1.0)[0] == pytest.approx(5 * np.sqrt(3))
 
 
 def test_normals_on_a_ball_point_outwards_and_have_length_one():

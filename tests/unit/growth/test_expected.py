@@ -72,13 +72,6 @@ def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_alo
     assert positions[1][deep] == pytest.approx(plain[deep], abs=0.3)
 
 
-def test_matched_surfaces_are_followed_as_they_are():
-    boundary = boundary_surface(BALL)[0]
-    pair = MatchedSurfaces(boundary, boundary.vertices * [1.1, 1.2, 1.3])
-    positions = carry_sharply(BALL, [pair], [boundary])
-    assert positions[1] == pytest.approx(BALL.vertices * [1.1, 1.2, 1.3], abs=0.05)
-
-
 def test_a_start_outside_an_atlas_of_matched_surfaces_follows_them_from_where_it_is_registered_to():
     turn = rigid(10, 20, 30)[:3, :3]
     first = sphere(20.0, centre=(9.0, 0.0, 0.0))

@@ -65,6 +65,7 @@ def test_the_gap_between_two_boxes_has_its_width_and_area():
 
 def test_walls_far_apart_or_thin_tissue_are_no_gap():
     assert gap_summary(gap_walls(pair(4.0))) == {"percentile1": None, "median": None, "area_mm2": 0.0}
+    assert gap_kept(gap_walls(pair(4.0)), pair(0.1)) is None
     plate = box((0.5, 6.0, 6.0))
     assert gap_summary(gap_walls(plate))["area_mm2"] == 0.0
     # inside out, the same plate is a gap
@@ -81,7 +82,3 @@ def test_the_share_of_a_gap_that_is_bridged_is_not_kept():
     # tissue fills the upper third of the gap
     bridged = merged(pair(0.5), box((0.5, 6.0, 2.0), (0, 0, 2.0)))
     assert gap_kept(gap_walls(pair(0.5)), bridged) == pytest.approx(2 / 3, abs=0.05)
-
-
-def test_without_a_gap_none_is_kept_or_lost():
-    assert gap_kept(gap_walls(pair(4.0)), pair(0.1)) is None
