@@ -1,9 +1,8 @@
-"""The linear solver: its preconditioner, tangents that are not positive definite, and contributions to the problem."""
+"""The linear solver: its preconditioner, and tangents that are not positive definite."""
 
 import numpy as np
 import pytest
 from boxes import (
-    COMM,
     distorted_box,
     everywhere_known,
     problem_on,
@@ -11,7 +10,6 @@ from boxes import (
     smooth_displacement,
     zones_of,
 )
-from petsc4py import PETSc
 from shapes import box_mesh
 
 from gyriflow.folding import linear_solver
@@ -40,40 +38,6 @@ def solved(problem, **settings):
     count = solver.solve(np.zeros_like(problem.displacement))
     assert problem.smallest_volume_ratio() > 0
     return count, everywhere_known(problem)
-
-
-class Springs:
-    """Linear springs between each node and its place, each like the others."""
-
-    def __init__(self, problem, stiffness, reach=1.0):
-        self.problem = problem
-        self.block = stiffness * np.eye(3)
-        self.reach = reach
-        self.asked = 0
-
-    def _owned(self):
-        return self.problem.displacement[: self.problem.domain.owned]
-
-    def energy(self):
-        u = self._owned()
-        return COMM.allreduce(float(0.5 * np.einsum("ni,ij,nj->", u, self.block, u)))
-
-    def add_residual(self, out):
-        out.array += (self._owned() @ self.block.T).ravel()
-
-    def stiffness(self, *, convex=False):
-        size = (3 * self.problem.domain.owned, 3 * len(self.problem.domain.positions))
-        matrix = PETSc.Mat().createAIJ((size, size), bsize=3, nnz=(6, 6), comm=COMM)
-        first = matrix.getOwnershipRange()[0]
-        for node in range(self.problem.domain.owned):
-            rows = np.arange(first + 3 * node, first + 3 * node + 3, dtype=PETSc.IntType)
-            matrix.setValues(rows, rows, self.block)
-        matrix.assemble()
-        return matrix
-
-    def largest_step(self, direction):
-        self.asked += 1
-        return self.reach
 
 
 def test_the_preconditioner_is_that_of_the_present_tangent():
@@ -141,15 +105,3 @@ def test_a_tangent_that_is_not_positive_definite_is_shifted():
 def test_what_is_not_solved_in_time_is_told():
     with pytest.raises(NotConvergedError, match="found no descent"):
         solved(clamped_box(), krylov_tolerance=1e-8, max_krylov=2)
-
-
-def test_a_contribution_holds_the_body_and_limits_the_steps():
-    free, held = clamped_box(), clamped_box()
-    springs = Springs(held, 50.0, reach=0.5)
-    held.contributions.append(springs)
-    count, moved = solved(held, max_newton=60)
-    easy, far = solved(free)
-    assert np.abs(moved).max() < 0.5 * np.abs(far).max()
-    # half steps at most: the residual can no more than halve in each
-    assert count.newton >= 25 > easy.newton
-    assert springs.asked == count.newton + 1

@@ -11,21 +11,17 @@ from verification_cases.manufactured import CASES, rates, solved
 pytestmark = [pytest.mark.slow, pytest.mark.one_rank]
 
 
+@pytest.mark.parametrize(
+    ("order", "cells", "fall", "gradient_falls", "left"),
+    # left of a displacement with gradients up to 0.4
+    [(1, (5, 10, 20), 1.8, (0.9, 1.2), 0.015), (2, (3, 5, 10), 2.7, (1.8, 2.4), 0.003)],
+    ids=["linear", "quadratic"],
+)
 @pytest.mark.parametrize("case", CASES)
-def test_errors_fall_with_the_square_of_the_edge_and_those_of_gradients_with_the_edge(case):
-    errors = [solved(case, cells) for cells in (5, 10, 20)]
+def test_errors_fall_with_one_power_more_than_those_of_gradients(case, order, cells, fall, gradient_falls, left):
+    errors = [solved(case, number, order=order) for number in cells]
     displacement, gradient = rates(errors).T
-    assert displacement[-1] >= 1.8
-    assert displacement[-1] > displacement[0]
-    assert 0.9 <= gradient[-1] <= 1.2
-    # of a displacement with gradients up to 0.4
-    assert errors[-1].displacement < 0.015
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_errors_of_quadratic_elements_fall_with_one_power_more(case):
-    errors = [solved(case, cells, order=2) for cells in (3, 5, 10)]
-    displacement, gradient = rates(errors).T
-    assert displacement[-1] >= 2.7
-    assert 1.8 <= gradient[-1] <= 2.4
-    assert errors[-1].displacement < 0.003
+    assert displacement[-1] >= fall
+    assert order == 2 or displacement[-1] > displacement[0]
+    assert gradient_falls[0] <= gradient[-1] <= gradient_falls[1]
+    assert errors[-1].displacement < left

@@ -9,7 +9,7 @@ from ellipsoid import RUN, SEMI_AXES
 from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.errors import SolverError
-from gyriflow.folding.growth import GrowthByRates, GrowthInputs, Size, StepStart
+from gyriflow.folding.growth import GrowthInputs, Size, StepStart
 from gyriflow.folding.growth_models import growth_model
 from gyriflow.folding.output import growth_along
 from gyriflow.folding.steering import SteeredStep, free_growth, joined, missed_curves, steered_rates
@@ -100,12 +100,6 @@ def test_bounds_leave_the_volume_on_its_curve():
     assert steered_rates(np.array([-0.01, -0.02]), MADE, BOUNDS) == (0.0, 0.0, True)
     with pytest.raises(SolverError, match="growth by sizes finds no rates"):
         steered_rates(np.array([0.01, 0.02]), MADE * [[1, 1], [1, 0]], BOUNDS)
-
-
-def test_prescribed_growth_teaches_nothing():
-    step = GrowthByRates(parameters_from(RUN), StepStart(np.empty((0, 3)), 0.0, DAY_S))
-    assert step.learnt(Size(2e4, 9e4)) is None
-    assert step.row(Size(2e4, 9e4)) == {"area_cm2": 200.0, "volume_ml": 90.0}
 
 
 def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its_direction():

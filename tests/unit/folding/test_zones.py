@@ -7,13 +7,14 @@ from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.checks import refuse_impossible, zone_report, zone_warnings
-from gyriflow.folding.layers import PialSearch, cortical_weight
 from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from gyriflow.parameters.folding import NoGrowth, parameters_from
 from gyriflow.parameters.terms import (
     BRIDGE,
     CLAMPED,
+    CORE,
+    CORTEX,
     LEFT,
     LEFT_CONTACT,
     MEDIAL_WALL,
@@ -21,20 +22,13 @@ from gyriflow.parameters.terms import (
     RIGHT_CONTACT,
 )
 
-OPEN = {"contact": False}
-DEFAULTS = {"gap_mm": 2.5, "contact": True, "shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
-ELLIPSOID = NoGrowth(**{key: DEFAULTS[key] for key in ("shift", "semi_axes")})
+ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
 
-def find_zones(mesh, *, gap_mm, contact, grows_everywhere=False, fissure_x_mm, **given):
+def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
     """Returns the zones of a run by the settings that decide them."""
-    no_growth = {key: given.pop(key) for key in ("shift", "semi_axes")}
-    values = {
-        "contact": {"gap_mm": gap_mm, "kind": "planes" if contact else "none"},
-        "no_growth": no_growth | {"kind": "none" if grows_everywhere else "ellipsoid"},
-        "fissure_x_mm": fissure_x_mm,
-    }
-    return zones_of_run(mesh, parameters_from(RUN | values | given))
+    values = {"contact": {"gap_mm": gap_mm, "kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
+    return zones_of_run(mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given))
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +41,12 @@ def test_the_ellipsoid_stands_where_the_model_puts_it():
     centre = np.array([0.0, 0.05 * 40, -0.15 * 60])
     tips = centre + np.diag([0.35 * 20, 0.40 * 40, 0.50 * 60])
     points = np.concatenate([box, centre + 0.999 * (tips - centre), centre + 1.001 * (tips - centre)])
-    inside = inside_ellipsoid(points, ELLIPSOID, *brain_box(points))
+    inside = inside_ellipsoid(points, NoGrowth(**ELLIPSOID), *brain_box(points))
     assert inside.tolist() == [False, False, True, True, True, False, False, False]
 
 
 def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
-    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    zones = find_zones(brain)
     x = brain.vertices[zones.facets, 0]
     left, right = x[zones.facet_zone == LEFT_CONTACT], x[zones.facet_zone == RIGHT_CONTACT]
     assert len(left)
@@ -62,24 +56,24 @@ def test_contact_facets_lie_on_their_side_and_are_mirror_images(brain):
 
 
 def test_clamped_facets_lie_in_the_ellipsoid_and_outside_the_contact(brain):
-    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    zones = find_zones(brain)
     clamped = zones.vertices_of(CLAMPED)
     assert len(clamped)
-    assert inside_ellipsoid(brain.vertices, ELLIPSOID, *brain_box(brain.vertices))[clamped].all()
+    assert inside_ellipsoid(brain.vertices, NoGrowth(**ELLIPSOID), *brain_box(brain.vertices))[clamped].all()
     assert (zones.growth[clamped] == 0).all()
 
 
 def test_tissue_that_bridges_the_planes_does_not_grow():
     # a vertex between the planes under the pial surface: its elements are the bridge
     mesh = ellipsoid_mesh(6, (20.0, 26.0, 18.0))
-    zones = find_zones(mesh, fissure_x_mm=0.0, **(DEFAULTS | {"semi_axes": (0.01, 0.01, 0.01)}))
+    zones = find_zones(mesh, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
     top = np.argmax(mesh.vertices[:, 2])
     assert zones.growth[top] == 0
     assert zones.growth[np.argmax(mesh.vertices[:, 0])] == 1
 
 
 def test_the_report_adds_up(brain):
-    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS)
+    zones = find_zones(brain)
     report = zone_report(brain, zones, 3.0)
     assert sum(zone["facets"] for zone in report["zones"].values()) == len(zones.facets)
     assert report["initial_penetration_mm"] == 0
@@ -88,8 +82,7 @@ def test_the_report_adds_up(brain):
 
 def test_walls_between_the_planes_are_warned_of(brain):
     def warnings(gap_mm):
-        zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"gap_mm": gap_mm}))
-        return zone_warnings(zone_report(brain, zones, 8.0))
+        return zone_warnings(zone_report(brain, find_zones(brain, gap_mm), 8.0))
 
     assert warnings(2.5) == []
     assert "feels no contact" in warnings(20.0)[0]
@@ -97,7 +90,7 @@ def test_walls_between_the_planes_are_warned_of(brain):
 
 def test_the_sides_of_a_box_slide_in_their_planes():
     box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
-    zones = find_zones(box, fissure_x_mm=0.0, **(DEFAULTS | OPEN), support="box", grows_everywhere=True)
+    zones = find_zones(box, contact="none", support="box", no_growth={"kind": "none"})
     x, y, z = box.vertices.T
     low = z == -2.0
     np.testing.assert_array_equal(zones.fixed[:, 0], (np.abs(x) == 4.0) | low)
@@ -108,14 +101,14 @@ def test_the_sides_of_a_box_slide_in_their_planes():
 
 
 def test_a_free_brain_needs_no_clamps(brain):
-    zones = find_zones(brain, fissure_x_mm=0.0, **DEFAULTS, support="free")
+    zones = find_zones(brain, support="free")
     assert not zones.fixed.any()
     refuse_impossible(brain, zones)
 
 
 @pytest.mark.fault(26)
 def test_a_brain_without_clamped_facets_is_refused(brain):
-    zones = find_zones(brain, fissure_x_mm=0.0, **(DEFAULTS | {"semi_axes": (0.1, 0.1, 0.1)}))
+    zones = find_zones(brain, no_growth={"semi_axes": (0.1, 0.1, 0.1)})
     with pytest.raises(InputError, match="no facet is clamped"):
         refuse_impossible(brain, zones)
 
@@ -127,14 +120,14 @@ def test_a_floating_part_is_refused(brain):
         np.concatenate([brain.vertices, far.vertices + [0.0, 0.0, 24.0]]),
         np.concatenate([brain.tets, far.tets + len(brain.vertices)]),
     )
-    zones = find_zones(both, fissure_x_mm=0.0, **DEFAULTS)
+    zones = find_zones(both)
     with pytest.raises(MeshError, match="1 of 2 parts"):
         refuse_impossible(both, zones)
 
 
 def test_a_fissure_outside_the_brain_is_refused(brain):
     with pytest.raises(InputError, match="outside the brain"):
-        refuse_impossible(brain, find_zones(brain, fissure_x_mm=50.0, **DEFAULTS))
+        refuse_impossible(brain, find_zones(brain, fissure_x_mm=50.0))
 
 
 def half(side):
@@ -151,7 +144,7 @@ def half(side):
 def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
     mesh = half(side)
     fissure = 0.5 if side == "left" else -0.5
-    zones = find_zones(mesh, fissure_x_mm=fissure, **DEFAULTS, side=side)
+    zones = find_zones(mesh, fissure_x_mm=fissure, side=side)
     wall = zones.vertices_of(MEDIAL_WALL)
     inner = np.flatnonzero(np.abs(mesh.vertices[:, 0]) < 1e-6)
     assert np.isin(inner, wall).all()
@@ -168,7 +161,7 @@ def test_the_medial_wall_of_a_single_hemisphere_slides_in_its_plane(side):
 
 def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     mesh = half("right")
-    zones = find_zones(mesh, fissure_x_mm=-0.5, **DEFAULTS, side="right", support="free")
+    zones = find_zones(mesh, fissure_x_mm=-0.5, side="right", support="free")
     assert not zones.free
     x, y, z = mesh.vertices.T
     zero, one = np.zeros_like(x), np.ones_like(x)
@@ -180,16 +173,11 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
     refuse_impossible(mesh, zones)
 
 
-@pytest.fixture(scope="module")
-def tagged():
+def test_elements_are_left_right_or_between_the_planes():
     mesh = ellipsoid_mesh(12, SEMI_AXES)
-    zones = zones_of_run(mesh, parameters_from(RUN))
-    weight = cortical_weight(PialSearch(mesh.vertices, zones.facets).distance(mesh.vertices), 4.0)
-    return mesh, zones, cell_tags(mesh, zones, weight)
-
-
-def test_elements_are_left_right_or_between_the_planes(tagged):
-    mesh, _, tags = tagged
+    tags = cell_tags(mesh, zones_of_run(mesh, parameters_from(RUN)), (mesh.vertices[:, 1] > 0).astype(float))
+    assert set(tags["layer"][mesh.vertices[mesh.tets, 1].min(axis=1) > 0]) == {CORTEX}
+    assert set(tags["layer"][mesh.vertices[mesh.tets, 1].max(axis=1) <= 0]) == {CORE}
     x = mesh.vertices[mesh.tets, 0].mean(axis=1)
     # the planes stand a quarter of the gap to both sides
     np.testing.assert_array_equal(tags["hemisphere"] == LEFT, x <= -2.0)
