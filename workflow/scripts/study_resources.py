@@ -4,8 +4,7 @@ from gyriflow.io.figures import write_html
 from gyriflow.io.files import write_table
 from gyriflow.io.jobs import gather_messages, read_benchmarks
 from gyriflow.parameters.terms import run_names
-from gyriflow.report.resources import resources
-from gyriflow.report.tables import html_table
+from gyriflow.report.tables import html_table, resources
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

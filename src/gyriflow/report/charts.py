@@ -1,8 +1,15 @@
-"""Charts over the weeks: metrics of brains and of their regions, norms, and the spectra of folds."""
+"""Charts over the weeks: metrics of brains and of their regions, norms, and the spectra of folds.
+
+As in the other charts, `runs` are all runs of a study, which settle the colours, and `measured` is what measured brains
+are called.
+"""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, Literal
 
+import matplotlib as mpl
+import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -13,7 +20,7 @@ from matplotlib.transforms import Transform
 
 from ..errors import InputError
 from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES
-from .labels import METRICS, week_label, with_unit
+from .labels import METRICS, value_labels, with_unit
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
@@ -73,10 +80,6 @@ def metrics_chart(metrics: pd.DataFrame, *, runs: Sequence[str] = (), measured: 
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; InputError if the table has none of the metrics.
-    runs
-        All runs of the study, which settle the colours.
-    measured
-        What the measured brains are called.
     """
     metrics = runs_by_name(metrics)
     present, colours = _present(metrics, OVERVIEW), run_colours(metrics["run"], runs)
@@ -126,7 +129,6 @@ def norms_chart(
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
         Subjects that the curves go through.
-    runs, measured : as for `metrics_chart`
 
     InputError where none of the metrics is there.
     """
@@ -170,8 +172,6 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, measured: s
     ----------
     regions : columns subject, run, week, hemisphere, region, metric, value, unit
     asymmetry : columns subject, run, week, region, metric, asymmetry_index
-    measured
-        What the measured brains are called.
     """
     regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
     colours, present = region_colours(regions["region"]), _present(regions, OF_REGIONS)
@@ -243,55 +243,59 @@ def _sides_of(rows: pd.DataFrame) -> list[str]:
 
 
 @styled
-def spectra_chart(
-    spectra: pd.DataFrame,
+def influence_spectra(
+    members: Mapping[str, pd.DataFrame | None],
+    real: Sequence[pd.DataFrame],
     *,
+    values: Mapping[str, Mapping[str, Any]],
     week: float,
-    colours: Mapping[str, Any],
-    bands: Sequence[int] = FOLD_BANDS,
     measured: str = REAL_BRAIN,
 ) -> Figure:
-    """Draw the relative power of the bands at one week: runs as bars, measured brains as stars, a panel per side.
+    """Draw the relative power in B4 to B6 of the members of a study at one week beside the measured brain's.
 
+    Members are bars, from pale to dark in the order of their values, measured brains stars, a panel per hemisphere.
     Bars of bands that are cut off or not resolved by the surface are hatched, such stars open, and so are all where a
     band that they are shares of is cut off. A band without any power is said to be beyond the modes.
 
     Parameters
     ----------
-    spectra : columns subject, run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved
+    members : {run: columns subject, week, hemisphere, band, relative_power, complete, denominator_complete, resolved}
+        None for a member that has not come to the week.
+    real : the same of measured brains, where `run` is "real"
+    values : {run: {parameter: value}}
+        What is varied, in the order of the study.
     week
-        Week in GW; InputError if the table has no such band then.
-    colours : {run: colour}, in this order
-    measured
-        What the measured brains are called.
+        In GW.
     """
-    rows = _of_bands(spectra, bands)
+    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
+    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
+    colours = dict(zip(labels.values(), shades, strict=False))
+    rows = _of_bands(pd.concat([*simulated, *real]), FOLD_BANDS)
     rows = rows[(rows["week"] - week).abs() < 1e-6]
-    if rows.empty:
-        raise InputError(f"no spectrum at {week_label(week)}", found=sorted(set(spectra["week"])))
     sides = _sides_of(rows)
     figure, panels = panel_figure(len(sides), per_row=2, panel_in=2.3, sharey=True)
-    width = 0.8 / max(len(colours), 1)
+    width = 0.8 / len(colours)
     for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             of_run = side[side["run"] == run]
-            position = [bands.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
+            position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
             bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colour)
             for bar, trusted in zip(bars, of_run["trusted"], strict=True):
                 if not trusted:
                     bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
-        for _, real in side[side["run"] == MEASURED].iterrows():
-            centre = bands.index(real["band"])
-            axes.hlines(real["relative_power"], centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
-            face = REAL_COLOUR if real["trusted"] else "white"
-            axes.plot(centre, real["relative_power"], "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
-        for place, band in enumerate(bands):
+        for _, of_real in side[side["run"] == MEASURED].iterrows():
+            centre, power = FOLD_BANDS.index(of_real["band"]), of_real["relative_power"]
+            axes.hlines(power, centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
+            face = REAL_COLOUR if of_real["trusted"] else "white"
+            axes.plot(centre, power, "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
+        for place, band in enumerate(FOLD_BANDS):
             if not side.loc[side["band"] == band, "relative_power"].notna().any():
                 _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
-        axes.set_xticks(range(len(bands)), [f"B{band}\n{_FOLDS.get(band, '')}" for band in bands])
+        axes.set_xticks(range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS])
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
-        axes.set_xlim(-0.5, len(bands) - 0.5)
+        axes.set_xlim(-0.5, len(FOLD_BANDS) - 0.5)
         axes.set_title(f"{hemisphere} hemisphere")
     panels[0].set_ylabel("relative power")
     from_zero(panels[0])
@@ -308,8 +312,8 @@ def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), meas
 
     Parameters
     ----------
-    spectra : as for `spectra_chart`
-    runs, measured : as for `metrics_chart`
+    spectra
+        Columns subject, run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved.
     """
     with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
@@ -317,16 +321,22 @@ def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), meas
     sides, colours = _sides_of(rows), run_colours(rows["run"], runs)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
     figure, panels = panel_figure(len(sides) * len(bands), **layout)
-    places = [(hemisphere, band) for hemisphere in sides for band in bands]
-    for axes, (hemisphere, band) in zip(panels, places, strict=True):
+    for axes, (hemisphere, band) in zip(panels, product(sides, bands), strict=True):
         here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
-        _band_over_weeks(axes, here, colours)
+        for run in [*colours, MEASURED]:
+            series = here[here["run"] == run].sort_values("week")
+            colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
+            if run != MEASURED:
+                axes.plot(series["week"], series["relative_power"], color=colour)
+            for trusted, part in series.groupby("trusted"):
+                look: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": size}
+                axes.plot(part["week"], part["relative_power"], marker, color=colour, **look)
         week_axis(axes, rows["week"])
         if not here["relative_power"].notna().any():
             _beyond_the_modes(axes, 0.5, axes.transAxes)
             axes.set_yticks([])
         if hemisphere == sides[0]:
-            axes.set_title(f"B{band}, {_FOLDS[band]} folds" if band in _FOLDS else f"B{band}")
+            axes.set_title(f"B{band}, {_FOLDS[band]} folds")
         if hemisphere != sides[-1]:
             axes.set_xlabel("")
         if band == bands[0]:
@@ -335,15 +345,3 @@ def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), meas
         from_zero(axes)
     _spectra_legend(figure, rows, colours, measured, bars=False)
     return figure
-
-
-def _band_over_weeks(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:
-    for run in [*colours, MEASURED]:
-        series = rows[rows["run"] == run].sort_values("week")
-        colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
-        if run != MEASURED:
-            axes.plot(series["week"], series["relative_power"], color=colour)
-        for trusted, part in series.groupby("trusted"):
-            face = colour if trusted else "white"
-            look: dict[str, Any] = {"color": colour, "markerfacecolor": face, "markersize": size}
-            axes.plot(part["week"], part["relative_power"], marker, **look)

@@ -1,6 +1,6 @@
-"""Areas, volumes and growth rates of series of brains as a chart."""
+"""Charts of growth: areas, volumes and rates of series of brains, and how far the tissue of runs moves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from typing import Any
 
@@ -8,12 +8,17 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from .style import (
+    MUTED_COLOUR,
     REAL_BRAIN,
     RUN_COLOURS,
     from_zero,
     panel_figure,
+    run_colours,
+    run_legend,
+    runs_by_name,
     styled,
     week_axis,
     wrap,
@@ -21,6 +26,17 @@ from .style import (
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series; the one left out is the folding's."""
+_MARKERS = {"FetalFoldSim": "s", "Wang et al. 2021": "^"}
+PUBLISHED = pd.DataFrame(
+    {
+        "run": np.repeat(list(_MARKERS), 4),
+        "from_week": [21.0, 22, 23, 24] * 2,
+        "to_week": [22.0, 23, 24, 25] * 2,
+        "max_mm": [2.51, 2.22, 2.37, 2.57, 1.24, 2.29, 3.65, 5.79],
+        "mean_mm": [0.42, 0.40, 0.38, 0.40, 0.45, 0.88, 1.91, 3.03],
+    }
+)
+"""Weekly displacement norms in mm: the FetalFoldSim paper's simulation (all nodes) and its quotation of real brains."""
 
 
 @styled
@@ -117,3 +133,39 @@ def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[f
     shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
     places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
     axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)
+
+
+@styled
+def displacement_chart(displacement: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+    """Draw the maximal and the mean displacement norm of all nodes, as in the paper, per week.
+
+    Norms between output weeks that lie further apart are divided by the weeks between them. Runs are lines, published
+    values grey.
+
+    Parameters
+    ----------
+    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
+    """
+    named = runs_by_name(displacement)
+    rows = pd.concat([PUBLISHED, named[named["nodes"] == "all"]])
+    rows["middle"], span = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
+    colours = run_colours(named["run"], runs)
+    figure, panels = panel_figure(2, per_row=2)
+    for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
+        per_week = rows.assign(per_week=rows[column] / span).sort_values("middle")
+        for run, line in per_week.groupby("run", sort=False):
+            look: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
+            if run in _MARKERS:
+                look |= {"marker": _MARKERS[str(run)], "linestyle": "--"}
+            axes.plot(line["middle"], line["per_week"], label=run, **look)
+        axes.set_title(f"{label} displacement, all nodes")
+        axes.set_ylabel("displacement (mm per week)")
+        from_zero(axes)
+        week_axis(axes, [*rows["from_week"], *rows["to_week"]])
+        axes.set_xlabel("gestational age (GW), middle of the interval")
+    extra = [
+        Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
+        for source, marker in _MARKERS.items()
+    ]
+    run_legend(figure, colours, extra=extra)
+    return figure

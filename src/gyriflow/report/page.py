@@ -13,9 +13,8 @@ from docutils.core import publish_parts
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from ..parameters.terms import run_names
+from ..parameters.terms import ELEMENTS_NEEDED, run_names
 from .labels import plain, week_label
-from .solve import resolution_verdict
 from .tables import html_table
 
 FILE, COMMAND = "(file)", "(command)"
@@ -225,6 +224,26 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     if run.get("initial_penetration_mm", 0.0) > DEEP_MM:
         words.append(f"walls of the fissure begin {run['initial_penetration_mm']:.2g} mm beyond their planes")
     return "; ".join(words)
+
+
+def resolution_verdict(run: Mapping[str, Any] | pd.Series) -> str:
+    """Return what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not.
+
+    Parameters
+    ----------
+    run : elements_through_cortex (before the first step), and what `resolution_over_steps` returns
+    """
+    needed = ELEMENTS_NEEDED[int(run["order"])]
+    at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
+    if not at_start >= needed:  # not a number: no element lies in the cortex
+        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds are the mesh's"
+    if pd.isna(week):
+        return ""
+    return (
+        f"cortex not resolved from {week_label(round(week, 2))} on "
+        f"(down to {run['least_elements_through_cortex']:.3g} elements through it, {needed:g} needed): "
+        "folds may be the mesh's from then on"
+    )
 
 
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:

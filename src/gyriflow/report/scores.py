@@ -1,10 +1,9 @@
 """Charts of what simulations are worth beside real brains: gain, horizon, onset of sulci, studies, calibrations."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -15,12 +14,10 @@ from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
 from ..parameters.terms import MEASURED, SIDES
-from .charts import spectra_chart
-from .labels import MEASURES, SIMPLER_WAYS, parameter_label, plain, value_labels, with_unit
+from .labels import MEASURES, SIMPLER_WAYS, parameter_label, plain, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
-    REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
     add_letters,
@@ -60,8 +57,6 @@ def validation_chart(
         `labels.MEASURES`.
     ceiling
         The same of the start carried by registration.
-    runs
-        All runs of the study, which settle the colours.
     """
     colours = run_colours(validation["run"], runs)
     figure, panels = panel_figure(len(MEASURES), per_row=2, panel_in=2.5)
@@ -110,8 +105,6 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
     ----------
     prediction
         Columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm.
-    runs
-        All runs of the study, which settle the colours.
     """
     columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
     places = list(product(dict.fromkeys(prediction["start"]), columns))
@@ -150,8 +143,6 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     ----------
     onset
         Columns run ("real" for the real brains), subject, region, there_at_start, onset_week.
-    runs
-        All runs of the study, which settle the colours.
     """
     several = len(onset["subject"].unique()) > 1
     table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
@@ -185,36 +176,6 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     axes.grid(visible=True, axis="both")
     run_legend(figure, colours, measured="real brains")
     return figure
-
-
-@styled
-def influence_spectra(
-    members: Mapping[str, pd.DataFrame | None],
-    real: Sequence[pd.DataFrame],
-    *,
-    values: Mapping[str, Mapping[str, Any]],
-    week: float,
-    measured: str = REAL_BRAIN,
-) -> Figure:
-    """Draw the relative power in B4 to B6 of the members of a study at one week, beside the measured brain's.
-
-    Colours go from pale to dark in the order of the values.
-
-    Parameters
-    ----------
-    members : {run: table as for `spectra_chart`}
-        None for a member that has not come to the week.
-    real : tables as for `spectra_chart`
-    values : {run: {parameter: value}}
-        What is varied, in the order of the study.
-    measured
-        What the measured brains are called.
-    """
-    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
-    simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
-    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
-    colours = dict(zip(labels.values(), shades, strict=False))
-    return spectra_chart(pd.concat([*simulated, *real]), week=week, colours=colours, measured=measured)
 
 
 @styled

@@ -9,11 +9,12 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
-from ..parameters.terms import MEASURED
+from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED
 from .charts import WITH_NORMS
 from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
 from .style import REAL_BRAIN, run_colours, runs_by_name
 
+SECONDS_PER_HOUR = 3600
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?|–")
@@ -163,6 +164,56 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     differs = shown.ne(shown.iloc[:, 0], axis=0).any(axis=1) & ~shown.isin(["–", "0", "no"]).all(axis=1)
     chosen = [*shown.index[differs], *(name for name in OF_EVERY_RUN if name in shown.index and not differs[name])]
     return shown.loc[chosen].rename(index=parameter_label).rename_axis("parameter")
+
+
+def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
+    """Return how well the steps of a run resolved the cortex, as the table of runs has it.
+
+    Parameters
+    ----------
+    order
+        Of the elements.
+    steps : columns week, elements_through_cortex
+        One row per step; no number where no element has its centre in the cortex, which counts as none.
+
+    Returns
+    -------
+    dict
+        `order`, `least_elements_through_cortex`, and `unresolved_from_week`, the first week with fewer elements than
+        `ELEMENTS_NEEDED` (NaN: there is none).
+    """
+    through = steps["elements_through_cortex"].fillna(0.0)
+    return {
+        "order": order,
+        "least_elements_through_cortex": float(through.min()),
+        "unresolved_from_week": float(steps.loc[through < ELEMENTS_NEEDED[order], "week"].min()),
+    }
+
+
+def resources(jobs: pd.DataFrame) -> pd.DataFrame:
+    """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
+
+    A job keeps one core busy at least, so its energy is the longer of wall and CPU time times the power of a core.
+
+    Parameters
+    ----------
+    jobs : columns rule, run, wall_s, cpu_s, memory_MiB
+        NaN where Snakemake could not measure; such jobs are counted and add nothing.
+
+    Returns
+    -------
+    DataFrame with columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh,
+    co2e_g
+    """
+    hours = jobs[["wall_s", "cpu_s"]].astype(float) / SECONDS_PER_HOUR
+    each = jobs.assign(hours=hours["wall_s"], core_hours=hours.max(axis=1), run=jobs["run"].fillna(""), jobs=1)
+    of_all = {"jobs": "sum", "hours": "sum", "core_hours": "sum", "memory_MiB": "max"}
+    stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(of_all)
+    stages = stages.rename(columns={"rule": "stage"}).sort_values("core_hours", ascending=False, kind="stable")
+    whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(of_all)}])
+    table = pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
+    table["energy_Wh"] = CORE_POWER_W * table["core_hours"]
+    return table.assign(co2e_g=CARBON_INTENSITY_G_PER_KWH / 1000 * table["energy_Wh"])
 
 
 def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:

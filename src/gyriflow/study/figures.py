@@ -211,7 +211,7 @@ def _of_folding(study: Study) -> Iterator[Figure]:
     yield Figure("study_runs", f"{STUDY}/runs.html", target="metrics")
     table, named = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
     path = f"{OF_STUDY}/displacement.png"
-    yield Figure("displacement_figure", path, "solve.displacement_chart", table, named, paper=True)
+    yield Figure("displacement_figure", path, "growth.displacement_chart", table, named, paper=True)
 
 
 def _of_run(one: Simulation, *, first_with_zones: bool) -> Iterator[Figure]:
@@ -334,7 +334,7 @@ def _of_comparison(study: Study, comparison: Comparison) -> Iterator[Figure]:
     }
     options = {**options, "week": week}
     path = f"{OF_COMPARISON}/spectra.png"
-    yield Figure("influence_spectra", path, "scores.influence_spectra", inputs, options, may_end=may_end, **shared)
+    yield Figure("influence_spectra", path, "charts.influence_spectra", inputs, options, may_end=may_end, **shared)
     vary = study.config.studies[comparison.name].vary
     if len(vary) == 1 and real and all(isinstance(value, int | float) for value in next(iter(vary.values()))):
         inputs = {table: f"{STUDY}/{comparison.name}/{table}.csv" for table in ("comparison", "nearest")}

@@ -11,7 +11,7 @@ from pictures import words
 
 from gyriflow.errors import InputError
 from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
-from gyriflow.report.charts import metrics_chart, norms_chart, regions_chart, spectra_chart, spectra_weeks_chart
+from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
 from gyriflow.report.pictures import region_colours
 from gyriflow.report.tables import centiles_table
 
@@ -50,7 +50,10 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
     ]
 
 
-BLUE = {"thin": "#0072B2"}
+def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
+    """Draws the spectra of a study with one member at 28 GW."""
+    values = {"thin": {"thickness_mm": 1.5}}
+    return influence_spectra({"thin": pd.concat(members)}, real, values=values, week=28.0)
 
 
 def test_metrics_of_runs_are_lines_and_measured_ones_stars():
@@ -76,17 +79,16 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
     assert {"thin", "real brain", "left hemisphere", "right hemisphere"} <= words(figure)
 
 
-def test_a_table_without_metrics_or_spectra_is_refused():
+def test_a_table_without_metrics_is_refused():
     with pytest.raises(InputError, match=r"no metric to draw.*spam"):
         metrics_chart(metric_rows("thin", "whole", "spam", {21.0: 1.0}, ""))
-    with pytest.raises(InputError, match=r"no spectrum at 30 GW; found \[28.0\]"):
-        spectra_chart(pd.concat(spectrum_rows("thin", 28.0, {4: 0.2})), week=30.0, colours=BLUE)
 
 
 def test_spectra_bars_are_the_relative_powers_of_each_side():
-    rows = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15})]
-    spectra = pd.concat([*rows, *spectrum_rows("thin", 27.0, {4: 0.9})])
-    left, right = spectra_chart(spectra, week=28.0, colours=BLUE).axes
+    thin = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("thin", 27.0, {4: 0.9})]
+    figure = study_of(thin, spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15}))
+    assert {"1.5 mm", "real brain"} <= words(figure)
+    left, right = figure.axes
     assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
     assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
     assert [line.get_xydata()[0].tolist() for line in left.lines] == [[0, 0.25], [1, 0.15]]
@@ -103,13 +105,15 @@ def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
 
 @pytest.mark.parametrize(("run", "shown"), [("thin", (True, False)), ("real", (False, True))])
 def test_bands_that_are_cut_off_are_marked_and_keyed(run, shown):
-    good = [*spectrum_rows("thin", 28.0, {4: 0.2}), *spectrum_rows("real", 28.0, {4: 0.2})]
-    spectra = pd.concat([*good, *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)])
+    good = {name: spectrum_rows(name, 28.0, {4: 0.2}) for name in ("thin", "real")}
+    cut = good | {run: [*good[run], *spectrum_rows(run, 28.0, {5: 0.1}, complete=False)]}
     # written as B5 too
-    figure = spectra_chart(spectra.assign(band="B" + spectra["band"].astype(str)), week=28.0, colours=BLUE)
+    thin, real = ([table.assign(band="B" + table["band"].astype(str)) for table in cut[name]] for name in good)
+    figure = study_of(thin, real)
     assert hatches_and_open_stars(figure) == shown
     assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, True][: 1 + shown[0]]
-    assert hatches_and_open_stars(spectra_chart(pd.concat(good), week=28.0, colours=BLUE)) == (False, False)
+    assert hatches_and_open_stars(study_of(*good.values())) == (False, False)
+    spectra = pd.concat([*cut["thin"], *cut["real"]])
     assert hatches_and_open_stars(spectra_weeks_chart(spectra)) == (False, run == "real")
 
 

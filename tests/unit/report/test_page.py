@@ -19,8 +19,7 @@ from gyriflow.report.page import (
     sections,
     shown_figures,
 )
-from gyriflow.report.solve import resolution_over_steps
-from gyriflow.report.tables import html_table
+from gyriflow.report.tables import html_table, resolution_over_steps
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
 BRAINS = [

@@ -1,12 +1,11 @@
-"""Charts and tables of growth and of the solve hold what their tables say."""
+"""Charts of growth and displacement hold what their tables say."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from pictures import words
 
-from gyriflow.report.growth import growth_chart
-from gyriflow.report.solve import displacement_chart
+from gyriflow.report.growth import displacement_chart, growth_chart
 
 AREAS = pd.DataFrame(
     {"series": "volume", "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
