@@ -7,7 +7,6 @@ rule quality_page:
         pdf=f"{BRAIN}/figures/quality.pdf",
         row=f"{BRAIN}/quality.json",
     params:
-        week=from_brain("week"),
         white_files=from_brain("given.white_files"),
         affine_from=from_brain("given.affine_from"),
         labels=lambda w: study.quality_labels(w.brain),

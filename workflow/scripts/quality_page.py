@@ -9,7 +9,7 @@ from gyriflow.io.jobs import read_messages
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_label_volume, read_volume_map
 from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.report.quality import Brain, facts, quality_page, quality_row, tissue_groups
+from gyriflow.report.quality import Brain, quality_page, quality_row, tissue_groups
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -24,16 +24,12 @@ with step(snakemake.log[0]):
         tissues = tissue_groups(labels.labels, LabelScheme(**params.scheme)), pose.world @ labels.affine
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
-    white = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
+    whites = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
+    white = merged(*whites.values()) if whites else None
     said = [message for log in params.logs for message in read_messages(log)]
     warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
-    brain = Brain(
-        surface, report["fissure_x_mm"], thickness, merged(*white.values()) if white else None, image, tissues
-    )
-    title = f"{snakemake.wildcards.brain}, {params.week:g} GW"
-    shown = {"title": title, "verdict": row["verdict"], "facts": facts(row), "warnings": warnings}
-    figure = quality_page(brain, **shown)
-    write_figure(output.png, output.pdf, figure, dpi=params.dpi)
+    brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
+    write_figure(output.png, output.pdf, quality_page(brain, row, warnings), dpi=params.dpi)
     write_json(output.row, row)

@@ -1,7 +1,7 @@
 """Pictures of surfaces side by side at one scale, with views, scale bar and colour bar."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from string import ascii_lowercase
 from typing import Any
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
-from .scene import PIXELS_PER_INCH, TISSUE, Material, View, half_extents, picture_axes, render, sees
+from .scene import PIXELS_PER_INCH, TISSUE, View, half_extents, picture_axes, render, sees
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
@@ -39,7 +39,7 @@ class Panel:
     ----------
     mesh, colours : the part that is seen, and its (n, 3) or (m, 3) colours
     caption : what stands below
-    material : how it takes the light
+    light : `TISSUE` or `MAP` of the scene
     mark : (3,) a point of the surface around which a ring is drawn, dotted where it lies on the side turned away
     lines : (k, 2, 3) ends of lines that are drawn on it
     """
@@ -48,7 +48,7 @@ class Panel:
     colours: Floats
     view: View
     caption: str = ""
-    material: Material = TISSUE
+    light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
     mark: Floats | None = None
     lines: Floats | None = None
 
@@ -79,19 +79,6 @@ def round_length(limit_mm: float) -> float:
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= limit_mm * (1 + 1e-9)))
 
 
-def _blocks(columns: int) -> list[slice]:
-    """Cut the columns into blocks of as equal numbers as possible, to stand below each other."""
-    size = -(-columns // -(-columns // MOST_COLUMNS))
-    return [slice(start, start + size) for start in range(0, columns, size)]
-
-
-def _half_widths_mm(rows: Sequence[Row]) -> Floats:
-    """Return half of what each column shows in mm: its widest brain and a margin."""
-    columns = zip(*(row.panels for row in rows), strict=True)
-    halves = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns]
-    return _MARGIN * np.maximum(halves, _NARROWEST * max(halves))
-
-
 def panel_grid(
     columns: Sequence[str],
     rows: Sequence[Row],
@@ -112,7 +99,13 @@ def panel_grid(
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     shown = [panel for row in rows for panel in row.panels if panel is not None]
-    halves, blocks = _half_widths_mm(rows), _blocks(len(columns))
+    # half of what each column shows in mm: its widest brain and a margin
+    of_columns = zip(*(row.panels for row in rows), strict=True)
+    widest = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in of_columns]
+    halves = _MARGIN * np.maximum(widest, _NARROWEST * max(widest))
+    # blocks of columns, of as equal numbers as possible, stand below each other
+    size = -(-len(columns) // -(-len(columns) // MOST_COLUMNS))
+    blocks = [slice(start, start + size) for start in range(0, len(columns), size)]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     most_mm = max(2 * halves[block].sum() for block in blocks)
@@ -127,24 +120,23 @@ def panel_grid(
 
     # a letter of a column's heading is about 0.055 in wide
     columns = [wrap(column, int(panel / 0.055)) for column, panel in zip(columns, panels, strict=True)]
-    head_in, caption_line_in = _dots(0.1), 0.13
+    head_in = _dots(0.1)
     block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
-    heights = [[_dots(_row_height_in(row, block, layout)) for row in rows] for block in blocks]
-    captions = [[_dots(caption_line_in * _caption_lines(row, block)) for row in rows] for block in blocks]
+    heights = [[_heights_in(row, block, inches_per_mm) for row in rows] for block in blocks]
     total = head_in + layout.foot + len(blocks) * block_head_in
-    total += sum(map(sum, heights)) + sum(map(sum, captions))
+    total += sum(height + caption for of_block in heights for height, caption in of_block)
 
     figure = Figure(figsize=(width, total))
     top = total - head_in
     letters = iter(ascii_lowercase)
-    for number, block in enumerate(blocks):
+    for block, of_block in zip(blocks, heights, strict=True):
         left = left_in
         for head, panel in zip(columns[block], panels[block], strict=True):
             x, y = (left + panel / 2) / width, (top - block_head_in / 2) / total
             figure.text(x, y, head, ha="center", va="center", fontsize=7)
             left += panel
         top -= block_head_in
-        for row, height, caption in zip(rows, heights[number], captions[number], strict=True):
+        for row, (height, caption) in zip(rows, of_block, strict=True):
             marks = 1 if len(rows) > 1 else len(row.panels[block]) if len(columns) > 1 else 0
             marked = list(islice(letters, marks))
             _draw_row(figure, row, block, layout, marked, bottom=top - height, height=height)
@@ -158,20 +150,18 @@ def panel_grid(
         bar.ax.tick_params(pad=1, length=2)
         bar.outline.set_linewidth(0.5)
     if legend:
-        place_of_legend: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.0), "borderaxespad": 0.2}
-        figure.legend(handles=legend, ncols=legend_columns, **place_of_legend)
+        figure.legend(handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2)
     return figure
 
 
-def _row_height_in(row: Row, block: slice, layout: _Layout) -> float:
-    halves = [half_extents(panel.mesh, panel.view)[1] for panel in row.panels[block] if panel is not None]
+def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
+    """Return the heights of a row's pictures and of what stands below them."""
+    panels = [panel for panel in row.panels[block] if panel is not None]
+    tallest = max((half_extents(panel.mesh, panel.view)[1] for panel in panels), default=0.0)
     # the label is written along the height
-    least = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
-    return max(2 * _MARGIN * max(halves, default=0.0) * layout.inches_per_mm, least)
-
-
-def _caption_lines(row: Row, block: slice) -> int:
-    return max((len(panel.caption.splitlines()) for panel in row.panels[block] if panel is not None), default=0)
+    label = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
+    lines = max((len(panel.caption.splitlines()) for panel in panels), default=0)
+    return _dots(max(2 * _MARGIN * tallest * inches_per_mm, label)), _dots(0.13 * lines)
 
 
 def _dots(inches: float) -> float:
@@ -205,16 +195,8 @@ def _draw_row(
         if panel is None:
             axes.text(0.5, 0.5, row.absent, transform=axes.transAxes, ha="center", va="center", fontsize=6.5)
             continue
-        image = render(
-            panel.mesh,
-            panel.colours,
-            panel.view,
-            half_width_mm=half_width,
-            half_height_mm=half_height,
-            pixels_per_mm=PIXELS_PER_INCH * layout.inches_per_mm,
-            material=panel.material,
-            lines=panel.lines,
-        )
+        size = (half_width, half_height), PIXELS_PER_INCH * layout.inches_per_mm
+        image = render(panel.mesh, panel.colours, panel.view, *size, light=panel.light, lines=panel.lines)
         axes.imshow(image, extent=(-half_width, half_width, -half_height, half_height), aspect="auto")
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):

@@ -92,9 +92,8 @@ def _ordered(*groups: Mapping) -> list:
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
 
 
-def _plain_panels(meshes: Mapping[Any, TriangleMesh], keys: Sequence, colour: str, view: View) -> list[Panel | None]:
-    """Return a panel of one colour for each key, None for those that lack a surface."""
-    return [Panel(meshes[key], uniform_colours(meshes[key], colour), view) if key in meshes else None for key in keys]
+def _plain_panel(mesh: TriangleMesh | None, colour: str, view: View) -> Panel | None:
+    return None if mesh is None else Panel(mesh, uniform_colours(mesh, colour), view)
 
 
 def _side_by_side(
@@ -129,15 +128,13 @@ def runs_by_week(
         A week that one of them lacks leaves its place empty.
     deviations : {week: (surface, maps)}
         Of which `labels.DISTANCE` is shown below.
-    measured
-        What the measured brains are called.
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
     if real:
         groups[measured] = (real, REAL_SURFACE_COLOUR)
     keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), [VIEWS[name] for name in views]
     panels = {
-        name: {view: _plain_panels(meshes, keys, colour, view) for view in seen}
+        name: {view: [_plain_panel(meshes.get(key), colour, view) for key in keys] for view in seen}
         for name, (meshes, colour) in groups.items()
     }
     bar = None
@@ -151,7 +148,7 @@ def runs_by_week(
 
 @styled
 def displacement_maps(
-    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]], *, views: Sequence[str] = SIDE_VIEWS
+    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]],
 ) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
@@ -163,25 +160,23 @@ def displacement_maps(
     ----------
     displacements : {run: {(from_week, to_week): (surface, norms in mm)}}
     """
-    keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in views]
-    scale = magnitude_scale(
-        np.concatenate([n for maps in displacements.values() for _, n in maps.values()]), MAGNITUDES
-    )
-    panels: dict[str, dict[View, list[Panel | None]]] = {}
-    for run, maps in displacements.items():
-        panels[run] = {view: [] for view in seen}
-        for key in keys:
-            if key not in maps:
-                for view in seen:
-                    panels[run][view].append(None)
-                continue
-            mesh, norms = maps[key]
-            place = mesh.vertices[int(np.nanargmax(norms))]
-            where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
-            words = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
-            for view in seen:
-                caption = words if view == seen[0] else ""
-                panels[run][view].append(Panel(mesh, paint(norms, scale), view, caption, MAP, place))
+    keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in SIDE_VIEWS]
+    every = np.concatenate([norms for maps in displacements.values() for _, norms in maps.values()])
+    scale = magnitude_scale(every, MAGNITUDES)
+
+    def panel(shown: SurfaceMap | None, view: View) -> Panel | None:
+        if shown is None:
+            return None
+        mesh, norms = shown
+        place = mesh.vertices[int(np.nanargmax(norms))]
+        where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
+        words = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
+        return Panel(mesh, paint(norms, scale), view, words if view == seen[0] else "", MAP, place)
+
+    panels = {
+        run: {view: [panel(maps.get(key), view) for key in keys] for view in seen}
+        for run, maps in displacements.items()
+    }
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
 
 
@@ -235,21 +230,20 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
     return merged(*(mesh for mesh, _ in halves)) if len(halves) > 1 else halves[0][0], values
 
 
+def _map_of(halves: Halves, quantity: str) -> SurfaceMap:
+    mesh, maps = whole_maps(halves, [quantity])
+    return mesh, maps[quantity]
+
+
 def shape_maps(
     brains: Mapping[str, Mapping[float, Halves]], *, quantity: str, views: Sequence[str] = SIDE_VIEWS
 ) -> Figure:
-    """Draw `scalar_maps` of a measure of the hemispheres; thickness is not known of every brain.
-
-    Parameters
-    ----------
-    brains : {group: {week: hemispheres}}
-        Groups without any are left out.
-    """
-    maps: dict[str, dict[float, SurfaceMap]] = {}
-    for group, weeks in brains.items():
-        for week, halves in weeks.items():
-            mesh, values = whole_maps(halves, [quantity])
-            maps.setdefault(group, {})[week] = mesh, values[quantity]
+    """Draw `scalar_maps` of a measure of the hemispheres, {group: {week: hemispheres}}, without groups of no brain."""
+    maps = {
+        group: {week: _map_of(halves, quantity) for week, halves in weeks.items()}
+        for group, weeks in brains.items()
+        if weeks
+    }
     return scalar_maps(maps, quantity=quantity, views=views)
 
 
@@ -295,7 +289,7 @@ def _map_panel(
         return None
     mesh, values = shown
     lines = None if directions is None else direction_lines(mesh, directions, view)
-    return Panel(mesh, paint(values, scale), view, material=MAP, lines=lines)
+    return Panel(mesh, paint(values, scale), view, light=MAP, lines=lines)
 
 
 def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
@@ -319,7 +313,6 @@ def influence_picture(
     *,
     values: Mapping[str, Mapping[str, Any]],
     measured: str = REAL_BRAIN,
-    views: Sequence[str] = SIDE_VIEWS,
 ) -> Figure:
     """Draw the surfaces of the members of a study at one week above their maps of the shape index on one scale.
 
@@ -334,25 +327,17 @@ def influence_picture(
     """
     quantity = "shape_index"
     headings = dict(zip(values, value_labels(list(values.values())), strict=True))
-    brains = {headings[run]: halves for run, halves in members.items()}
-    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR)
-    if real:
-        brains[measured], colours[measured] = real, REAL_SURFACE_COLOUR
-    maps: dict[str, SurfaceMap | None] = dict.fromkeys(brains)
-    for name, halves in brains.items():
-        if halves:
-            mesh, of_mesh = whole_maps(halves, [quantity])
-            maps[name] = mesh, of_mesh[quantity]
-    scale = scale_of(quantity, np.empty(0))
-    seen, rows = [VIEWS[name] for name in views], []
+    brains = {headings[run]: halves for run, halves in members.items()} | ({measured: real} if real else {})
+    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR) | {measured: REAL_SURFACE_COLOUR}
+    maps = {name: _map_of(halves, quantity) if halves else None for name, halves in brains.items()}
+    scale, seen = scale_of(quantity, np.empty(0)), [VIEWS[name] for name in SIDE_VIEWS]
+    rows = []
     for view in seen:
-        panels = [
-            shown and Panel(shown[0], uniform_colours(shown[0], colours[name]), view) for name, shown in maps.items()
-        ]
-        rows.append(Row(f"{view.name} view", panels, absent=ABSENT))
+        panels = [_plain_panel(shown and shown[0], colours[name], view) for name, shown in maps.items()]
+        rows.append(Row(f"{view.name} view", panels, ABSENT))
     for view in seen:
         panels = [_map_panel(shown, scale, view, quantity) for shown in maps.values()]
-        rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, absent=ABSENT))
+        rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
     return panel_grid(list(brains), rows, colour_bar=(scale, MAPS[quantity]))
 
 
@@ -373,8 +358,6 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 @styled
 def regions_picture(
     brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]],
-    *,
-    views: Sequence[str] = ROUND_VIEWS,
 ) -> Figure:
     """Draw brains coloured by region, a column per brain and a row per view, with the regions' names.
 
@@ -399,15 +382,13 @@ def regions_picture(
         legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     rows = [
         Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
-        for view in map(VIEWS.__getitem__, views)
+        for view in map(VIEWS.__getitem__, ROUND_VIEWS)
     ]
     return panel_grid(list(painted), rows, legend=legend)
 
 
 @styled
-def zones_picture(
-    mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_mm: float, views: Sequence[str] = MEDIAL_VIEWS
-) -> Figure:
+def zones_picture(mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_mm: float) -> Figure:
     """Draw the zones of the brain's boundary from several sides, with their areas.
 
     Parameters
@@ -424,8 +405,8 @@ def zones_picture(
         if areas[code]:
             legend.append(Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²"))
     panels = [
-        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, material=MAP)
-        for view in map(VIEWS.__getitem__, views)
+        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, light=MAP)
+        for view in map(VIEWS.__getitem__, MEDIAL_VIEWS)
     ]
     # a brain of one hemisphere has no medial view of the other
     panels = [panel for panel in panels if len(panel.mesh.faces)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,11 +20,10 @@ from ..geometry.triangles import Floats, TriangleMesh
 from ..parameters.measures import SHAPE_MEASURES
 from ..parameters.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
-from .sections import PLANES, SCALE_BAR_MM, Extent, draw_image, draw_outline, plane_grid
-from .style import FULL_WIDTH_IN, REAL_SURFACE_COLOUR, new_figure, styled, wrap
+from .sections import PLANES, SCALE_BAR_MM, draw_outline
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure, styled, wrap
 
-Verdict = Literal["fine", "look"]
-VERDICTS: Mapping[Verdict, tuple[str, str]] = {"fine": ("No warnings.", "#009E73"), "look": ("Look at:", "#E69F00")}
+VERDICTS = {"fine": ("No warnings.", "#009E73"), "look": ("Look at:", "#E69F00")}
 """What stands above the warnings of a page, and the colour of the verdict."""
 TISSUES = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
 """Groups of labels as they are coloured, in place of an image."""
@@ -39,6 +38,10 @@ MOST_LINES, LINE_LETTERS = 8, 138
 # in inches
 ROWS_IN, HEAD_IN, LINE_IN = (2.4, 1.42, 1.42), 0.9, 0.13
 PIXELS_PER_INCH = 200
+MARGIN_MM, PIXEL_MM = 8.0, 0.25
+"""Of planes, beyond the surface and between the dots."""
+# grey values up to this quantile of those above zero are told apart
+_BRIGHTEST = 0.995
 
 COLUMNS = (
     *("subject", "week", "population", "source", "sides", "verdict", "cause", "warning_count", "warnings"),
@@ -55,17 +58,13 @@ class Brain:
 
     Attributes
     ----------
-    pial
-        The whole surface, in RAS+ mm.
-    fissure_x_mm
-        Where the medial views part the hemispheres.
-    thickness_mm : (n,) float or None
-        At the vertices of the surface, NaN where it was not measured.
-    white
-        The white surface, in the same coordinates, if it is given.
+    pial : the whole surface, in RAS+ mm
+    fissure_x_mm : where the medial views part the hemispheres
+    thickness_mm : (n,) at the vertices of the surface, NaN where it was not measured
+    white : the white surface, in the same coordinates
     image, tissues
-        The (i, j, k) grey values and groups of labels (`TISSUES`) behind the outlines, as far as they are there, each
-        with the (4, 4) affine from voxel index to the surface's coordinates.
+        The (i, j, k) grey values and groups of labels (`TISSUES`), each with the (4, 4) affine from voxel index to the
+        surface's coordinates.
     """
 
     pial: TriangleMesh
@@ -86,24 +85,27 @@ def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
 
 
 @styled
-def quality_page(
-    brain: Brain, *, title: str, verdict: Verdict, facts: Mapping[str, str], warnings: Sequence[str]
-) -> Figure:
+def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) -> Figure:
     """Draw the page of a brain: three planes, the surface in four views, thickness in four views, and its warnings.
 
     The image lies behind the outlines where there is one, else the labels. A page ends below its last warning.
+
+    Parameters
+    ----------
+    row : what `quality_row` returns
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], "• … more in quality.csv"]
     figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
-    heading, colour = VERDICTS[verdict]
+    heading, colour = VERDICTS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
-    words = wrap("   ".join(f"{name}: {value}" for name, value in facts.items()), LINE_LETTERS)
+    words = wrap("   ".join(f"{name}: {value}" for name, value in _facts(row).items()), LINE_LETTERS)
+    title = f"{row['subject']}, {row['week']:g} GW"
     figure.suptitle(title, x=0.015, ha="left", fontsize=10, fontweight="bold")
     box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"}
     place: dict[str, Any] = {"ha": "right", "va": "top", "fontsize": 10, "fontweight": "bold"}
-    figure.text(0.985, 0.985, verdict.upper(), color="white", bbox=box, **place)
+    figure.text(0.985, 0.985, row["verdict"].upper(), color="white", bbox=box, **place)
     figure.supxlabel("\n".join([heading, *lines]), **left)
     rows: Any = figure.subfigures(3, 1, height_ratios=ROWS_IN)
     planes, views, thickness = rows
@@ -118,8 +120,8 @@ def quality_page(
         panels = _draw_views(thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS)
         unknown = "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
         thickness.colorbar(scale, ax=panels).set_label(f"thickness (mm){unknown}", fontsize=6.5)
-    for letter, row in zip("abc", rows, strict=True):
-        row.text(0.015, 0.85 if row is planes else 1.0, letter, ha="left", va="top", fontsize=9, fontweight="bold")
+    for letter, part in zip("abc", rows, strict=True):
+        part.text(0.015, 0.85 if part is planes else 1.0, letter, ha="left", va="top", fontsize=9, fontweight="bold")
     return figure
 
 
@@ -130,28 +132,44 @@ def _draw_planes(figure: SubFigure, brain: Brain) -> None:
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {"coronal": middle[1], "axial": middle[2], "sagittal": (fissure + outer) / 2}
-    grids = {plane: plane_grid(plane, at[plane], low, high) for plane in PLANES}
-    widths = [right - left for _, (left, right, *_) in grids.values()]
-    tallest = max(top - bottom for _, (*_, bottom, top) in grids.values())
+    # the coordinates of the dots along each axis, and the ends of pictures
+    dots = [np.arange(begin - MARGIN_MM, end + MARGIN_MM, PIXEL_MM) for begin, end in zip(low, high, strict=True)]
+    ends = [(along[0], along[-1] + PIXEL_MM) for along in dots]
+    tallest = max(np.ptp(ends[up]) for *_, up in PLANES.values())
     colour = "black" if brain.image is None else "white"
-    panels = figure.subplots(1, 3, width_ratios=widths)
-    for axes, (plane, (points, extent)) in zip(panels, grids.items(), strict=True):
+    panels = figure.subplots(1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()])
+    for axes, (plane, (across, right, up)) in zip(panels, PLANES.items(), strict=True):
+        points = np.empty((len(dots[up]), len(dots[right]), 3))
+        points[..., across], points[..., right], points[..., up] = at[plane], dots[right], dots[up][:, None]
+        look: dict[str, Any] = {"origin": "lower", "extent": (*ends[right], *ends[up]), "interpolation": "none"}
         if brain.image:
-            draw_image(axes, *brain.image, points, extent)
+            values, affine = brain.image
+            lit = values[np.isfinite(values) & (values > 0)]
+            brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
+            grey = map_coordinates(np.nan_to_num(values), voxel_index(points, affine), order=1)
+            axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **look)
         if brain.tissues:
-            _draw_tissues(axes, *brain.tissues, points, extent, filled=brain.image is None)
+            groups, affine = brain.tissues
+            index = voxel_index(points, affine)
+            if not brain.image:
+                shown = map_coordinates(groups, index, order=0, mode="constant")
+                axes.imshow(shown, cmap=ListedColormap(TISSUE_COLOURS), vmin=-0.5, vmax=4.5, **look)
+            inside = map_coordinates(np.isin(groups, (2, 3)).astype(np.float32), index, order=1)
+            if (groups == 1).any() and inside.min() < 0.5 < inside.max():
+                grid = [np.linspace(*ends[axis], len(dots[axis])) for axis in (right, up)]
+                axes.contour(*grid, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6)
         if brain.white is not None:
             draw_outline(axes, brain.white, plane, at[plane], INNER_COLOUR)
         draw_outline(axes, brain.pial, plane, at[plane], PIAL_COLOUR)
         # all at one scale
-        axes.set(xlim=extent[:2], ylim=(sum(extent[2:]) / 2 + np.array([-0.5, 0.5]) * tallest), aspect="equal")
+        axes.set(xlim=ends[right], ylim=(sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest), aspect="equal")
         axes.set_axis_off()
-        axes.set_title(f"{plane}, {'xyz'[PLANES[plane][0]]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2)
+        axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2)
         for x, end in zip((0.03, 0.97), "PA" if plane == "sagittal" else "LR", strict=True):
             axes.text(x, 0.5, end, transform=axes.transAxes, ha="center", va="center", fontsize=6.5, color=colour)
-    coronal, (left, _, bottom, _) = panels[0], grids["coronal"][1]
-    coronal.plot([left + 1, left + 1 + SCALE_BAR_MM], [bottom + 2] * 2, color=colour, linewidth=1.2)
-    coronal.text(left + 1, bottom + 3, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
+    coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
+    coronal.plot([left, left + SCALE_BAR_MM], [bottom] * 2, color=colour, linewidth=1.2)
+    coronal.text(left, bottom + 1, f"{SCALE_BAR_MM:g} mm", fontsize=6, color=colour)
     keys = [Patch(color=PIAL_COLOUR, label="pial surface")]
     if brain.white is not None or brain.tissues:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
@@ -159,21 +177,6 @@ def _draw_planes(figure: SubFigure, brain: Brain) -> None:
         there = np.unique(brain.tissues[0])
         keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUES.items() if code in there]
     figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=6, handlelength=1.0)
-
-
-def _draw_tissues(
-    axes: Axes, groups: NDArray[np.integer], affine: Floats, points: Floats, extent: Extent, *, filled: bool
-) -> None:
-    """Draw the groups of labels in a plane where they are to be `filled`, and the inner border of the cortex."""
-    index = voxel_index(points, affine)
-    if filled:
-        shown = map_coordinates(groups, index, order=0, mode="constant")
-        look: dict[str, Any] = {"cmap": ListedColormap(TISSUE_COLOURS), "vmin": -0.5, "vmax": 4.5, "origin": "lower"}
-        axes.imshow(shown, extent=extent, interpolation="none", **look)
-    inside = map_coordinates(np.isin(groups, (2, 3)).astype(np.float32), index, order=1)
-    if (groups == 1).any() and inside.min() < 0.5 < inside.max():
-        right, up = np.linspace(*extent[:2], inside.shape[1]), np.linspace(*extent[2:], inside.shape[0])
-        axes.contour(right, up, inside, levels=[0.5], colors=INNER_COLOUR, linewidths=0.6)
 
 
 def _draw_views(figure: SubFigure, brain: Brain, colours: Floats, names: Sequence[str]) -> list[Axes]:
@@ -187,12 +190,30 @@ def _draw_views(figure: SubFigure, brain: Brain, colours: Floats, names: Sequenc
         mesh, painted = restricted(brain.pial, colours, view.hemisphere, brain.fissure_x_mm)
         if not len(mesh.faces):
             continue
-        picture = render(mesh, painted, view, half_width_mm=wide, half_height_mm=tall, pixels_per_mm=pixels_per_mm)
-        axes.imshow(picture)
+        axes.imshow(render(mesh, painted, view, (wide, tall), pixels_per_mm))
         axes.set_title(view.name, fontsize=6.5, pad=1)
         for x, end in zip((0.05, 0.95), view.ends, strict=True):
-            axes.text(x, 0.97, end, transform=axes.transAxes, ha="center", va="top", fontsize=6, color="#767676")
+            axes.text(x, 0.97, end, transform=axes.transAxes, ha="center", va="top", fontsize=6, color=MUTED_COLOUR)
     return panels
+
+
+def _facts(row: Mapping[str, Any]) -> dict[str, str]:
+    """Return what stands in the head of a brain's page, by name."""
+    sides = str(row["sides"]).split()
+    both = " + ".join(f"{row[f'area_{side}_cm2']:.1f}" for side in sides)
+    turned, thickness = row["rotation_deg"], row["mean_thickness_mm"]
+    facts = {
+        "source": str(row["source"]),
+        "hemispheres": " and ".join(sides),
+        "area": f"{row['area_cm2']:.1f} cm² ({both})",
+        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
+        "pose": f"by {row['pose_by']}, turned by {turned:.1f}°" if turned >= 0.05 else "as in the file",
+    }
+    if row["asymmetry_mm"] is not None:
+        facts["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
+    if thickness is not None:
+        facts["thickness"] = f"{thickness:.2f} mm (measured on {100 * row['thickness_measured_share']:.0f} %)"
+    return facts
 
 
 def quality_row(
@@ -250,23 +271,3 @@ def quality_table(
     every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
     table = pd.DataFrame(every, columns=list(COLUMNS)).set_index("subject", drop=False)
     return table.loc[[name for name in order if name in table.index]].reset_index(drop=True)
-
-
-def facts(row: Mapping[str, Any]) -> dict[str, str]:
-    """Return what stands in the head of a brain's page, by name."""
-    sides = str(row["sides"]).split()
-    both = " + ".join(f"{row[f'area_{side}_cm2']:.1f}" for side in sides)
-    turned = row["rotation_deg"]
-    shown = {
-        "source": str(row["source"]),
-        "hemispheres": " and ".join(sides),
-        "area": f"{row['area_cm2']:.1f} cm² ({both})",
-        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
-        "pose": f"by {row['pose_by']}, turned by {turned:.1f}°" if turned >= 0.05 else "as in the file",
-    }
-    if row["asymmetry_mm"] is not None:
-        shown["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
-    if row["mean_thickness_mm"] is not None:
-        share = 100 * row["thickness_measured_share"]
-        shown["thickness"] = f"{row['mean_thickness_mm']:.2f} mm (measured on {share:.0f} %)"
-    return shown

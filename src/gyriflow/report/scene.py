@@ -1,6 +1,8 @@
 """One surface seen from one side: cameras, light and off-screen rendering."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -63,22 +65,10 @@ PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
 UNKNOWN_COLOUR = "#B8B8B8"
 SAME_PLACE_MM = 0.5
 """How near to a point what is seen first has to be, to be that point."""
-
-
-@dataclass(frozen=True)
-class Material:
-    """How much of its colour a surface shows in any light, in the light of the lamps, and as gloss."""
-
-    ambient: float
-    diffuse: float
-    specular: float
-
-
-TISSUE = Material(0.16, 0.84, 0.1)
-"""For surfaces of one colour, whose shape is read from their shade."""
-MAP = Material(0.58, 0.42, 0.0)
-"""For maps, whose colours are read as values: shade may only hint at the shape."""
-_INSIDE = Material(0.6, 0.4, 0.0)
+TISSUE = {"ambient": 0.16, "diffuse": 0.84, "specular": 0.1}
+"""The light on surfaces of one colour, whose shape is read from their shade: of any side, of the lamps, as gloss."""
+MAP = {"ambient": 0.58, "diffuse": 0.42, "specular": 0.0}
+"""The light on maps, whose colours are read as values: shade may only hint at the shape."""
 
 # lamps fixed to the camera, as strong from the left as from the right: shade makes no difference between hemispheres.
 # The strongest stands above, so that shallow sulci of young brains are seen
@@ -150,11 +140,10 @@ def render(
     mesh: TriangleMesh,
     colours: Floats,
     view: View,
-    *,
-    half_width_mm: float,
-    half_height_mm: float,
+    half_extents_mm: tuple[float, float],
     pixels_per_mm: float,
-    material: Material = TISSUE,
+    *,
+    light: Mapping[str, Any] = TISSUE,
     lines: Floats | None = None,
 ) -> Image:
     """Return a picture of the surface in parallel projection, its bounding box in the middle.
@@ -162,13 +151,14 @@ def render(
     Parameters
     ----------
     colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
+    half_extents_mm : half the width and half the height of the picture
     lines : (k, 2, 3) ends of lines that are drawn where the surface does not hide them
 
     Returns
     -------
     (height, width, 3) picture on white
     """
-    size = [max(2, round(2 * half * pixels_per_mm)) for half in (half_width_mm, half_height_mm)]
+    size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
     surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     surface.point_data.active_normals = vertex_normals(mesh)
     bytes_ = np.clip(np.round(255 * np.asarray(colours)), 0, 255).astype(np.uint8)
@@ -182,16 +172,12 @@ def render(
             scalars="colour",
             rgb=True,
             interpolation="phong",
-            ambient=material.ambient,
-            diffuse=material.diffuse,
-            specular=material.specular,
             specular_power=15,
             culling="back",
+            **light,
         )
         # the inside of a surface that is open where a connected brain is parted
-        plotter.add_mesh(
-            surface, color=NEUTRAL_COLOUR, ambient=_INSIDE.ambient, diffuse=_INSIDE.diffuse, culling="front"
-        )
+        plotter.add_mesh(surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front")
         if lines is not None:
             ends = pv.line_segments_from_points(lines.reshape(-1, 3))
             plotter.add_mesh(ends, color="black", line_width=0.005 * PIXELS_PER_INCH, lighting=False)
@@ -201,7 +187,7 @@ def render(
         distance = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
         plotter.camera_position = [tuple(middle + distance * np.array(view.towards)), tuple(middle), view.up]
         plotter.camera.parallel_projection = True
-        plotter.camera.parallel_scale = half_height_mm
+        plotter.camera.parallel_scale = half_extents_mm[1]
         plotter.renderer.ResetCameraClippingRange()
         # twice as fine as most print: smoother edges would cost more than they show
         plotter.disable_anti_aliasing()

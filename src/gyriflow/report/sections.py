@@ -1,6 +1,6 @@
-"""Plane sections: outlines of surfaces over an image and over each other."""
+"""Plane sections: outlines of surfaces over each other."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pyvista as pv
@@ -8,11 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
-from scipy.ndimage import map_coordinates
 
-from ..geometry.deformations import voxel_index
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import TriangleMesh
 from .labels import week_label
 from .style import (
     FULL_WIDTH_IN,
@@ -25,27 +22,16 @@ from .style import (
     styled,
 )
 
-PLANES = {
-    # name: (axis across the plane, axes to the right and up)
-    "coronal": (1, 0, 2),
-    "axial": (2, 0, 1),
-    "sagittal": (0, 1, 2),
-}
+PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
+"""The axes across each plane, and to the right and up in its picture."""
 MOST_WEEKS = 5
-MARGIN_MM, PIXEL_MM = 8.0, 0.25
-"""Of an image, beyond the surface and between the dots."""
 SCALE_BAR_MM = 20.0
 BESIDE_IN, BEYOND_IN, WIDEST_IN = 0.7, 0.9, 2.3
 """Room beside and above the panels of outlines, and the most that one may be wide."""
-# grey values up to this quantile of those above zero are told apart
-_BRIGHTEST = 0.995
-
-Extent = tuple[float, float, float, float]
-"""Left, right, lower and upper end of a picture in mm."""
 
 
 def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colour: str, thickness: float = 0.8) -> None:
-    """Draw the lines in which a plane at a place in mm cuts a surface."""
+    """Draw the lines in which one of `PLANES` at a place in mm cuts a surface."""
     across, right, up = PLANES[plane]
     body = pv.PolyData.from_regular_faces(np.array(surface.vertices), np.array(surface.faces, dtype=int))
     cut = body.slice(normal=np.eye(3)[across], origin=np.eye(3)[across] * at)
@@ -53,38 +39,11 @@ def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colou
     axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=thickness, capstyle="round"))
 
 
-def plane_grid(plane: str, at: float, low: Floats, high: Floats) -> tuple[Floats, Extent]:
-    """Return the (rows, columns, 3) points of a picture of a plane within a box and a margin, and its extent."""
-    across, right, up = PLANES[plane]
-    begin, end = low - MARGIN_MM, high + MARGIN_MM
-    columns, rows = (np.arange(begin[axis], end[axis], PIXEL_MM) for axis in (right, up))
-    points = np.empty((len(rows), len(columns), 3))
-    points[..., across], points[..., right], points[..., up] = at, columns[None], rows[:, None]
-    return points, (begin[right], columns[-1] + PIXEL_MM, begin[up], rows[-1] + PIXEL_MM)
-
-
-def draw_image(axes: Axes, values: Floats, affine: ArrayLike, points: Floats, extent: Extent) -> None:
-    """Draw a volume in grey at the points of a plane.
-
-    Parameters
-    ----------
-    values : (i, j, k) float
-    affine : (4, 4) float
-        Voxel index to position in mm.
-    points, extent : what `plane_grid` returns
-    """
-    lit = values[np.isfinite(values) & (values > 0)]
-    brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
-    grey = map_coordinates(np.nan_to_num(values), voxel_index(points, affine), order=1)
-    axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, origin="lower", extent=extent, interpolation="none")
-
-
 @styled
 def outlines_chart(
     runs: Mapping[str, Mapping[float, TriangleMesh]],
     real: Mapping[float, TriangleMesh],
     *,
-    planes: Sequence[str] = tuple(PLANES),
     measured: str = REAL_BRAIN,
 ) -> Figure:
     """Draw the outlines of runs over those of the measured brain, a row per plane, a column per week.
@@ -96,21 +55,18 @@ def outlines_chart(
     ----------
     runs : {run: {week: surface in RAS+ mm, aligned with the measured one}}
     real : {week: measured surface in RAS+ mm}
-    measured
-        What the measured brains are called.
     """
     weeks, colours = sorted(real)[-MOST_WEEKS:], run_colours(runs)
     drawn = [brains[week] for brains in (real, *runs.values()) for week in weeks if week in brains]
     low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1
-    wide = max((high - low)[PLANES[plane][1]] for plane in planes)
-    tall = [(high - low)[PLANES[plane][2]] for plane in planes]
+    wide = max((high - low)[right] for _, right, _ in PLANES.values())
+    tall = [(high - low)[up] for *_, up in PLANES.values()]
     inches_per_mm = min((FULL_WIDTH_IN - BESIDE_IN) / (len(weeks) * wide), WIDEST_IN / wide)
     width = max(SINGLE_COLUMN_IN, BESIDE_IN + inches_per_mm * len(weeks) * wide)
     figure = new_figure(width, inches_per_mm * sum(tall) + BEYOND_IN)
     panels = figure.subplots(len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall})
-    for row, plane in zip(panels, planes, strict=True):
-        across, right, up = PLANES[plane]
+    for row, (plane, (across, right, up)) in zip(panels, PLANES.items(), strict=True):
         centre = (low[right] + high[right]) / 2
         # a sagittal plane in the middle would show the fissure alone
         part = 0.75 if plane == "sagittal" else 0.5
@@ -128,10 +84,10 @@ def outlines_chart(
     for axes, week in zip(panels[0], weeks, strict=True):
         axes.set_title(week_label(week), fontsize=8)
     foot = panels[-1, 0]
-    start, bottom = foot.get_xlim()[0] + 2, low[PLANES[planes[-1]][2]]
+    start, bottom = foot.get_xlim()[0] + 2, low[PLANES["sagittal"][2]]
     foot.plot([start, start + SCALE_BAR_MM], [bottom] * 2, color="black", linewidth=2, clip_on=False)
     foot.text(start, bottom - 1, f"{SCALE_BAR_MM:g} mm", va="top", fontsize=7)
-    add_letters(panels[:, 0] if len(planes) > 1 and len(weeks) > 1 else panels.flat)
+    add_letters(panels[:, 0])
     named = {**colours, measured: REAL_COLOUR}
     handles = [Line2D([], [], color=colour, label=label) for label, colour in named.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)

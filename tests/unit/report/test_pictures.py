@@ -5,7 +5,7 @@ import pytest
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, sphere
 
-from gyriflow.geometry.triangles import merged
+from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.report.labels import AREA_GROWTH
 from gyriflow.report.pictures import (
     LINES_MM,
@@ -19,14 +19,14 @@ from gyriflow.report.pictures import (
     zones_picture,
 )
 from gyriflow.report.scene import VIEWS, render, uniform_colours
+from gyriflow.report.sections import outlines_chart
 
 BRAIN = box((20, 30, 20))
 SMOOTH = ellipsoid((20.0, 26.0, 18.0))
 
 
 def seen(mesh, colours, view, mm=20, **look):
-    size = {"half_width_mm": mm, "half_height_mm": mm, "pixels_per_mm": 4}
-    return render(mesh, colours, VIEWS[view], **size, **look).astype(float)
+    return render(mesh, colours, VIEWS[view], (mm, mm), 4, **look).astype(float)
 
 
 @pytest.mark.parametrize("name", ["left", "right", "top", "bottom", "front", "back"])
@@ -73,13 +73,13 @@ def test_all_panels_have_one_scale_and_the_bar_its_length():
 
 def test_displacement_maps_share_their_colour_scale():
     maps = {"slow": {(21.0, 22.0): (BRAIN, np.full(8, 1.0))}, "fast": {(22.0, 23.0): (BRAIN, np.full(8, 4.0))}}
-    figure = displacement_maps(maps, views=("left",))
+    figure = displacement_maps(maps)
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim() == pytest.approx((0.0, 4.0))
     assert "(mm)" in bar.get_xlabel()
     said = {f"max {norm}.00 mm\nat −10, −15, −10\nmean {norm}.00 mm" for norm in (1, 4)}
     assert {"21–22 GW\nleft view", "22–23 GW\nleft view", "slow", "fast"} | said <= words(figure)
-    first, second = map(tone, (picture(figure, 0), picture(figure, 1)))
+    first, second = map(tone, (picture(figure, 0), picture(figure, 2)))
     # pale at a quarter of the scale, dark blue at its end
     assert first.sum() > 1.5 * second.sum()
     assert second[2] > 1.5 * second[0]
@@ -87,17 +87,16 @@ def test_displacement_maps_share_their_colour_scale():
 
 def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed():
     norms = np.ones(len(SMOOTH.vertices))
-    top = int(SMOOTH.vertices[:, 2].argmax())
+    # on the right, not seen from the left
+    top = int((SMOOTH.vertices @ [0.3, 0, 1]).argmax())
     norms[top] = 50.0
-    figure = displacement_maps({"run": {(21.0, 22.0): (SMOOTH, norms)}}, views=("top", "bottom"))
+    figure = displacement_maps({"run": {(21.0, 22.0): (SMOOTH, norms)}})
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim()[1] == pytest.approx(1.0)
-    above, below = (
-        [ring for ring in axes.patches if ring.get_edgecolor()[:3] == (0, 0, 0)] for axes in pictures(figure)
-    )
-    assert [ring.get_linestyle() for ring in (*above, *below)] == ["-", ":"]
+    rings = [ring for axes in pictures(figure) for ring in axes.patches if ring.get_edgecolor()[:3] == (0, 0, 0)]
+    assert [ring.get_linestyle() for ring in rings] == [":", "-"]
     middle = (SMOOTH.vertices.min(axis=0) + SMOOTH.vertices.max(axis=0)) / 2
-    assert above[0].center == pytest.approx((SMOOTH.vertices[top] - middle)[:2])
+    assert rings[1].center == pytest.approx((SMOOTH.vertices[top] - middle)[:2])
 
 
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
@@ -113,11 +112,11 @@ def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
 def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
     brain = merged(box((10, 30, 20), (-6, 0, 0)), box((10, 30, 20), (6, 0, 0)))
     zones = np.repeat([1, 3], 12)
-    figure = zones_picture(brain, zones, fissure_x_mm=0.0, views=("left medial", "right medial"))
+    figure = zones_picture(brain, zones, fissure_x_mm=0.0)
     # a box of 10 × 30 × 20 mm has 22 cm²
     assert {"clamped 22.0 cm²", "right contact 22.0 cm²"} <= words(figure)
     assert not any("free" in text for text in words(figure))
-    left, right = map(tone, (picture(figure, 0), picture(figure, 1)))
+    left, right = map(tone, (picture(figure, 2), picture(figure, 3)))
     assert left[1] > left[0]
     assert right[0] > 2 * right[2]
 
@@ -163,7 +162,7 @@ def test_regions_are_seen_in_their_colours_where_they_are():
     mesh = sphere(20.0)
     y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
     regions = np.where(z < -12, 0, np.where(y > 0, 1, 2))
-    figure = regions_picture({"p": [(mesh, (regions, {1: "front", 2: "back"}))]}, views=("left",))
+    figure = regions_picture({"p": [(mesh, (regions, {1: "front", 2: "back"}))]})
     hues = {patch.get_label(): np.array(patch.get_facecolor()[:3]) for patch in figure.legends[0].legend_handles}
     image = picture(figure) / 255.0
     # seen from the left, anterior is on the left of the picture
@@ -171,3 +170,14 @@ def test_regions_are_seen_in_their_colours_where_they_are():
         pixel = image[int(row * image.shape[0]), int(column * image.shape[1])]
         away = {key: np.linalg.norm(hue / hue.sum() - pixel / pixel.sum()) for key, hue in hues.items()}
         assert min(away, key=away.__getitem__) == name
+
+
+def test_outlines_are_those_of_both_brains_at_one_scale():
+    bigger = TriangleMesh(1.1 * SMOOTH.vertices, SMOOTH.faces)
+    figure = outlines_chart({"thin": {21.0: SMOOTH, 22.0: SMOOTH}}, {21.0: SMOOTH, 22.0: bigger})
+    first, second = figure.axes[2:4]
+    assert np.ptp(first.get_xlim()) == np.ptp(second.get_xlim())
+    real, simulated = (np.concatenate(lines.get_segments()) for lines in second.collections)
+    assert np.ptp(real[:, 0]) == pytest.approx(44.0, rel=0.01)
+    assert np.ptp(simulated[:, 0]) == pytest.approx(40.0, rel=0.01)
+    assert {"thin", "real brain", "21 GW", "22 GW"} <= words(figure)

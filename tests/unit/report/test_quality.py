@@ -1,14 +1,17 @@
 """The page of a brain for quality control, its verdict, and the table of all brains."""
 
 import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
 from pictures import words
-from shapes import sphere
+from shapes import rigid, sphere
 
+from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
+from gyriflow.geometry.triangles import transformed
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.report.quality import (
     Brain,
-    facts,
     quality_page,
     quality_row,
     quality_table,
@@ -22,12 +25,6 @@ REPORT = {
     "pose": Pose(np.eye(4), {"whole": LPS_TO_RAS}, "shape").plain(),
     "asymmetry_mm": 0.5,
 }
-BALL = sphere(20.0, 3)
-
-
-def page(brain, warnings=(), verdict="fine"):
-    row = quality_row(LABELS, REPORT, {}, list(warnings), 80.0)
-    return quality_page(brain, title="a, 24 GW", verdict=verdict, facts=facts(row), warnings=list(warnings))
 
 
 def test_labels_are_grouped_by_tissue():
@@ -40,9 +37,19 @@ def test_the_page_shows_planes_views_and_warnings():
     groups = np.select([radius < 5, radius < 18, radius < 20, radius < 24], [3, 2, 1, 4], 0)
     affine = np.eye(4)
     affine[:3, 3] = -30
-    figure = page(Brain(BALL, 0.0, tissues=(groups, affine)), ["it is crooked"], "look")
+    warnings = ["it is crooked"]
+    row = quality_row(LABELS, REPORT, {}, warnings, 80.0)
+    figure = quality_page(Brain(sphere(20.0, 3), 0.0, tissues=(groups, affine)), row, warnings)
     shown = words(figure)
-    assert {"LOOK", "Look at:\n• it is crooked", "coronal, y = 0 mm", "left", "right medial", "front"} <= shown
+    assert {
+        "a, 24 GW",
+        "LOOK",
+        "Look at:\n• it is crooked",
+        "coronal, y = 0 mm",
+        "left",
+        "right medial",
+        "front",
+    } <= shown
     (head,) = [text for text in shown if text.startswith("source")]
     assert "area: 100.0 cm² (49.0 + 51.0)" in head
     assert "50 % of that expected" in head
@@ -65,3 +72,45 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     assert table["warnings"].tolist()[1] == "one | two"
     # of one hemisphere half a brain is expected
     assert table["share_of_expected_volume"].tolist()[1:] == [1.0, 0.5]
+
+
+@pytest.fixture(scope="module")
+def figure():
+    """An ellipsoid in a volume stored obliquely, and the page of quality with both turned upright."""
+    centre, half = np.array([12.0, -7.0, 3.0]), np.array([15.0, 21.0, 12.0])
+    oblique = np.eye(4)
+    oblique[:3, :3] = rigid(25, -10, 40)[:3, :3] * 0.8
+    oblique[:3, 3] = centre - oblique[:3, :3] @ np.full(3, 40.0)
+    index = np.stack(np.indices((81, 81, 81)), axis=-1)
+    away = np.linalg.norm((index @ oblique[:3, :3].T + oblique[:3, 3] - centre) / half, axis=-1)
+    surface = isosurface((1.5 - away).astype(np.float32), oblique)
+    pose = np.eye(4)
+    pose[:3, 3] = 1, 2, 3
+    centre = centre + pose[:3, 3]
+    brain = Brain(transformed(surface, pose), centre[0], image=(100.0 * (away < 1), pose @ oblique))
+    return quality_page(brain, quality_row(LABELS, REPORT, {}, [], 80.0), []), centre, half
+
+
+@pytest.mark.parametrize(
+    ("number", "name", "axes"), [(0, "coronal", (0, 2)), (1, "axial", (0, 1)), (2, "sagittal", (1, 2))]
+)
+def test_line_and_edge_agree_in_every_plane(figure, number, name, axes):
+    drawn, centre, half = figure
+    panel = drawn.axes[number]
+    assert panel.get_title().startswith(name)
+    (lines,) = [item for item in panel.collections if isinstance(item, LineCollection)]
+    points = np.concatenate(lines.get_segments())
+    # the sagittal plane is half-way to the right, where the ellipse is smaller
+    share = np.sqrt(0.75) if name == "sagittal" else 1.0
+    expected = share * half[list(axes)]
+    np.testing.assert_allclose(np.ptp(points, axis=0) / 2, expected, atol=0.15)
+    np.testing.assert_allclose((points.max(axis=0) + points.min(axis=0)) / 2, centre[list(axes)], atol=0.15)
+    image = panel.images[0]
+    left, right, low, high = image.get_extent()
+    bright = np.asarray(image.get_array()) > 50
+    rows, columns = (np.flatnonzero(bright.any(axis=axis)) for axis in (1, 0))
+    size = (right - left) / bright.shape[1], (high - low) / bright.shape[0]
+    found = np.array([left, low]) + (np.array([columns[[0, -1]].mean(), rows[[0, -1]].mean()]) + 0.5) * size
+    np.testing.assert_allclose(found, centre[list(axes)], atol=0.4)
+    spans = np.array([np.ptp(columns), np.ptp(rows)]) * size / 2
+    np.testing.assert_allclose(spans, expected, atol=0.5)
