@@ -51,7 +51,6 @@ MAPS = {
     AREA_GROWTH: "growth of area (% per week)",
 }
 """The quantities that are drawn as maps, with the labels of their colour bars."""
-WEIGHT, GROWTH, STIFFNESS = "cortical weight", "tangential growth (% per week)", "shear modulus (Pa)"
 PARAMETERS = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",

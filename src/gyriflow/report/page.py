@@ -106,7 +106,8 @@ def page_content(
     versions = [(name, version) for name, version in software.items() if version]
     return {
         "title": f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
-        "done": what_was_done(brains, runs),
+        "given": brains,
+        "folded": runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality)),
         "runs": html_table(scores_table(runs, validation)),
         "warnings": "" if warnings.empty else html_table(grouped(warnings)),
@@ -219,20 +220,15 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     ]
     if run["min_J"] <= 0:
         words.append("elements inverted")
-    if too_coarse := resolution_verdict(run):
+    if too_coarse := _resolution(run):
         words.append(too_coarse)
     if run.get("initial_penetration_mm", 0.0) > DEEP_MM:
         words.append(f"walls of the fissure begin {run['initial_penetration_mm']:.2g} mm beyond their planes")
     return "; ".join(words)
 
 
-def resolution_verdict(run: Mapping[str, Any] | pd.Series) -> str:
-    """Return what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not.
-
-    Parameters
-    ----------
-    run : elements_through_cortex (before the first step), and what `resolution_over_steps` returns
-    """
+def _resolution(run: Mapping[str, Any] | pd.Series) -> str:
+    """Return what is to be said of a run whose mesh is too coarse, at the start or later; empty where it is not."""
     needed = ELEMENTS_NEEDED[int(run["order"])]
     at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
     if not at_start >= needed:  # not a number: no element lies in the cortex
@@ -276,33 +272,6 @@ def grouped(warnings: pd.DataFrame) -> pd.DataFrame:
     rows["brain, run"] = places
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
     return groups.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
-
-
-def what_was_done(brains: Sequence[Mapping[str, Any]], runs: pd.DataFrame) -> str:
-    """Return in a few sentences what the study is: its brains, what was folded, and to which age."""
-    weeks = sorted({float(brain["week"]) for brain in brains})
-    ends = sorted({float(week) for week in runs["end_week"]})
-    populations = sorted({str(brain["population"]) for brain in brains if brain["population"]})
-    synthetic = sum(bool(brain["synthetic"]) for brain in brains)
-    of = f" ({'; '.join(populations)})" if populations else ""
-    starts = list(dict.fromkeys(runs["subject"]))
-    sentences = [
-        f"{_counted(len(brains), 'brain')} of {_span(weeks)}{of} went in.",
-        f"Of these, {synthetic} synthetic, not of a fetus." if synthetic else "",
-        f"{', '.join(starts)} {'was' if len(starts) == 1 else 'were'} filled with tetrahedra and grown to "
-        f"{_span(ends)} in {_counted(len(runs), 'simulation')} of cortical folding by differential tangential growth.",
-        "Simulated and measured brains were measured by the same code with the same settings, and compared where their "
-        "weeks and population agree.",
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def _span(weeks: Sequence[float]) -> str:
-    return week_label(weeks[0]) if len(weeks) == 1 else f"{weeks[0]:g} to {week_label(weeks[-1])}"
 
 
 def made(provenance: Mapping[str, Any]) -> str:

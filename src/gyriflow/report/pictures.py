@@ -54,7 +54,7 @@ SurfaceMap = tuple[TriangleMesh, Floats]
 SurfaceMaps = tuple[TriangleMesh, Mapping[str, Floats]]
 """A surface in RAS+ mm and its maps per vertex by name."""
 Halves = Sequence[SurfaceMaps]
-"""The hemispheres of a brain, each with its maps per vertex by name."""
+"""The hemispheres of a brain, each with its maps."""
 
 SIDE_VIEWS = ("left", "top")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
@@ -81,7 +81,6 @@ ZONE_COLOURS = {
     MEDIAL_WALL: "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
-CORTEX_COLOUR, CORE_COLOUR = "#E8A33D", "#F3EBDD"
 TINTS = (0.0, 0.4, 0.7)
 """How far towards white the colours of further regions are."""
 

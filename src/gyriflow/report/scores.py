@@ -20,7 +20,6 @@ from .style import (
     MUTED_COLOUR,
     REAL_COLOUR,
     RUN_COLOURS,
-    add_letters,
     from_zero,
     new_figure,
     panel_figure,
@@ -201,7 +200,7 @@ def nearest_chart(
     Raises
     ------
     InputError
-        If no distance is known.
+        If no distance is knhere.
     """
     rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)].dropna(subset="distance")
     if rows.empty:
@@ -212,16 +211,16 @@ def nearest_chart(
     figure, panels = panel_figure(len(measures), panel_in=2.1)
     drawn: set[str] = set()
     for number, (axes, measure) in enumerate(zip(panels, measures, strict=True)):
-        own = rows[rows["measure"] == measure]
-        sides = ["whole"] if (own["hemisphere"] == "whole").any() else list(SIDES)
+        here = rows[rows["measure"] == measure]
+        sides = ["whole"] if (here["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
         for side in sides:
-            _nearest_line(axes, own[own["hemisphere"] == side].sort_values("at"), *SIDE_LOOKS[side])
+            _nearest_line(axes, here[here["hemisphere"] == side].sort_values("at"), *SIDE_LOOKS[side])
         axes.margins(y=0.25)
         if measure in published:
             axes.axvline(published[measure], color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
         # distances of sizes are parts of the real brain's
-        unit = "share of the real" if measure in _SIZES else own["unit"].iloc[0]
+        unit = "share of the real" if measure in _SIZES else here["unit"].iloc[0]
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:
@@ -268,8 +267,7 @@ def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Seque
     score
         What the score is the sum of.
     """
-    figure = new_figure(FULL_WIDTH_IN, 2.7)
-    panels = figure.subplots(1, len(optimum), squeeze=False)[0]
+    figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
     # later rounds are darker
     shades = dict(zip(sorted(set(runs["round"])), np.linspace(0.75, 0, runs["round"].nunique()), strict=True))
@@ -284,6 +282,5 @@ def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Seque
             axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")
         axes.set_xlabel(parameter_label(name))
     panels[0].set_ylabel(f"score: {plain(' + '.join(score))}")
-    add_letters(panels)
     figure.legend(handles=panels[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=5)
     return figure

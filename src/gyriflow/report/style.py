@@ -39,11 +39,8 @@ REAL_BRAIN = "real brain"
 """What brains that were not simulated are called where their population is not known."""
 
 SETTINGS: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.0,
     "axes.titlesize": 8.0,
-    "axes.labelsize": 8.0,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -58,7 +55,6 @@ SETTINGS: dict[Any, Any] = {
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "legend.fontsize": 7.0,
-    "legend.title_fontsize": 7.0,
     "legend.frameon": False,
     "lines.linewidth": 1.3,
     "lines.markersize": 4.0,

@@ -35,7 +35,6 @@ def surfaces_view(
     real: Sequence[tuple[float, Halves]],
     *,
     measured: str,
-    budget_bytes: float = BUDGET_BYTES,
 ) -> dict[str, Any]:
     """Return the surfaces, thinned out to fit the budget, with their maps and colour scales, ready for JSON.
 
@@ -48,8 +47,6 @@ def surfaces_view(
     runs : {run: (week, hemispheres) by week, with the same vertices}
         InputError where their vertices differ in number.
     real : (week, hemispheres) of the measured brains by week
-    measured
-        What the measured brains are called.
     """
     simulated = {name: _with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
     others = [_timed(*frame) for frame in real]
@@ -57,7 +54,7 @@ def surfaces_view(
     if not everything:
         return {"groups": [], "maps": []}
     bytes_per_vertex = len(everything) * _BYTES_PER_FRAME + (len(runs) + len(real)) * _BYTES_PER_TRIANGULATION
-    vertices = int(np.clip(budget_bytes / _LETTERS_PER_BYTE / bytes_per_vertex, FEWEST_VERTICES, MOST_VERTICES))
+    vertices = int(np.clip(BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex, FEWEST_VERTICES, MOST_VERTICES))
     low = np.min([mesh.vertices.min(axis=0) for _, mesh, _ in everything], axis=0)
     high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
@@ -72,11 +69,11 @@ def surfaces_view(
         look = {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _text(faces, "<u2")}
         groups.append(look | {"frames": [_frame(frame, kept, box, scales) for frame in frames]})
     if others:
-        look = {"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR}
-        groups.append(look | {"frames": []})
-    for frame in others:
-        kept, faces = thin_out(frame[1], vertices)
-        groups[-1]["frames"].append(_frame(frame, kept, box, scales) | {"faces": _text(faces, "<u2")})
+        shown = []
+        for frame in others:
+            kept, faces = thin_out(frame[1], vertices)
+            shown.append(_frame(frame, kept, box, scales) | {"faces": _text(faces, "<u2")})
+        groups.append({"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR, "frames": shown})
     maps = [_described(name, scale) for name, scale in scales.items()]
     return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
 
@@ -106,9 +103,7 @@ def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDAr
         return np.arange(len(mesh.vertices)), np.asarray(mesh.faces, dtype=np.int64)
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     coarse = body.decimate_pro(1 - vertices / len(mesh.vertices), preserve_topology=True)
-    distance, kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
-    if distance.max() > 1e-3:
-        raise InputError("thinning has moved vertices", found=f"{distance.max():.3g} mm", expected="none moved")
+    _, kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
     return kept, np.asarray(coarse.regular_faces, dtype=np.int64)
 
 

@@ -90,6 +90,8 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     parts = ("first &lt;page", "<h3>Runs", "<h3>Brains", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Provenance")
     order = [text.index(word) for word in parts]
     assert order == sorted(order)
+    assert "2 brains of 21 to 23 GW (healthy) went in. young was filled with" in " ".join(text.split())
+    assert "grown to 23 GW in 1 simulation of" in " ".join(text.split())
     assert "12ab" in text
     assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
     assert "numpy" in text
