@@ -47,7 +47,6 @@ OF_REGIONS = ("area", "mean_sulcal_depth", "mean_curvature", "mean_local_gyrific
 """The metrics of each chart, in their order."""
 NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
-HEMISPHERE_LINES = dict(zip(("whole", *SIDES), LINES, strict=True))
 _FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
 _HATCH = "//////"
 
@@ -64,6 +63,12 @@ def _title(axes: Axes, rows: pd.DataFrame) -> None:
     axes.set_title(with_unit(METRICS[rows["metric"].iloc[0]], rows["unit"].iloc[0]))
 
 
+def _lines(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:
+    for run, of_run in rows[rows["run"] != MEASURED].groupby("run", sort=False):
+        ordered = of_run.sort_values("week")
+        axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
+
+
 def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, **look: Any) -> None:
     if len(rows):
         axes.plot(rows["week"], rows["value"], "*", **{"color": colour, "markersize": 7, "zorder": 3} | look)
@@ -71,39 +76,25 @@ def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, **look: An
 
 @styled
 def metrics_chart(metrics: pd.DataFrame, *, runs: Sequence[str] = (), measured: str = REAL_BRAIN) -> Figure:
-    """Draw a panel per metric over weeks: runs as lines, measured brains as black stars.
+    """Draw a panel per metric of whole brains over weeks: runs as lines, measured brains as black stars.
 
-    A metric that is known for the hemispheres only has dashed lines and full stars for the left one, dotted lines and
-    open stars for the right one. Metrics that the table lacks are left out.
+    Metrics that the table lacks are left out.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; InputError if the table has none of the metrics.
     """
-    metrics = runs_by_name(metrics)
-    present, colours = _present(metrics, OVERVIEW), run_colours(metrics["run"], runs)
+    whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    present, colours = _present(whole, OVERVIEW), run_colours(whole["run"], runs)
     figure, panels = panel_figure(len(present))
-    drawn: set[str] = set()
     for axes, name in zip(panels, present, strict=True):
-        rows = metrics[metrics["metric"] == name]
-        sides = {"whole"} if (rows["hemisphere"] == "whole").any() else set(SIDES)
-        drawn |= sides
-        for (run, side), group in rows[rows["hemisphere"].isin(sides)].groupby(["run", "hemisphere"], sort=False):
-            ordered = group.sort_values("week")
-            if run == MEASURED:
-                _stars(axes, ordered, markerfacecolor="white" if side == "right" else REAL_COLOUR)
-            else:
-                look: dict[str, Any] = {"linestyle": HEMISPHERE_LINES[str(side)], "marker": "o", "markersize": 2.5}
-                axes.plot(ordered["week"], ordered["value"], color=colours[str(run)], **look)
+        rows = whole[whole["metric"] == name]
+        _lines(axes, rows, colours)
+        _stars(axes, rows[rows["run"] == MEASURED])
         _title(axes, rows)
-        week_axis(axes, metrics["week"])
-    extra = [
-        Line2D([], [], color=MUTED_COLOUR, linestyle=HEMISPHERE_LINES[side], label=f"{side} hemisphere")
-        for side in SIDES
-        if side in drawn
-    ]
-    run_legend(figure, colours, measured=measured if (metrics["run"] == MEASURED).any() else "", extra=extra)
+        week_axis(axes, whole["week"])
+    run_legend(figure, colours, measured=measured if (whole["run"] == MEASURED).any() else "")
     return figure
 
 
@@ -145,9 +136,7 @@ def norms_chart(
         bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
         axes.vlines(bars["week"], bars["q05"], bars["q95"], color=REAL_COLOUR, linewidth=1.0)
         axes.plot(bars["week"], bars["q50"], "_", color=REAL_COLOUR, markersize=7)
-        for (run, _), brain in rows[rows["run"] != MEASURED].groupby(["run", "subject"], sort=False):
-            ordered = brain.sort_values("week")
-            axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
+        _lines(axes, rows, colours)
         real = rows[rows["run"] == MEASURED]
         within = real["subject"].isin(reference)
         _stars(axes, real[within], markersize=6)
@@ -208,10 +197,9 @@ def _region_lines(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], 
 
 
 def _of_bands(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
-    """Return the rows of the bands, written as 4 or "B4", with whole numbers and a column `trusted`."""
-    numbers = spectra["band"].astype(str).str.removeprefix("B").astype(int)
+    """Return the rows of the bands with a column `trusted`."""
     trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
-    return spectra.assign(band=numbers, trusted=trusted)[numbers.isin(bands)]
+    return spectra.assign(trusted=trusted)[spectra["band"].isin(bands)]
 
 
 def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:

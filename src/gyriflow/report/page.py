@@ -32,7 +32,7 @@ def shown_figures(
     figures: Sequence[tuple[str, str, Mapping[str, str]]],
     contents: Mapping[str, str | tuple[str, float]],
 ) -> list[dict[str, Any]]:
-    """Return the figures and tables that the report has words on: section, title, content, caption, first, technical.
+    """Return the figures and tables with the words on them: section, title, content, caption, first, technical.
 
     Parameters
     ----------
@@ -46,8 +46,6 @@ def shown_figures(
     first = next((path for rule, path, _ in figures if rule == FIRST), None)
     shown = []
     for rule, path, names in figures:
-        if rule not in words:
-            continue
         # the page's title names a brain that all figures of a kind are of
         keys = ("run", "study", "brain") if len(starts[rule]) > 1 else ("run", "study")
         title = words[rule]["title"].format(**{key: plain(name.removesuffix("_mm")) for key, name in names.items()})
@@ -172,22 +170,20 @@ def brains_table(brains: Sequence[Mapping[str, Any]], quality: pd.DataFrame) -> 
     """
     judged = quality.set_index("subject")
     causes = judged["cause"].fillna("").where(judged["cause"].fillna("") != "", judged["warnings"].fillna(""))
-    rows = []
-    for brain in brains:
-        name = str(brain["id"])
-        rows.append(
-            {
-                "brain": name,
-                "age": week_label(brain["week"]),
-                "source": brain["source"],
-                "population": brain["population"] or ("synthetic" if brain["synthetic"] else "not stated"),
-                "licence": brain["licence"] or ("made here" if brain["synthetic"] else "your own data"),
-                "volume (mL)": judged.loc[name, "volume_ml"],
-                "pial area (cm²)": judged.loc[name, "area_cm2"],
-                "verdict": judged.loc[name, "verdict"],
-                "warnings": causes[name] or "none",
-            }
-        )
+    rows = [
+        {
+            "brain": brain["id"],
+            "age": week_label(brain["week"]),
+            "source": brain["source"],
+            "population": brain["population"] or ("synthetic" if brain["synthetic"] else "not stated"),
+            "licence": brain["licence"] or ("made here" if brain["synthetic"] else "your own data"),
+            "volume (mL)": judged.loc[brain["id"], "volume_ml"],
+            "pial area (cm²)": judged.loc[brain["id"], "area_cm2"],
+            "verdict": judged.loc[brain["id"], "verdict"],
+            "warnings": causes[brain["id"]] or "none",
+        }
+        for brain in brains
+    ]
     return pd.DataFrame(rows)
 
 
@@ -205,8 +201,8 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
     for name, (_, run) in zip(names, runs.iterrows(), strict=True):
         scores: Mapping[Any, Any] = {}
         if validation is not None:
-            own = validation[(validation["run"] == run["run"]) & (validation["start_week"] == run["start_week"])]
-            scores = own.sort_values("week").iloc[-1] if len(own) else {}
+            compared = validation[(validation["run"] == run["run"]) & (validation["start_week"] == run["start_week"])]
+            scores = compared.sort_values("week").iloc[-1] if len(compared) else {}
         rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)
 

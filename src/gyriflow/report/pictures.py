@@ -6,27 +6,16 @@ from typing import Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_rgb, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
-from ..parameters.measures import SHAPE_MEASURES
-from ..parameters.terms import (
-    BASE,
-    BETWEEN_PLANES,
-    CLAMPED,
-    FREE,
-    LEFT_CONTACT,
-    MEDIAL_WALL,
-    RIGHT_CONTACT,
-    SIDE_X,
-    SIDE_Y,
-    ZONE_NAMES,
-)
+from ..parameters.measures import SHAPE_MEASURES, VertexMeasure
+from ..parameters.terms import ZONE_NAMES
 from ..units import CM2_PER_MM2
-from .labels import AREA_GROWTH, DEVIATIONS, DISTANCE, MAPS, column_label, plain, value_labels
+from .labels import AREA_GROWTH, DEVIATIONS, DISPLACEMENT, DISTANCE, MAPS, column_label, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
@@ -39,7 +28,6 @@ from .scene import (
     uniform_colours,
 )
 from .style import (
-    MAGNITUDES,
     NEUTRAL_COLOUR,
     REAL_BRAIN,
     REAL_SURFACE_COLOUR,
@@ -70,15 +58,9 @@ SEEN_FLAT = 0.3
 ABSENT = "ended\nbefore\nthis week"
 """What stands in the place of a member of a study that has not come to the week."""
 ZONE_COLOURS = {
-    FREE: "#D55E00",
-    CLAMPED: "#009E73",
-    LEFT_CONTACT: "#0072B2",
-    RIGHT_CONTACT: RIGHT_COLOUR,
-    BETWEEN_PLANES: "#CC79A7",
-    BASE: "#999999",
-    SIDE_X: "#56B4E9",
-    SIDE_Y: "#E69F00",
-    MEDIAL_WALL: "#8C6D31",
+    **{"free": "#D55E00", "clamped": "#009E73", "left contact": "#0072B2", "right contact": RIGHT_COLOUR},
+    **{"between planes": "#CC79A7", "base": "#999999", "side x": "#56B4E9", "side y": "#E69F00"},
+    "medial wall": "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 TINTS = (0.0, 0.4, 0.7)
@@ -161,7 +143,7 @@ def displacement_maps(
     """
     keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in SIDE_VIEWS]
     every = np.concatenate([norms for maps in displacements.values() for _, norms in maps.values()])
-    scale = magnitude_scale(every, MAGNITUDES)
+    scale = scale_of(DISPLACEMENT, every)
 
     def panel(shown: SurfaceMap | None, view: View) -> Panel | None:
         if shown is None:
@@ -179,21 +161,6 @@ def displacement_maps(
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
 
 
-def magnitude_scale(values: Floats, colours: str) -> ScalarMappable:
-    """Return a scale from zero to a round value that at most a few of the values pass, so that no outlier sets it."""
-    finite = values[np.isfinite(values)]
-    high = float(np.quantile(finite, _MOST)) if len(finite) else 1.0
-    end = round_up(high) if high > 0 else 1.0
-    return colour_scale(colours, 0.0, end, cut=bool((finite > end).any()))
-
-
-def signed_scale(values: Floats) -> ScalarMappable:
-    """Return a scale that is pale at zero and as wide on both sides, for values of which some are below zero."""
-    sizes = np.abs(values[np.isfinite(values)])
-    end = round_up(float(np.quantile(sizes, _MOST))) if sizes.any() else 1.0
-    return colour_scale(SIGNED, -end, end, cut=bool((sizes > end).any()))
-
-
 def round_up(value: float) -> float:
     """Return a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
     step = 10.0 ** (np.floor(np.log10(value)) - 1)
@@ -201,15 +168,23 @@ def round_up(value: float) -> float:
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Return the colour scale of one of `labels.MAPS`: its own limits, or from zero to where few vertices are above."""
-    # by more than rounding
-    shrinks = quantity == AREA_GROWTH and np.nanmin(values) < -ROUNDING * np.nanmax(np.abs(values))
-    if quantity in DEVIATIONS or shrinks:
-        return signed_scale(values)
-    measure = SHAPE_MEASURES.get(quantity)
-    if measure is not None and measure.limits is not None:
+    """Return the colour scale of one of `labels.MAPS`: its own limits, or one that few vertices pass.
+
+    It begins at zero. Of deviations, and of growth where some is below zero, it is as wide on both sides, pale at zero.
+    The end is a round value, so that no outlier sets it.
+    """
+    measure = SHAPE_MEASURES.get(quantity, VertexMeasure(MAPS[quantity]))
+    if measure.limits is not None:
         return colour_scale(measure.colours, *measure.limits)
-    return magnitude_scale(values, MAGNITUDES if measure is None else measure.colours)
+    finite = values[np.isfinite(values)]
+    # by more than rounding
+    shrinks = quantity == AREA_GROWTH and finite.min() < -ROUNDING * np.abs(finite).max()
+    signed = quantity in DEVIATIONS or shrinks
+    sizes = np.abs(finite) if signed else finite
+    high = float(np.quantile(sizes, _MOST)) if len(sizes) else 1.0
+    end = round_up(high) if high > 0 else 1.0
+    low, colours = (-end, SIGNED) if signed else (0.0, measure.colours)
+    return colour_scale(colours, low, end, cut=bool((sizes > end).any()))
 
 
 def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMaps:
@@ -392,19 +367,16 @@ def zones_picture(mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_m
 
     Parameters
     ----------
-    zones : (m,) code of each face, of `ZONE_COLOURS`
+    zones : (m,) zone of each face, a place in `ZONE_NAMES`
     fissure_x_mm
         Where the medial views part the hemispheres.
     """
-    palette = np.zeros((max(ZONE_COLOURS) + 1, 3))
-    areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(palette)) * CM2_PER_MM2
-    legend = []
-    for code, colour in ZONE_COLOURS.items():
-        palette[code] = to_rgb(colour)
-        if areas[code]:
-            legend.append(Patch(color=colour, label=f"{ZONE_NAMES[code]} {areas[code]:.1f} cm²"))
+    colours = [ZONE_COLOURS[name] for name in ZONE_NAMES]
+    areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(colours)) * CM2_PER_MM2
+    shown = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]
+    legend = [Patch(color=colour, label=f"{name} {area:.1f} cm²") for name, colour, area in shown]
     panels = [
-        Panel(*restricted(mesh, palette[zones], view.hemisphere, fissure_x_mm), view, light=MAP)
+        Panel(*restricted(mesh, to_rgba_array(colours)[zones, :3], view.hemisphere, fissure_x_mm), view, light=MAP)
         for view in map(VIEWS.__getitem__, MEDIAL_VIEWS)
     ]
     # a brain of one hemisphere has no medial view of the other

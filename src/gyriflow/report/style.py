@@ -30,8 +30,6 @@ RIGHT_COLOUR = "#E0B400"
 SIMULATED_SURFACE_COLOUR = "#8FB4DC"
 REAL_SURFACE_COLOUR = "#EBD6B4"
 
-MAGNITUDES = "YlGnBu"
-"""Colour map of quantities from zero up: pale at zero, so that dark colours are values and not shade."""
 NEUTRAL_COLOUR = "#D9D9D9"
 """Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
@@ -125,11 +123,10 @@ def wrap(text: str, letters: int) -> str:
 
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table with columns run and subject in which simulated brains go by the names of `run_names`."""
-    pairs = list(dict.fromkeys(zip(table["run"], table["subject"], strict=True)))
-    pairs = [pair for pair in pairs if pair[0] != MEASURED]
-    names = dict(zip(pairs, run_names(pairs), strict=True))
-    shown = [names.get(pair, pair[0]) for pair in zip(table["run"], table["subject"], strict=True)]
-    return table.assign(run=shown)
+    pairs = list(zip(table["run"], table["subject"], strict=True))
+    simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != MEASURED]
+    names = dict(zip(simulated, run_names(simulated), strict=True))
+    return table.assign(run=[names.get(pair, pair[0]) for pair in pairs])
 
 
 def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
@@ -146,15 +143,14 @@ def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, A
     return {run: colour for run, colour in colours.items() if run in shown}
 
 
-def week_axis(axes: Axes, weeks: Iterable[float] | None = None) -> None:
+def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     """Label the horizontal axis as gestational weeks with whole weeks as ticks."""
+    values = list(weeks)
     axes.set_xlabel("gestational age (GW)")
     axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
-    if weeks is not None:
-        values = list(weeks)
-        # a single week stands in the middle of one
-        margin = max(0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2)
-        axes.set_xlim(min(values) - margin, max(values) + margin)
+    # a single week stands in the middle of one
+    margin = max(0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2)
+    axes.set_xlim(min(values) - margin, max(values) + margin)
 
 
 def from_zero(axes: Axes) -> None:

@@ -74,7 +74,11 @@ def surfaces_view(
             kept, faces = thin_out(frame[1], vertices)
             shown.append(_frame(frame, kept, box, scales) | {"faces": _text(faces, "<u2")})
         groups.append({"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR, "frames": shown})
-    maps = [_described(name, scale) for name, scale in scales.items()]
+    maps = []
+    for name, scale in scales.items():
+        bottom, top = scale.get_clim()
+        colours = scale.to_rgba(np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True)[:, :3]
+        maps.append({"name": name, "label": MAPS[name], "low": bottom, "high": top, "colours": _text(colours, "u1")})
     return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
 
 
@@ -105,12 +109,6 @@ def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDAr
     coarse = body.decimate_pro(1 - vertices / len(mesh.vertices), preserve_topology=True)
     _, kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
     return kept, np.asarray(coarse.regular_faces, dtype=np.int64)
-
-
-def _described(name: str, scale: ScalarMappable) -> dict[str, Any]:
-    low, high = scale.get_clim()
-    colours = scale.to_rgba(np.linspace(low, high, _VALUE_LEVELS + 1), bytes=True)[:, :3]
-    return {"name": name, "label": MAPS[name], "low": low, "high": high, "colours": _text(colours, "u1")}
 
 
 def _frame(

@@ -1,6 +1,6 @@
 """The figures and tables of a study, and what each is made from; `workflow/report/figures.yaml` says what they show."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,6 @@ from .records import Brain, Comparison, Measured, Simulation
 from .study import Study
 
 OF_STUDY, OF_RUN, OF_COMPARISON = f"{STUDY}/figures", f"{RUN}/figures", f"{STUDY}/{{study}}/figures"
-WEEKLY = f"{OF_STUDY}/weekly.{{brain}}.png"
 AROUND = ["left", "right", "top", "bottom"]
 THREE_SIDES = ["left", "top", "bottom"]
 REAL_BRAIN = "real brain"
@@ -27,22 +26,16 @@ class Figure:
 
     Attributes
     ----------
-    name
-        Name of the rule, which all figures of a kind share.
-    pattern
-        The file, a PNG, an HTML page or JSON, with wildcards. A PDF stands beside each PNG.
+    name : of the rule, which all figures of a kind share
+    pattern : the file, a PNG, an HTML page or JSON, with wildcards; a PDF stands beside each PNG
     draw
         The function that draws it, as `module.function` of `gyriflow.report`; empty for what another rule makes.
     inputs
         The files that the function takes, by its parameters: a file, or lists and dictionaries of files.
-    options
-        What else it takes.
-    names
-        Its wildcards, and what else its caption names.
-    target
-        The target that asks for it; "" for one of the paper alone, which is not in the report.
-    paper
-        Whether the target `paper` asks for it, too.
+    options : what else it takes
+    names : its wildcards, and what else its caption names
+    target : the target that asks for it; "" for one of the paper alone, which is not in the report
+    paper : whether the target `paper` asks for it, too
     may_end
         Run, start and week of simulations that may have ended before: `inputs["members"]` has none of theirs then.
     """
@@ -124,24 +117,20 @@ def measured_name(brains: Iterable[Brain]) -> str:
     Several populations are listed with their weeks. Real brains of unknown population are called "real brain"; shapes
     are called by their kind if they share one.
     """
-    populations: dict[str, list[float]] = {}
+    populations: dict[str, set[float]] = {}
     kinds = set()
     for brain in brains:
         if brain.given.shape is not None:
             kinds.add(brain.given.shape.kind)
         else:
-            populations.setdefault(brain.given.population or REAL_BRAIN, []).append(brain.week)
+            populations.setdefault(brain.given.population or REAL_BRAIN, set()).add(brain.week)
     names = list(populations)
-    if len(populations) > 1:
-        names = [f"{name} ({_span(weeks)} GW)" for name, weeks in populations.items()]
+    if len(names) > 1:
+        spans = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
+        names = [f"{name} ({span} GW)" for name, span in zip(names, spans, strict=True)]
     if kinds:
         names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
     return " or ".join(names) or REAL_BRAIN
-
-
-def _span(weeks: Sequence[float]) -> str:
-    first, last = min(weeks), max(weeks)
-    return f"{first:g}" if first == last else f"{first:g}-{last:g}"
 
 
 def _halves(row: Measured) -> list[list[str]]:
@@ -195,7 +184,8 @@ def _of_folding(study: Study) -> Iterator[Figure]:
         options = {"measured": measured_name(real.values())}
         surfaces = {week: brain.pial for week, brain in real.items()}
         inputs: Given = {"runs": {one.run: _whole(one) for one in runs}, "real": surfaces}
-        yield Figure("weekly_figure", WEEKLY, "pictures.runs_by_week", inputs, options, names, paper=True)
+        path = f"{OF_STUDY}/weekly.{{brain}}.png"
+        yield Figure("weekly_figure", path, "pictures.runs_by_week", inputs, options, names, paper=True)
         simulated = {one.run: {week: _whole(one)[week] for week in _measured_by_week(one)} for one in runs}
         inputs = {"runs": simulated, "real": surfaces}
         path = f"{OF_STUDY}/outlines.{{brain}}.png"
@@ -203,38 +193,29 @@ def _of_folding(study: Study) -> Iterator[Figure]:
         inputs = {"frames": {one.run: one.file(FOLDING["frames"]) for one in runs}}
         path = f"{OF_STUDY}/displacement_maps.{{brain}}.png"
         yield Figure("displacement_maps", path, "pictures.displacement_maps", inputs, names=names, paper=True)
+        brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
+        brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
+        path, quantity = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
+        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, quantity, names)
     zones = set()
     for one in study.folded:
-        zoned = repr((one.start.id, one.settings.model_dump(include=ZONES)))
-        yield from _of_run(one, first_with_zones=zoned not in zones)
-        zones.add(zoned)
+        if one.shapes and "growth" in one.settings.fields:
+            inputs = {"frames": one.file(FOLDING["frames"]), "params": one.file(PARAMETERS)}
+            growth: Given = {"quantity": "area_growth_percent_per_gw", "views": THREE_SIDES}
+            path = f"{OF_RUN}/growth_found.png"
+            yield Figure("growth_found_figure", path, "pictures.scalar_maps", inputs, growth, one.names)
+        if (zoned := repr((one.start.id, one.settings.model_dump(include=ZONES)))) not in zones:
+            zones.add(zoned)
+            inputs = {name: one.file(file) for name, file in {**REGIONS, "params": PARAMETERS}.items()}
+            path = f"{OF_RUN}/zones.png"
+            yield Figure("zones_figure", path, "pictures.zones_picture", inputs, names=one.names, target="", paper=True)
     yield Figure("study_runs", f"{STUDY}/runs.html", target="metrics")
     table, named = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
     path = f"{OF_STUDY}/displacement.png"
     yield Figure("displacement_figure", path, "growth.displacement_chart", table, named, paper=True)
 
 
-def _of_run(one: Simulation, *, first_with_zones: bool) -> Iterator[Figure]:
-    names = one.names
-    if one.shapes and "growth" in one.settings.fields:
-        inputs = {"frames": one.file(FOLDING["frames"]), "params": one.file(PARAMETERS)}
-        options = {"quantity": "area_growth_percent_per_gw", "views": THREE_SIDES}
-        path = f"{OF_RUN}/growth_found.png"
-        yield Figure("growth_found_figure", path, "pictures.scalar_maps", inputs, options, names)
-    if first_with_zones:
-        inputs = {name: one.file(file) for name, file in {**REGIONS, "params": PARAMETERS}.items()}
-        path = f"{OF_RUN}/zones.png"
-        yield Figure("zones_figure", path, "pictures.zones_picture", inputs, names=names, target="", paper=True)
-
-
 def _of_metrics(study: Study) -> Iterator[Figure]:
-    for start in study.starts:
-        runs = [one for one in study.folded if one.start is start]
-        real = _measured_by_week(*runs)
-        brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
-        brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
-        path, quantity = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
-        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, quantity, {"brain": start.id})
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
     options = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
@@ -339,9 +320,8 @@ def _of_comparison(study: Study, comparison: Comparison) -> Iterator[Figure]:
     if len(vary) == 1 and real and all(isinstance(value, int | float) for value in next(iter(vary.values()))):
         inputs = {table: f"{STUDY}/{comparison.name}/{table}.csv" for table in ("comparison", "nearest")}
         options = {"varied": next(iter(vary)), "subject": start.id, "real": [brain.id for brain in real]}
-        yield Figure(
-            "nearest_figure", f"{OF_COMPARISON}/nearest.png", "scores.nearest_chart", inputs, options, **shared
-        )
+        path = f"{OF_COMPARISON}/nearest.png"
+        yield Figure("nearest_figure", path, "scores.nearest_chart", inputs, options, **shared)
 
 
 def _of_the_rest(study: Study) -> Iterator[Figure]:
