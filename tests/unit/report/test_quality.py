@@ -10,13 +10,7 @@ from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
 from gyriflow.geometry.triangles import transformed
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.report.quality import (
-    Brain,
-    quality_page,
-    quality_row,
-    quality_table,
-    tissue_groups,
-)
+from gyriflow.report.quality import Brain, quality_page, quality_row, quality_table, tissue_groups
 
 LABELS = {"subject": "a", "week": 24.0, "population": None, "source": "labels", "sides": "left right", "page": "a.png"}
 REPORT = {

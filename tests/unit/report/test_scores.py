@@ -6,26 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.report.scores import (
-    calibration_chart,
-    nearest_chart,
-    onset_chart,
-    prediction_chart,
-    validation_chart,
-)
+from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, prediction_chart, validation_chart
 
 NOTHING_PUBLISHED = pd.DataFrame({"measure": [], "paper": []})
 OF_THE_STUDY = {"varied": "thickness_mm", "subject": "s", "real": ["r"]}
-NAMES = ["thickness_mm", "growth_rate_per_s"]
-RUNS = pd.DataFrame(
-    {
-        "thickness_mm": [1.0, 2.0, 3.0, 2.2],
-        "growth_rate_per_s": [1e-7, 2e-7, 3e-7, 2.2e-7],
-        "round": [0, 0, 0, 1],
-        "score": [0.5, 0.2, np.nan, 0.1],
-    }
-)
-OPTIMUM = pd.DataFrame({"parameter": NAMES, "value": [2.1, 2.1e-7]})
+TRIED = {"thickness_mm": [1.0, 2.0, 3.0, 2.2], "growth_rate_per_s": [1e-7, 2e-7, 3e-7, 2.2e-7]}
+RUNS = pd.DataFrame(TRIED | {"round": [0, 0, 0, 1], "score": [0.5, 0.2, np.nan, 0.1]})
+OPTIMUM = pd.DataFrame({"parameter": ["thickness_mm", "growth_rate_per_s"], "value": [2.1, 2.1e-7]})
 
 
 def test_each_parameter_of_a_calibration_has_a_panel():
