@@ -252,8 +252,7 @@ def influence_spectra(
     real : the same of measured brains, where `run` is "real"
     values : {run: {parameter: value}}
         What is varied, in the order of the study.
-    week
-        In GW.
+    week : in GW
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
     simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]

@@ -62,10 +62,8 @@ def growth_chart(
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
     figure, (of_areas, of_volumes, *of_rates) = panel_figure(2 + len(names), panel_in=2.4, foot_in=0.0)
-    for axes, column, label in (
-        (of_areas, "area_cm2", "pial area (cm²)"),
-        (of_volumes, "volume_ml", "volume (mL)"),
-    ):
+    labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
+    for axes, (column, label) in zip((of_areas, of_volumes), labels.items(), strict=True):
         _sizes_panel(axes, areas, column, colours)
         axes.set_ylabel(label)
         if len(names) == 1:

@@ -38,8 +38,7 @@ def shown_figures(
     ----------
     words : {name of a rule: section, title, caption in reStructuredText, and whether it is technical}
         In titles and captions the names of figures stand in braces.
-    figures
-        Rule, path and names of each figure.
+    figures : rule, path and names of each figure
     contents : {path: HTML, or a picture's data address and its width in inches}
     """
     starts = {rule: {names.get("brain") for other, _, names in figures if other == rule} for rule, _, _ in figures}
@@ -124,14 +123,11 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
 
     Parameters
     ----------
-    template
-        Jinja template of the page, which escapes what is put in.
+    template : Jinja template of the page, which escapes what is put in
     parts : style, three, notice, controls, viewer
         The style sheet and the scripts of the 3D view with their licence, put into the page as they are.
-    view
-        What `view_data` returns.
-    content
-        What else the template names; HTML as `Markup`.
+    view : what `view_data` returns
+    content : what else the template names; HTML as `Markup`
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     # within a script, nothing may look like its end
@@ -163,8 +159,7 @@ def brains_table(brains: Sequence[Mapping[str, Any]], quality: pd.DataFrame) -> 
 
     Parameters
     ----------
-    brains
-        id, week, population, source, licence, and whether it is synthetic, as the configuration has them.
+    brains : id, week, population, source, licence, and whether it is synthetic, as the configuration has them
     quality : columns subject, verdict, cause, warnings, volume_ml, area_cm2
         The table of quality control.
     """

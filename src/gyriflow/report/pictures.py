@@ -192,8 +192,7 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
 
     Parameters
     ----------
-    names
-        The maps that are wanted; a hemisphere that lacks one has NaN.
+    names : the maps that are wanted; a hemisphere that lacks one has NaN
     """
     if names is None:
         names = [name for name in halves[0][1] if all(name in maps for _, maps in halves)]
@@ -235,8 +234,7 @@ def scalar_maps(
     ----------
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
-    quantity
-        A name of `labels.MAPS`.
+    quantity : a name of `labels.MAPS`
     directions : {week or run: (n, 3) vectors at the vertices}
         Drawn as lines in proportion to these, but for the longest tenth, which are alike.
     """
@@ -368,8 +366,7 @@ def zones_picture(mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_m
     Parameters
     ----------
     zones : (m,) zone of each face, a place in `ZONE_NAMES`
-    fissure_x_mm
-        Where the medial views part the hemispheres.
+    fissure_x_mm : where the medial views part the hemispheres
     """
     colours = [ZONE_COLOURS[name] for name in ZONE_NAMES]
     areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(colours)) * CM2_PER_MM2

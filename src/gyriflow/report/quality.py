@@ -227,12 +227,9 @@ def quality_row(
 
     Parameters
     ----------
-    labels
-        subject, week, population, source, sides and page.
-    report, thickness
-        What the surface stage and the thickness say, as in `surface.json` and `thickness.json`.
-    expected_ml
-        The coarse volume of a cerebrum of the week; of one side alone half of it is expected.
+    labels : subject, week, population, source, sides and page
+    report, thickness : what the surface stage and the thickness say, as in `surface.json` and `thickness.json`
+    expected_ml : the coarse volume of a cerebrum of the week; of one side alone half of it is expected
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
     pose = pose_from(report["pose"])
@@ -263,10 +260,8 @@ def quality_table(
 
     Parameters
     ----------
-    rows
-        What `quality_row` returns.
-    refused
-        labels and cause of the brains that were refused.
+    rows : what `quality_row` returns
+    refused : labels and cause of the brains that were refused
     """
     every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
     table = pd.DataFrame(every, columns=list(COLUMNS)).set_index("subject", drop=False)

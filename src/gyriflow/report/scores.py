@@ -54,8 +54,7 @@ def validation_chart(
     validation
         Columns run, start_week, week, kind, gain_…, gain_low_…, gain_high_…, r_start_…, r_adjacent_… of each of
         `labels.MEASURES`.
-    ceiling
-        The same of the start carried by registration.
+    ceiling : the same of the start carried by registration
     """
     colours = run_colours(validation["run"], runs)
     figure, panels = panel_figure(len(MEASURES), per_row=2, panel_in=2.5)
@@ -102,8 +101,7 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
 
     Parameters
     ----------
-    prediction
-        Columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm.
+    prediction : columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm
     """
     columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
     places = list(product(dict.fromkeys(prediction["start"]), columns))
@@ -140,8 +138,7 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
 
     Parameters
     ----------
-    onset
-        Columns run ("real" for the real brains), subject, region, there_at_start, onset_week.
+    onset : columns run ("real" for the real brains), subject, region, there_at_start, onset_week
     """
     several = len(onset["subject"].unique()) > 1
     table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
@@ -192,10 +189,8 @@ def nearest_chart(
         parameter. Where the flag or the resolution is not "ok", a distance is not to be trusted: its mark is open.
     nearest : columns measure, paper
         The value that the publication found nearest by a measure is drawn as a dashed line.
-    varied
-        Name of the column with the parameter's values.
-    subject, real
-        The start brain, and the measured brains that it is compared with.
+    varied : name of the column with the parameter's values
+    subject, real : the start brain, and the measured brains that it is compared with
 
     Raises
     ------
@@ -264,8 +259,7 @@ def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Seque
     ----------
     runs : columns of the parameters, round, score (NaN: diverged)
     optimum : columns parameter, value
-    score
-        What the score is the sum of.
+    score : what the score is the sum of
     """
     figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]

@@ -80,12 +80,9 @@ def panel_figure(
 
     Parameters
     ----------
-    per_row
-        Panels of a full row, which is as wide as a page.
-    panel_in, foot_in
-        Height of a row, and what is left for the legend, in inches.
-    grid
-        What else `Figure.subplots` takes.
+    per_row : panels of a full row, which is as wide as a page
+    panel_in, foot_in : height of a row, and what is left for the legend, in inches
+    grid : what else `Figure.subplots` takes
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
@@ -103,17 +100,8 @@ def add_letters(panels: Iterable[Axes]) -> None:
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
             # beside the title, which may be as wide as the panel
-            axes.annotate(
-                letter,
-                (0.0, 1.0),
-                xytext=(-12, 4),
-                xycoords="axes fraction",
-                textcoords="offset points",
-                ha="right",
-                va="bottom",
-                fontweight="bold",
-                fontsize=9,
-            )
+            place: dict[str, Any] = {"xytext": (-12, 4), "xycoords": "axes fraction", "textcoords": "offset points"}
+            axes.annotate(letter, (0.0, 1.0), ha="right", va="bottom", fontweight="bold", fontsize=9, **place)
 
 
 def wrap(text: str, letters: int) -> str:

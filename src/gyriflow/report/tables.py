@@ -14,7 +14,6 @@ from .charts import WITH_NORMS
 from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
 from .style import REAL_BRAIN, run_colours, runs_by_name
 
-SECONDS_PER_HOUR = 3600
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
 NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?|–")
@@ -69,8 +68,7 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; several measured brains of a week give their mean.
-    measured
-        Heading of the measured brains' column.
+    measured : heading of the measured brains' column
 
     Returns
     -------
@@ -171,8 +169,7 @@ def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
 
     Parameters
     ----------
-    order
-        Of the elements.
+    order : of the elements
     steps : columns week, elements_through_cortex
         One row per step; no number where no element has its centre in the cortex, which counts as none.
 
@@ -205,7 +202,7 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     DataFrame with columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh,
     co2e_g
     """
-    hours = jobs[["wall_s", "cpu_s"]].astype(float) / SECONDS_PER_HOUR
+    hours = jobs[["wall_s", "cpu_s"]].astype(float) / 3600
     each = jobs.assign(hours=hours["wall_s"], core_hours=hours.max(axis=1), run=jobs["run"].fillna(""), jobs=1)
     of_all = {"jobs": "sum", "hours": "sum", "core_hours": "sum", "memory_MiB": "max"}
     stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(of_all)

@@ -30,8 +30,7 @@ class Figure:
     pattern : the file, a PNG, an HTML page or JSON, with wildcards; a PDF stands beside each PNG
     draw
         The function that draws it, as `module.function` of `gyriflow.report`; empty for what another rule makes.
-    inputs
-        The files that the function takes, by its parameters: a file, or lists and dictionaries of files.
+    inputs : the files that the function takes, by its parameters: a file, or lists and dictionaries of files
     options : what else it takes
     names : its wildcards, and what else its caption names
     target : the target that asks for it; "" for one of the paper alone, which is not in the report
@@ -166,12 +165,9 @@ def _of_brains(study: Study) -> Iterator[Figure]:
 def _of_growth(study: Study) -> Iterator[Figure]:
     if not study.growing:
         return
-    given = study.config.folding.growth_rate_per_s
-    rate: float | dict[float, float] | None = None
-    if isinstance(given, float):
-        rate = given
-    elif given.map is None:
-        rate = dict(given.weeks or {})
+    rate: Any = study.config.folding.growth_rate_per_s
+    if not isinstance(rate, float):
+        rate = dict(rate.weeks or {}) if rate.map is None else None
     options = {"measured": measured_name(brain for _, brain in study.growing), "folding_rate_per_s": rate}
     path = f"{STUDY}/growth/growth.png"
     yield Figure("growth_figure", path, "growth.growth_chart", GROWTH, options, target="growth", paper=True)
