@@ -19,14 +19,14 @@ from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
-SURFACES = (".gii", ".stl", ".ply", ".obj")
+SURFACES = (".gii", ".vtk", ".vtp", ".stl", ".ply", ".obj")
 FREESURFER = re.compile(r"[lr]h\.(?:pial|white)")
 LABELS = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
 SIDES = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
 KINDS = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
 WEEK = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
 SUFFIXES = re.compile(
-    r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|nii|gz|mgz|mgh|gii|stl|ply|obj)(?=[._-]|$)",
+    r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|nii|gz|mgz|mgh|gii|vt[kp]|stl|ply|obj)(?=[._-]|$)",
     re.IGNORECASE,
 )
 SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.*[_/])?(ses-[A-Za-z0-9]+))?")

@@ -29,7 +29,7 @@ MEANINGS: dict[str, tuple[str, ...]] = {
 
 
 class HemisphereFiles(Settings):
-    """The pial surfaces of both hemispheres: GIFTI, FreeSurfer, STL, PLY or OBJ files."""
+    """The pial surfaces of both hemispheres: GIFTI, FreeSurfer, VTK, STL, PLY or OBJ files."""
 
     left: InputFile
     """File of the left hemisphere."""

@@ -1,4 +1,4 @@
-"""Triangle surfaces (GIFTI, FreeSurfer, STL, PLY, OBJ), in mm, and maps and labels at their vertices (GIFTI).
+"""Triangle surfaces (GIFTI, FreeSurfer, VTK, STL, PLY, OBJ), in mm, and maps and labels at their vertices (GIFTI).
 
 Where a file says in which space its coordinates are, they are brought to scanner space.
 """
@@ -29,14 +29,15 @@ log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 MESH_SUFFIXES = (".stl", ".ply", ".obj")
-SURFACE_KINDS = ".surf.gii, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
+VTK_SUFFIXES = (".vtk", ".vtp")
+SURFACE_KINDS = ".surf.gii, .vtk, .vtp, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
 FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
-    """Return the surface of a GIFTI, FreeSurfer, STL, PLY or OBJ file, in the order of corners of the file.
+    """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY or OBJ file, in the order of corners of the file.
 
     Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
     there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
@@ -55,6 +56,8 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
     with reading(path, "a surface", SURFACE_KINDS):
         if path.suffix.lower() in MESH_SUFFIXES:
             vertices, faces, space, structure = *_read_with_trimesh(path), None, None
+        elif path.suffix.lower() in VTK_SUFFIXES:
+            vertices, faces, space, structure = *_read_with_pyvista(path), None, None
         elif path.suffix.lower() == ".gii" or path.name.endswith(".gii.gz"):
             vertices, faces, space, structure = _read_gifti_surface(path)
         else:
@@ -216,6 +219,16 @@ def _read_with_trimesh(path: Path) -> tuple[Floats, NDArray]:
     # process=True joins equal vertices: STL stores each corner of each face
     body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
+
+
+def _read_with_pyvista(path: Path) -> tuple[Floats, NDArray]:
+    import pyvista as pv
+
+    data = pv.read(path)
+    # what VTK computes from damaged cells may end the process, so that these are taken as they are
+    if not isinstance(data, pv.PolyData) or not data.n_points or not data.is_all_triangles:
+        raise InputError("holds no surface", path=path, found=type(data).__name__, expected="triangles (PolyData)")
+    return np.asarray(data.points, dtype=float), np.asarray(data.regular_faces)
 
 
 def read_pose(path: AnyPath) -> Pose:

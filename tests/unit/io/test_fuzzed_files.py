@@ -8,6 +8,7 @@ import gzip
 import nibabel as nib
 import numpy as np
 import pytest
+import pyvista as pv
 from fuzzing import MANY, damaged, outcome
 from hypothesis import given
 from hypothesis import strategies as st
@@ -60,6 +61,9 @@ def wholes(tmp_path_factory):
     info = {"head": [2, 0, 20], "valid": "1  # volume info valid", "filename": "a.mgz", "volume": [8, 8, 8]}
     axes = {"xras": [-1.0, 0, 0], "yras": [0, 0, -1.0], "zras": [0, 1.0, 0], "cras": [1.0, 2.0, 3.0]}
     write_geometry(folder / "lh.pial", BALL.vertices, BALL.faces, volume_info=info | {"voxelsize": [1.0] * 3} | axes)
+    body = pv.PolyData.from_regular_faces(BALL.vertices, BALL.faces)
+    body.save(folder / "a.vtk", binary=False)
+    body.save(folder / "a.vtp")
     write_vertex_labels(folder / "a.label.gii", np.arange(len(BALL.vertices)) % 3, {1: "one", 2: "two"})
     write_vertex_maps(folder / "a.shape.gii", {"depth": BALL.vertices[:, 0]})
     write_maps(folder / "a.h5", {"thickness_mm": BALL.vertices[:, 0]})
@@ -78,7 +82,8 @@ def tried(tmp_path, name, data, read):
     [
         ("a.nii", read_label_volume, 352), ("a.mgh", read_label_volume, 284), ("a.nii.gz", read_volume_map, 16),
         ("a.surf.gii", read_surface, 1500), ("lh.pial", read_surface, 80), ("a.stl", read_surface, 84),
-        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.label.gii", read_vertex_labels, 800),
+        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.vtk", read_surface, 200),
+        ("a.vtp", read_surface, 1000), ("a.label.gii", read_vertex_labels, 800),
         ("a.shape.gii", read_vertex_maps, 800), ("a.h5", read_maps, 200), ("a.json", read_json, None),
         ("participants.tsv", read_tab_separated, None), ("participants.tsv", read_table, None),
         ("study.yaml", read_yaml, None),
@@ -110,3 +115,15 @@ def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path,
     path.write_bytes(data if suffix == "nii" else gzip.compress(data))
     with pytest.raises(InputError, match="is shorter than its header says"):
         read_label_volume(path)
+
+
+@pytest.mark.parametrize(("old", "new"), [(b"\n3 ", b"\n3 7777"), (b"\n3 ", b"\n9 ")])
+def test_vtk_cells_that_name_missing_points_do_not_end_the_process(tmp_path, old, new):
+    points = "0 0 0 1 0 0 0 1 0 0 0 1"
+    faces = "\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
+    text = f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}\nPOLYGONS 4 16{faces}"
+    path = tmp_path / "a.vtk"
+    path.write_bytes(text.encode())
+    assert len(read_surface(path).faces) == 4
+    path.write_bytes(text.encode().replace(old, new))
+    assert outcome(read_surface, path) is None

@@ -3,6 +3,7 @@
 import nibabel as nib
 import numpy as np
 import pytest
+import pyvista as pv
 from nibabel.freesurfer.io import write_geometry
 from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
 from nibabel.nifti1 import intent_codes
@@ -37,9 +38,12 @@ def gifti(path, vertices, faces):
     return path
 
 
-@pytest.mark.parametrize("name", ["a.surf.gii", "a.stl", "a.ply", "a.obj"])
+@pytest.mark.parametrize("name", ["a.surf.gii", "a.stl", "a.ply", "a.obj", "a.vtk", "a.vtp"])
 def test_written_surface_comes_back_closed_and_outward(tmp_path, ball, name):
-    write_surface(tmp_path / name, ball)
+    if ".vt" in name:
+        pv.PolyData.from_regular_faces(np.array(ball.vertices), np.array(ball.faces, dtype=int)).save(tmp_path / name)
+    else:
+        write_surface(tmp_path / name, ball)
     back = read_surface(tmp_path / name)
     assert len(back.vertices) == len(ball.vertices)
     assert is_closed(back)
