@@ -45,7 +45,7 @@ class Folding:
     """A brain that folds: the solver's objects, made once, and one step at a time.
 
     The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `growth` is how tissue grew
-    in the last step, or will in the first one. `quadrature_degree` is that of `Problem`.
+    in the last step, or will in the first one.
     """
 
     def __init__(
@@ -55,8 +55,6 @@ class Folding:
         zones: Zones,
         parameters: FoldingParameters,
         maps: Maps | None = None,
-        *,
-        quadrature_degree: int | None = None,
     ) -> None:
         p = self.parameters = parameters
         self.zones, self.maps = zones, maps or {}
@@ -67,7 +65,6 @@ class Folding:
             zones,
             MATERIALS[p.material](p.poisson_ratio),
             penalty_pa_per_m=PENALTY_PA_PER_M if p.contact.kind == "planes" else 0.0,
-            quadrature_degree=quadrature_degree,
             remembers_stress=p.stress_memory_gw > 0,
         )
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
