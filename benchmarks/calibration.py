@@ -28,7 +28,7 @@ BOUNDS = {"thickness_mm": [1.2, 4.0], "growth_rate_per_s": [1.0e-7, 4.0e-7]}
 
 
 def study(edge_mm: float) -> dict[str, Any]:
-    """Returns what both configurations share: the start brain, a coarse mesh, the paper's model in steps of a day."""
+    """Return what both configurations share: the start brain, a coarse mesh, the paper's model in steps of a day."""
     return {
         "atlas": {"name": "spina-bifida", "series": "unoperated", "weeks": [21]},
         "start": START,
@@ -48,7 +48,7 @@ def study(edge_mm: float) -> dict[str, Any]:
 
 
 def call(folder: Path, config: dict[str, Any], target: str, cores: int) -> None:
-    """Runs a target in a folder; GyriflowError where it fails."""
+    """Run a target in a folder; GyriflowError where it fails."""
     write_yaml(folder / "study.yaml", config)
     command = [sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(cores), target, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]

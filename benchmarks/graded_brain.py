@@ -35,7 +35,7 @@ TETS_AT_1_MM, POWER = 7.86e4, 2.38
 
 
 def brain_mesh(tets: int) -> TetrahedralMesh:
-    """Returns a mesh of about `tets` elements in RAS+ mm, its fissure at x = 0; ValueError for too few."""
+    """Return a mesh of about `tets` elements in RAS+ mm, its fissure at x = 0; ValueError for too few."""
     if tets < FEWEST_TETS:
         raise ValueError(f"elements of so coarse a mesh reach across the fissure: at least {FEWEST_TETS} are needed")
     # not where runs import this file: the meshers' libraries and those of the solver do not go together
@@ -55,7 +55,7 @@ def brain_mesh(tets: int) -> TetrahedralMesh:
 
 @cache
 def brain_surface() -> TriangleMesh:
-    """Returns the brain's surface, closed and outward, in RAS+ mm."""
+    """Return the brain's surface, closed and outward, in RAS+ mm."""
     import igl
 
     axes = [np.arange(-half, half + SPACING_MM, SPACING_MM) for half in SEMI_AXES_MM + 2.25]
@@ -66,7 +66,7 @@ def brain_surface() -> TriangleMesh:
 
 
 def _level(points: Floats) -> Floats:
-    """Returns a function in mm of (n, 3) points that is negative inside the brain and close to the distance near it."""
+    """Return a function in mm of (n, 3) points that is negative inside the brain and close to the distance near it."""
     # deep inside, where directions change fast, by position
     direction = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 10.0)
     dents = DENT_MM * np.cos(direction @ WAVES.T + np.arange(len(WAVES))).mean(axis=1)
@@ -77,12 +77,12 @@ def _level(points: Floats) -> Floats:
 
 
 def _ellipsoid(points: Floats, semi_axes: Floats) -> Floats:
-    """Returns about the distance to an ellipsoid, negative inside: a function over its gradient's length."""
+    """Return about the distance to an ellipsoid, negative inside: a function over its gradient's length."""
     points = np.abs(points) + 1e-9  # the gradient vanishes in the centre
     scaled = np.linalg.norm(points / semi_axes, axis=1)
     return scaled * (scaled - 1) / np.linalg.norm(points / semi_axes**2, axis=1)
 
 
 def _smaller(a: Floats, b: Floats) -> Floats:
-    """Returns the minimum of both, rounded off where they meet."""
+    """Return the minimum of both, rounded off where they meet."""
     return -ROUNDING_MM * np.logaddexp(-a / ROUNDING_MM, -b / ROUNDING_MM)

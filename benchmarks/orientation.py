@@ -72,13 +72,13 @@ def main() -> None:
 
 
 def pairs_of_files(folder: Path) -> list[Files]:
-    """Returns the files of each brain in a folder, the left hemisphere's first."""
+    """Return the files of each brain in a folder, the left hemisphere's first."""
     pairs = [(left, left.with_name(left.name.replace("left", "right"))) for left in sorted(folder.glob("*left*"))]
     return [(left, right) for left, right in pairs if right.exists()]
 
 
 def posed(brain: Files) -> PialSurface:
-    """Returns the pial surface of two files, coarse, as the workflow makes it."""
+    """Return the pial surface of two files, coarse, as the workflow makes it."""
     left, right, declared = read_hemispheres(*brain)
     edge = max(1.2, abs(signed_volume(left)) ** (1 / 3) / 25)
     settings = {"week": _week(left), "edge_length_mm": edge, "max_asymmetry": 0.05}
@@ -86,7 +86,7 @@ def posed(brain: Files) -> PialSurface:
 
 
 def errors(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, float]:
-    """Returns the worst errors in degrees and mm.
+    """Return the worst errors in degrees and mm.
 
     Pitch, about x, and tilt, about the other axes, are the parts of the angles. Those `of_study` are what is left once
     one rotation, the same for all, has been taken off: absolute pitch is a convention. Offset and gap are the places of
@@ -115,7 +115,7 @@ def errors(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, float]:
 
 
 def counts(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, int]:
-    """Returns how many files were recognised as inside out or not, and how many brains are two closed pieces."""
+    """Return how many files were recognised as inside out or not, and how many brains are two closed pieces."""
     right, closed = 0, 0
     for brain, surface in surfaces.items():
         closed += [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)] == [True, True]
@@ -126,7 +126,7 @@ def counts(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, int]:
 
 
 def _week(left: TriangleMesh) -> float:
-    """Returns the week whose brains are nearest in size."""
+    """Return the week whose brains are nearest in size."""
     volume = 2e-3 * abs(signed_volume(left))
     return float(min(WEEKS, key=lambda week: abs(np.log(expected_volume_ml(week) / volume))))
 
@@ -136,7 +136,7 @@ def _worst(values: Floats) -> float:
 
 
 def moved_at_random(arguments: argparse.Namespace, known: dict) -> dict[str, dict]:
-    """Writes the hemispheres of a folder, moved, and returns their truth; `known` is that of the folder, or empty."""
+    """Write the hemispheres of a folder, moved, and return their truth; `known` is that of the folder, or empty."""
     random, truth = np.random.default_rng(arguments.seed), {}
     for files in pairs_of_files(arguments.folder):
         shared = any_motion(random)
@@ -156,12 +156,12 @@ def moved_at_random(arguments: argparse.Namespace, known: dict) -> dict[str, dic
 
 
 def any_motion(random: np.random.Generator) -> np.ndarray:
-    """Returns a random rigid motion, (4, 4): any rotation, and a shift of a few centimetres."""
+    """Return a random rigid motion, (4, 4): any rotation, and a shift of a few centimetres."""
     return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0.0, FAR_MM, 3))
 
 
 def deformed(mesh: TriangleMesh, rms_mm: float, random: np.random.Generator) -> TriangleMesh:
-    """Returns the surface stretched by up to 4 % along each axis and bent by random waves, without a rigid motion.
+    """Return the surface stretched by up to 4 % along each axis and bent by random waves, without a rigid motion.
 
     `rms_mm` is the root mean square length of the waves' displacements. The volume is kept.
     """

@@ -33,7 +33,7 @@ TEXTS = {"GNU LESSER GENERAL PUBLIC LICENSE": "LGPL", "Mozilla Public License": 
 
 
 def required(name: str, found: dict[str, metadata.Distribution]) -> None:
-    """Adds a distribution and those that it needs, extras aside, to `found`."""
+    """Add a distribution and those that it needs, extras aside, to `found`."""
     key = re.sub(r"[-_.]+", "-", name).lower()
     if key in found:
         return
@@ -48,7 +48,7 @@ def required(name: str, found: dict[str, metadata.Distribution]) -> None:
 
 
 def stated(distribution: metadata.Distribution) -> str:
-    """Returns the licence that a distribution states: as an expression, in a class, in a word, or by its text."""
+    """Return the licence that a distribution states: as an expression, in a class, in a word, or by its text."""
     about = distribution.metadata
     classes = [name.split(" :: ")[-1] for name in about.get_all("Classifier") or [] if name.startswith("License")]
     text = about.get("License-Expression") or "; ".join(classes) or ""
@@ -63,7 +63,7 @@ def stated(distribution: metadata.Distribution) -> str:
 
 
 def in_copyright(folder: Path) -> list[tuple[str, str]]:
-    """Returns Debian packages with the licences in their `copyright` files, the most frequent first."""
+    """Return Debian packages with the licences in their `copyright` files, the most frequent first."""
     rows = []
     for file in sorted(folder.glob("*/copyright")):
         if file.parent.name.startswith("lib") and any(part in file.parent.name for part in DEBIAN):
@@ -73,7 +73,7 @@ def in_copyright(folder: Path) -> list[tuple[str, str]]:
 
 
 def kind(licence: str) -> str:
-    """Returns the kind of a licence."""
+    """Return the kind of a licence."""
     return next((name for name, pattern in KINDS.items() if re.search(pattern, licence)), "other")
 
 

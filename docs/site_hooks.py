@@ -28,14 +28,14 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Adds the pages that lie elsewhere in the checkout."""
+    """Add the pages that lie elsewhere in the checkout."""
     for source, page in PAGES.items():
         files.append(File.generated(config, page, content=(CHECKOUT / source).read_text(encoding="utf-8")))
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Makes links to files that are no pages of the site into their names, and mends those between pages."""
+    """Make links to files that are no pages of the site into their names, and mend those between pages."""
     sources = {site: source for source, site in PAGES.items()}
     here = sources.get(page.file.src_uri, f"docs/{page.file.src_uri}")
 

@@ -15,7 +15,7 @@ WEEK = 24.0
 
 @cache
 def atlas_labels(week: float = WEEK) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the (i, j, k) labels of an unoperated week in voxels of 1.6 mm, and their (4, 4) affine."""
+    """Return the (i, j, k) labels of an unoperated week in voxels of 1.6 mm, and their (4, 4) affine."""
     path = SHIPPED / "atlases" / "spina-bifida" / f"fetal_SB_atlas_GA{week:g}_notoperated" / "parcellation.nii.gz"
     volume = read_label_volume(path)
     return volume.labels[::2, ::2, ::2], volume.affine @ np.diag([2.0, 2.0, 2.0, 1.0])
@@ -23,14 +23,14 @@ def atlas_labels(week: float = WEEK) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def atlas_brain() -> TriangleMesh:
-    """Returns the closed surface of both hemispheres, joined."""
+    """Return the closed surface of both hemispheres, joined."""
     mask, affine, _ = _cerebrum()
     return mask_surface(mask, affine)
 
 
 @cache
 def atlas_halves() -> tuple[TriangleMesh, TriangleMesh]:
-    """Returns the closed surfaces of the left and the right hemisphere, cut apart beside x = 0, in RAS+."""
+    """Return the closed surfaces of the left and the right hemisphere, cut apart beside x = 0, in RAS+."""
     mask, affine, x = _cerebrum()
     left, right = (mask_surface(mask & side, affine) for side in (x < -0.5, x > 0.5))
     return left, right

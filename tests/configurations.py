@@ -11,31 +11,31 @@ LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}
 
 
 def labelled(*weeks, names="abcdefgh"):
-    """Returns brains of labels, of some weeks, that are called a, b, ..."""
+    """Return brains of labels, of some weeks, that are called a, b, ..."""
     return [{"id": name, "week": week, **LABELLED} for name, week in zip(names, weeks, strict=False)]
 
 
 def study(brains=None, **changes):
-    """Returns a valid configuration, of two brains if no brains are given, with changes on its top level."""
+    """Return a valid configuration, of two brains if no brains are given, with changes on its top level."""
     return {"brains": brains or labelled(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
 
 
 def touched(folder, *names):
-    """Makes empty files in a folder, which it returns."""
+    """Make empty files in a folder, which it returns."""
     for name in names:
         (folder / name).touch()
     return folder
 
 
 def refusal(raw, folder="."):
-    """Returns the message with which a configuration is refused."""
+    """Return the message with which a configuration is refused."""
     with pytest.raises(InputError) as caught:
         load(raw, folder)
     return str(caught.value)
 
 
 def problems(raw, folder="."):
-    """Returns the lines of that message, a problem each; none where the configuration is valid."""
+    """Return the lines of that message, a problem each; none where the configuration is valid."""
     try:
         load(raw, folder)
     except InputError as error:
@@ -48,15 +48,15 @@ def problems(raw, folder="."):
 
 
 def keys(raw, folder="."):
-    """Returns the keys of these problems."""
+    """Return the keys of these problems."""
     return [line.partition(": ")[0] for line in problems(raw, folder)]
 
 
 def series_of(study: Study) -> dict[str, list[str]]:
-    """Returns the ids of the brains of each growth series."""
+    """Return the ids of the brains of each growth series."""
     return {name: [brain.id for brain in brains] for name, brains in study.series.brains.items()}
 
 
 def series_for(study: Study, brain: str) -> str | None:
-    """Returns the growth series whose curves a brain follows."""
+    """Return the growth series whose curves a brain follows."""
     return study.series.for_sizes(study.brains[brain])

@@ -38,7 +38,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Puts what takes long first, so that no worker is left alone with it at the end."""
+    """Put what takes long first, so that no worker is left alone with it at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 
     def place(item):
@@ -49,7 +49,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_xdist_auto_num_workers(config):
-    """Returns a worker a core; none for a single file, which takes less long than workers to start."""
+    """Return a worker a core; none for a single file, which takes less long than workers to start."""
     single = len(config.args) == 1 and Path(config.args[0].partition("::")[0]).is_file()
     return 0 if single else min(len(os.sched_getaffinity(0)), MOST_WORKERS)
 

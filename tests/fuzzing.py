@@ -31,7 +31,7 @@ ODD_BYTES = st.one_of(
 
 @st.composite
 def damaged(draw: st.DrawFn, whole: bytes, header: int | None = None) -> bytes:
-    """Draws a damaged copy of a file's bytes: cut, overwritten, lengthened, or with a part missing or twice.
+    """Draw a damaged copy of a file's bytes: cut, overwritten, lengthened, or with a part missing or twice.
 
     `header` is the length of what decides how the rest is read; half of the damage falls there.
     """
@@ -54,7 +54,7 @@ def damaged(draw: st.DrawFn, whole: bytes, header: int | None = None) -> bytes:
 
 
 def outcome(read, *arguments):
-    """Returns what a reader gives, or None where it refuses with a message of gyriflow; any other error gets out.
+    """Return what a reader gives, or None where it refuses with a message of gyriflow; any other error gets out.
 
     A reader leaves the folder of its file as it was.
     """

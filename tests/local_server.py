@@ -25,7 +25,7 @@ class Server:
 
 @contextmanager
 def serving(server: Server) -> Iterator[Server]:
-    """Serves until the block ends, at `server.url`."""
+    """Serve until the block ends, at `server.url`."""
 
     class Handler(BaseHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
@@ -58,13 +58,13 @@ def serving(server: Server) -> Iterator[Server]:
 
 
 def packed(size: int, seed: int = 0) -> bytes:
-    """Returns a NIfTI file (.nii.gz) of about so many bytes that do not shrink."""
+    """Return a NIfTI file (.nii.gz) of about so many bytes that do not shrink."""
     values = np.random.default_rng(seed).integers(0, 2**15, size // 200 * 100, dtype=np.int16)
     return gzip.compress(nib.Nifti1Image(values.reshape(-1, 100, 1), np.eye(4)).to_bytes(), mtime=0)
 
 
 def gifti(seed: int = 0) -> bytes:
-    """Returns a GIFTI file of one triangle."""
+    """Return a GIFTI file of one triangle."""
     points = np.random.default_rng(seed).random((3, 3)).astype(np.float32)
     arrays = [(points, "NIFTI_INTENT_POINTSET"), (np.array([[0, 1, 2]], np.int32), "NIFTI_INTENT_TRIANGLE")]
     return nib.GiftiImage(darrays=[nib.gifti.GiftiDataArray(data, intent) for data, intent in arrays]).to_bytes()

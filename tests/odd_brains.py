@@ -16,18 +16,18 @@ SIGN = {"left": -1.0, "right": 1.0}
 
 
 def positions(labels: Labels, affine: Floats) -> Floats:
-    """Returns x, y, z of the voxels in mm from the brain's centre, RAS+, (3, i, j, k)."""
+    """Return x, y, z of the voxels in mm from the brain's centre, RAS+, (3, i, j, k)."""
     index = np.indices(labels.shape).reshape(3, -1)
     return ((affine[:3, :3] @ index).T + affine[:3, 3] - CENTRE_MM).T.reshape(3, *labels.shape)
 
 
 def without_callosum(labels: Labels, affine: Floats) -> Labels:
-    """Returns a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
+    """Return a brain whose hemispheres are joined at the thalami alone: agenesis of the corpus callosum."""
     return apart(labels, affine, above_mm=positions(labels, affine)[2][labels == DEEP_GREY].mean())
 
 
 def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float = -np.inf) -> Labels:
-    """Returns unconnected hemispheres, with a gap of CSF between them."""
+    """Return unconnected hemispheres, with a gap of CSF between them."""
     x, _, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     gap = np.isin(labels, CEREBRUM) & (np.abs(x) < 0.5 * gap_mm) & (z > above_mm)
@@ -35,7 +35,7 @@ def apart(labels: Labels, affine: Floats, gap_mm: float = 3.0, above_mm: float =
 
 
 def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
-    """Returns a brain without a fissure in front, with one ventricle for two and no corpus callosum."""
+    """Return a brain without a fissure in front, with one ventricle for two and no corpus callosum."""
     x, y, z = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     a, b, c = (np.abs(axis[np.isin(labels, CEREBRUM)]).max() for axis in (x, y, z))
@@ -47,7 +47,7 @@ def holoprosencephaly(labels: Labels, affine: Floats) -> Labels:
 
 
 def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) -> Labels:
-    """Returns labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
+    """Return labels moved: `came_from` gives the (3, …) place, in mm from the centre, that each place's label has."""
     place = came_from(positions(labels, affine))
     index = np.linalg.inv(affine[:3, :3]) @ (place.reshape(3, -1).T + CENTRE_MM - affine[:3, 3]).T
     nearest = np.rint(index).astype(int)
@@ -57,7 +57,7 @@ def warp(labels: Labels, affine: Floats, came_from: Callable[[Floats], Floats]) 
 
 
 def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
-    """Returns a brain whose middle is pushed to the right by `mm`, its outer sides in place: a shift of the midline."""
+    """Return a brain whose middle is pushed to the right by `mm`, its outer sides in place: a shift of the midline."""
     x, _, _ = positions(labels, affine)
     half = np.abs(x[np.isin(labels, CEREBRUM)]).max()
 
@@ -72,7 +72,7 @@ def shifted_midline(labels: Labels, affine: Floats, mm: float = 8.0) -> Labels:
 
 
 def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, ventricle: bool = False) -> Labels:
-    """Returns a brain whose right hemisphere is wider by `factor`: hemimegalencephaly, or with a wide ventricle."""
+    """Return a brain whose right hemisphere is wider by `factor`: hemimegalencephaly, or with a wide ventricle."""
 
     def came_from(place: Floats) -> Floats:
         return np.stack([np.where(place[0] > 0, place[0] / factor, place[0]), place[1], place[2]])
@@ -87,7 +87,7 @@ def wide_hemisphere(labels: Labels, affine: Floats, factor: float = 1.3, *, vent
 
 
 def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: Side = "right") -> Labels:
-    """Returns hemispheres apart, one of them shrunk to a share of its volume: hypoplasia."""
+    """Return hemispheres apart, one of them shrunk to a share of its volume: hypoplasia."""
     whole, factor = apart(labels, affine), share ** (1 / 3)
     wall = np.array([1.5 * SIGN[side], 0.0, 0.0])[:, None, None, None]
     x, _, _ = positions(labels, affine)
@@ -96,7 +96,7 @@ def small_hemisphere(labels: Labels, affine: Floats, share: float = 0.12, side: 
 
 
 def add_sides(labels: Labels, affine: Floats) -> Labels:
-    """Returns the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum is white matter there."""
+    """Return the labels of a phantom with sides, as in BOUNTI (`dhcp-19`); the callosum is white matter there."""
     x, _, _ = positions(labels, affine)
     pairs = {CSF: 1, CORTEX: 3, WHITE: 5, CALLOSUM: 5, VENTRICLES: 7, CEREBELLUM: 11, DEEP_GREY: 16}
     made = np.where(labels == BRAINSTEM, 10, 0)
@@ -106,7 +106,7 @@ def add_sides(labels: Labels, affine: Floats) -> Labels:
 
 
 def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:
-    """Returns the brain with its ventricles joined, through a thin aqueduct, to a fourth ventricle below the cerebrum.
+    """Return the brain with its ventricles joined, through a thin aqueduct, to a fourth ventricle below the cerebrum.
 
     All of it has the label of the ventricles, as in the labels of atlases.
     """
@@ -123,14 +123,14 @@ def with_fourth_ventricle(labels: Labels, affine: Floats) -> Labels:
 
 
 def one_hemisphere(labels: Labels, affine: Floats, side: Side = "left", gap_mm: float = 1.0) -> Labels:
-    """Returns one hemisphere alone, as after hemispherectomy or as hemispheres are given one by one."""
+    """Return one hemisphere alone, as after hemispherectomy or as hemispheres are given one by one."""
     x, _, _ = positions(labels, affine)
     made = np.where(labels == CALLOSUM, WHITE, labels)
     return np.where(SIGN[side] * x > 0.5 * gap_mm, made, 0).astype(np.int32)
 
 
 def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
-    """Returns a brain whose fissure bends to and fro by `mm`, together with what lies beside it."""
+    """Return a brain whose fissure bends to and fro by `mm`, together with what lies beside it."""
 
     def came_from(place: Floats) -> Floats:
         return np.stack([place[0] - mm * np.sin(place[1] / 12.0), place[1], place[2]])
@@ -139,7 +139,7 @@ def bent_midline(labels: Labels, affine: Floats, mm: float = 3.0) -> Labels:
 
 
 def crop(labels: Labels, affine: Floats, share: float = 0.33) -> tuple[Labels, Floats]:
-    """Returns the volume without a share of the brain on top, as where the field of view ends, and its affine."""
+    """Return the volume without a share of the brain on top, as where the field of view ends, and its affine."""
     brain = np.isin(labels, CEREBRUM)
     up = affine[2, :3]
     axis = int(np.abs(up).argmax())

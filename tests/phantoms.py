@@ -50,7 +50,7 @@ class Shape:
 
 
 def cerebral_volume_ml(week: float) -> float:
-    """Returns the volume of a phantom's cerebrum in mL: 48 at 21 GW, as in the atlas of the demo."""
+    """Return the volume of a phantom's cerebrum in mL: 48 at 21 GW, as in the atlas of the demo."""
     t = week - 21.0
     return float(48.0 * np.exp(0.160 * t - 0.00264 * t**2))
 
@@ -58,7 +58,7 @@ def cerebral_volume_ml(week: float) -> float:
 def phantom_labels(
     week: float, *, voxel_mm: float = 0.8, seed: int = 0, cortex_mm: float = 2.0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Returns the (i, j, k) labels of a synthetic brain of 21 to 36 GW and their (4, 4) affine to RAS+ mm.
+    """Return the (i, j, k) labels of a synthetic brain of 21 to 36 GW and their (4, 4) affine to RAS+ mm.
 
     Labels are those of the scheme spina-bifida-atlas. The axes are stored in the order posterior, inferior, right. The
     same seed gives the same folds at every week, the deeper the older.
@@ -90,7 +90,7 @@ def phantom_labels(
 
 
 def _grid(shape: Shape, voxel_mm: tuple[float, ...]) -> list[Floats]:
-    """Returns open x, y, z coordinates (RAS, mm from the brain's centre) of a grid around the whole brain."""
+    """Return open x, y, z coordinates (RAS, mm from the brain's centre) of a grid around the whole brain."""
     half = shape.half_length * PROPORTIONS * 1.12 + MARGIN_MM
     below = half + np.array([0.0, 0.0, 0.45 * shape.half_length])
     axes = [np.arange(-a, b, step, dtype=np.float32) for a, b, step in zip(below, half, voxel_mm, strict=True)]
@@ -98,7 +98,7 @@ def _grid(shape: Shape, voxel_mm: tuple[float, ...]) -> list[Floats]:
 
 
 def _pattern(directions: tuple[Floats, Floats, Floats], frequency: float, seed: int) -> Floats:
-    """Returns a smooth random field of unit variance on the sphere of directions: a sum of plane waves."""
+    """Return a smooth random field of unit variance on the sphere of directions: a sum of plane waves."""
     random = np.random.default_rng(seed)
     waves = random.normal(size=(16, 3))
     waves *= frequency * random.uniform(0.8, 1.2, size=(16, 1)) / np.linalg.norm(waves, axis=1, keepdims=True)
@@ -110,7 +110,7 @@ def _pattern(directions: tuple[Floats, Floats, Floats], frequency: float, seed: 
 
 
 def _cerebrum(points: list[Floats], shape: Shape, seed: int) -> tuple[Mask, Floats]:
-    """Returns the cerebrum's mask and the depth in mm below the smooth outline, both on the grid of `points`.
+    """Return the cerebrum's mask and the depth in mm below the smooth outline, both on the grid of `points`.
 
     Outline and folds are star-shaped around the centre and the fissure is open to the outside, so that the mask has
     no handles.
@@ -137,7 +137,7 @@ def _cerebrum(points: list[Floats], shape: Shape, seed: int) -> tuple[Mask, Floa
 
 
 def _sulcal_depth(directions: tuple[Floats, Floats, Floats], shape: Shape, seed: int) -> Floats:
-    """Returns how deep the folds are (mm) in each of the (n,) directions u, v, w.
+    """Return how deep the folds are (mm) in each of the (n,) directions u, v, w.
 
     Sulci run along the zero lines of random fields, nearly the same in both hemispheres; on each side is a Sylvian
     dent, which lengthens backwards and upwards.
@@ -162,13 +162,13 @@ def _sulcal_depth(directions: tuple[Floats, Floats, Floats], shape: Shape, seed:
 
 
 def _bump(u: Floats, v: Floats, w: Floats, centre: tuple[float, float, float], width: float) -> Floats:
-    """Returns a bell of height one on the sphere of directions around `centre`, `width` in radians."""
+    """Return a bell of height one on the sphere of directions around `centre`, `width` in radians."""
     at = np.array(centre) / np.linalg.norm(centre)
     return np.exp(-((u - at[0]) ** 2 + (v - at[1]) ** 2 + (w - at[2]) ** 2) / (2.0 * width**2)).astype(np.float32)
 
 
 def _joint(q: Floats, r: Floats) -> Mask:
-    """Returns where, seen from the side, tissue joins the hemispheres: below the callosum down to the base."""
+    """Return where, seen from the side, tissue joins the hemispheres: below the callosum down to the base."""
     arch = ((q - 0.05) / 0.50) ** 2 + ((r + 0.15) / 0.42) ** 2 < 1.0
     return arch | ((np.abs(q - 0.05) < 0.30) & (r < -0.15))
 
@@ -179,7 +179,7 @@ def _ellipsoid(points: list[Floats], centre: tuple[float, float, float], half: t
 
 
 def _tissues(points: list[Floats], shape: Shape, seed: int, voxel_mm: float, cortex_mm: float) -> NDArray[np.int32]:
-    """Returns the labels on the grid of `points`."""
+    """Return the labels on the grid of `points`."""
     x, y, z = points
     a, b, c = shape.half_length * PROPORTIONS
     cerebrum, outline_depth = _cerebrum(points, shape, seed)

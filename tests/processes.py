@@ -9,21 +9,21 @@ from pathlib import Path
 
 
 def below(pid: int) -> list[int]:
-    """Returns the ids of all processes that a process started, and of those that these did."""
+    """Return the ids of all processes that a process started, and of those that these did."""
     listed = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False).stdout
     children = [int(child) for child in listed.split()]
     return children + [other for child in children for other in below(child)]
 
 
 def command_of(pid: int) -> list[str]:
-    """Returns the words of a process' command line, none where it has ended."""
+    """Return the words of a process' command line, none where it has ended."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/cmdline").read_text().split("\0")[:-1]
     return []
 
 
 def all_end(pids: list[int], within_s: float = 10) -> bool:
-    """Returns whether processes end in time."""
+    """Return whether processes end in time."""
     deadline = time.monotonic() + within_s
     while any(map(command_of, pids)) and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -31,7 +31,7 @@ def all_end(pids: list[int], within_s: float = 10) -> bool:
 
 
 def kill(pids: list[int]) -> None:
-    """Kills processes, and returns once they have ended."""
+    """Kill processes, and return once they have ended."""
     for pid in pids:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)

@@ -14,7 +14,7 @@ WORST_FIRST = ("failed", "not run", "passed")
 
 
 def listed():
-    """Returns the faults and the promises by number: (section, fault, what the user gets), (text,)."""
+    """Return the faults and the promises by number: (section, fault, what the user gets), (text,)."""
     content = yaml.safe_load(FAULTS_FILE.read_text(encoding="utf-8"))
     faults = {
         number: (section, row["fault"], row["user gets"])
@@ -25,7 +25,7 @@ def listed():
 
 
 def trying(numbers):
-    """Returns cases for `parametrize`, each marked with the faults that it tries: {case: number or numbers}."""
+    """Return cases for `parametrize`, each marked with the faults that it tries: {case: number or numbers}."""
     return [
         pytest.param(name, marks=pytest.mark.fault(*(tried if isinstance(tried, tuple) else (tried,))), id=name)
         for name, tried in numbers.items()
@@ -48,7 +48,7 @@ class Collector:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection_modifyitems(self, items):
-        """Runs before tests are deselected, so that these are known as not run."""
+        """Run before tests are deselected, so that these are known as not run."""
         for item in items:
             path = item.path.relative_to(CHECKOUT).as_posix()
             name = f"{path}::{getattr(item, 'originalname', None) or item.name}"
@@ -74,7 +74,7 @@ class Collector:
             self.page.write_text(page_of(self.tests), encoding="utf-8")
 
     def pytest_testnodedown(self, node):
-        """Adds what a worker has tried; each has collected all tests."""
+        """Add what a worker has tried; each has collected all tests."""
         for tried, outcomes in getattr(node, "workeroutput", {}).get("tried", {}).items():
             for name, outcome in outcomes.items():
                 if outcome != "not run" and self.tests[tried].get(name) != "failed":
@@ -83,7 +83,7 @@ class Collector:
 
 
 def page_of(tests):
-    """Returns the page of all faults and promises with the worst outcome of the tests of each."""
+    """Return the page of all faults and promises with the worst outcome of the tests of each."""
     known = listed()
     outcomes = [outcome for found in tests.values() for outcome in found.values()]
     counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in WORST_FIRST[::-1])

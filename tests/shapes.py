@@ -23,7 +23,7 @@ PAD = 4
 
 
 def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
-    """Returns the (4, 4) motion of turns about x, y and z in turn, in degrees, and a shift in mm."""
+    """Return the (4, 4) motion of turns about x, y and z in turn, in degrees, and a shift in mm."""
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_euler("xyz", degrees or (0.0, 0.0, 0.0), degrees=True).as_matrix()
     matrix[:3, 3] = shift
@@ -31,17 +31,17 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 
 def moved(mesh: TriangleMesh, *shift: float) -> TriangleMesh:
-    """Returns a surface shifted by mm along x, or x, y and z."""
+    """Return a surface shifted by mm along x, or x, y and z."""
     return TriangleMesh(mesh.vertices + [*shift, 0.0, 0.0][:3], mesh.faces)
 
 
 def sphere(radius: float = 10.0, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
-    """Returns an icosphere, its radius in mm."""
+    """Return an icosphere, its radius in mm."""
     return ellipsoid((radius,) * 3, subdivisions, centre)
 
 
 def ellipsoid(half_axes, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
-    """Returns an icosphere drawn out to semi-axes in mm."""
+    """Return an icosphere drawn out to semi-axes in mm."""
     vertices, faces = _icosphere(subdivisions)
     return TriangleMesh(vertices * np.asarray(half_axes) + np.asarray(centre), faces)
 
@@ -53,7 +53,7 @@ def _icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:
-    """Returns a box's surface, 12 triangles, each divided in four some times."""
+    """Return a box's surface, 12 triangles, each divided in four some times."""
     shape = trimesh.creation.box(size)
     for _ in range(subdivisions):
         shape = shape.subdivide()
@@ -61,33 +61,33 @@ def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:
 
 
 def torus(ring: float, tube: float, around: int = 32, across: int = 32) -> TriangleMesh:
-    """Returns a torus about z: the radii in mm of its ring and its tube, and the faces along both."""
+    """Return a torus about z: the radii in mm of its ring and its tube, and the faces along both."""
     shape = trimesh.creation.torus(ring, tube, major_sections=around, minor_sections=across)
     return TriangleMesh(shape.vertices, shape.faces)
 
 
 @cache
 def phantom(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the labels of a synthetic brain and their affine, which are not to be changed."""
+    """Return the labels of a synthetic brain and their affine, which are not to be changed."""
     labels, affine = phantom_labels(week, voxel_mm=voxel_mm)
     labels.flags.writeable = affine.flags.writeable = False
     return labels, affine
 
 
 def mask_surface(mask: np.ndarray, affine: np.ndarray) -> TriangleMesh:
-    """Returns the closed surface of the smoothed main parts of a mask of voxels, without handles."""
+    """Return the closed surface of the smoothed main parts of a mask of voxels, without handles."""
     field, _ = make_simple(smooth_mask(np.pad(mask, PAD), 1.0))
     return isosurface(field, shifted_affine(affine, np.full(3, -PAD)))
 
 
 def cerebrum_surface(labels: np.ndarray, affine: np.ndarray) -> TriangleMesh:
-    """Returns the closed surface around the cerebrum of a phantom's labels."""
+    """Return the closed surface around the cerebrum of a phantom's labels."""
     return mask_surface(np.isin(labels, CEREBRUM), affine)
 
 
 @cache
 def phantom_halves(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[TriangleMesh, TriangleMesh]:
-    """Returns a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the fissure at x = 0, in RAS+."""
+    """Return a phantom's left and right hemisphere as closed surfaces 1.2 mm apart, the fissure at x = 0, in RAS+."""
     labels, affine = phantom(week, voxel_mm)
     centred = affine.copy()
     centred[:3, 3] -= CENTRE_MM
@@ -97,12 +97,12 @@ def phantom_halves(week: float = 24.0, voxel_mm: float = 1.2) -> tuple[TriangleM
 
 
 def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetrahedralMesh:
-    """Returns a box around the origin, in mm, with six elements per grid cell."""
+    """Return a box around the origin, in mm, with six elements per grid cell."""
     return grid([np.linspace(-s / 2, s / 2, n + 1) for s, n in zip(size, cells, strict=True)])
 
 
 def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> TetrahedralMesh:
-    """Returns an ellipsoid around the origin, in mm: a cube's grid with its shells drawn out to ellipsoids."""
+    """Return an ellipsoid around the origin, in mm: a cube's grid with its shells drawn out to ellipsoids."""
     cube = box_mesh((cells,) * 3, (2.0, 2.0, 2.0))
     x = cube.vertices
     shell = np.abs(x).max(axis=1, keepdims=True)
@@ -114,12 +114,12 @@ def ellipsoid_mesh(cells: int, semi_axes: tuple[float, float, float]) -> Tetrahe
 
 
 def hemisphere(side: int) -> TriangleMesh:
-    """Returns an ellipsoid in place of a hemisphere, on the left (-1) or the right (1) of a gap of 3 mm at x = 0."""
+    """Return an ellipsoid in place of a hemisphere, on the left (-1) or the right (1) of a gap of 3 mm at x = 0."""
     return ellipsoid(HALF_AXES, centre=(12.5 * side, 0.0, 0.0))
 
 
 def save_labels(path, labels: np.ndarray, affine: np.ndarray) -> None:
-    """Writes labels as NIfTI in mm, as programs other than this one do."""
+    """Write labels as NIfTI in mm, as programs other than this one do."""
     image = nib.Nifti1Image(labels.astype(np.int16), affine)
     image.header.set_xyzt_units("mm")
     nib.save(image, path)
@@ -128,7 +128,7 @@ def save_labels(path, labels: np.ndarray, affine: np.ndarray) -> None:
 def save_gifti(
     path, mesh: TriangleMesh, matrix: np.ndarray | None = None, data: str = "UNKNOWN", to: str = "SCANNER_ANAT"
 ) -> None:
-    """Writes a GIFTI surface as it is, whatever is wrong with it, with a matrix from one space to another if given."""
+    """Write a GIFTI surface as it is, whatever is wrong with it, with a matrix from one space to another if given."""
     points = GiftiDataArray(mesh.vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET")
     if matrix is not None:
         points.coordsys = GiftiCoordSystem(f"NIFTI_XFORM_{data}", f"NIFTI_XFORM_{to}", matrix)

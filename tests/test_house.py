@@ -69,17 +69,17 @@ OPENING_FUNCTIONS = {
 
 
 def rooms_imported(path: Path) -> set[str]:
-    """Returns the other rooms of gyriflow that a source file imports, at the top or inside functions."""
+    """Return the other rooms of gyriflow that a source file imports, at the top or inside functions."""
     return {room_of(module) for module in imported_modules(path)} - {room_of(path), "__init__"}
 
 
 def makes_buffer(node: ast.AST) -> bool:
-    """Returns whether an expression makes a buffer in memory that looks like a file."""
+    """Return whether an expression makes a buffer in memory that looks like a file."""
     return isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("BytesIO", "StringIO"))
 
 
 def opened_files(path: Path) -> list[str]:
-    """Returns the calls of a source file that open files, as `line: name`."""
+    """Return the calls of a source file that open files, as `line: name`."""
     tree = ast.parse(path.read_text())
     modules = {
         alias.asname or alias.name: alias.name
@@ -162,12 +162,12 @@ def test_no_vague_names():
 
 
 def listed(path: Path) -> list[str]:
-    """Returns the entries of a list of packages."""
+    """Return the entries of a list of packages."""
     return [entry for line in path.read_text().splitlines() if (entry := line.split("#")[0].strip())]
 
 
 def locked() -> dict[str, str]:
-    """Returns the version of each package that is locked, all with hashes."""
+    """Return the version of each package that is locked, all with hashes."""
     text = (ROOT / "envs" / "requirements.txt").read_text()
     found = dict(re.findall(r"^([\w.-]+)==([^ ]+).*?\\\n    --hash=sha256:", text, flags=re.MULTILINE))
     assert len(found) == len(re.findall(r"^\w", text, flags=re.MULTILINE))
@@ -175,7 +175,7 @@ def locked() -> dict[str, str]:
 
 
 def needed() -> list[str]:
-    """Returns the packages that the project names, for users and for development, but numpy, which dolfinx brings."""
+    """Return the packages that the project names, for users and for development, but numpy, which dolfinx brings."""
     content = tomllib.loads((ROOT / "pyproject.toml").read_text())
     entries = [*content["project"]["dependencies"], *content["dependency-groups"]["dev"]]
     return [name for entry in entries if (name := re.split(r"[<>=]", entry)[0]) != "numpy"]

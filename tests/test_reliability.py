@@ -12,7 +12,7 @@ TESTS = Path(__file__).parent
 
 
 def marked():
-    """Returns the numbers that tests name by kind, read from their sources: marks and tables of cases."""
+    """Return the numbers that tests name by kind, read from their sources: marks and tables of cases."""
     found = {"fault": set(), "promise": set()}
     for path in TESTS.rglob("test_*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

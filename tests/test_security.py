@@ -21,7 +21,7 @@ SAFE_LOADERS = {"SafeLoader", "CSafeLoader", "_StrictLoader"}
 
 
 def dangers(source):
-    """Returns what a source has that makes code of data, or files that others may read."""
+    """Return what a source has that makes code of data, or files that others may read."""
     found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import | ast.ImportFrom):

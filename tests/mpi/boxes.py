@@ -20,7 +20,7 @@ PENALTY_PA_PER_M = 5e5
 
 
 def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
-    """Returns a box in mm whose inner vertices are moved at random (seeded): no symmetry helps."""
+    """Return a box in mm whose inner vertices are moved at random (seeded): no symmetry helps."""
     mesh = box_mesh(cells, size)
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
@@ -29,7 +29,7 @@ def distorted_box(cells=(4, 3, 3), size=(8.0, 6.0, 6.0), by=0.2):
 
 
 def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
-    """Returns a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
+    """Return a box in mm of quadratic elements, whose inner nodes are moved at random (seeded): sides are curved."""
     mesh = quadratic(distorted_box(cells, size))
     inner = np.setdiff1d(np.arange(len(mesh.vertices)), boundary_faces(mesh)[0])
     vertices = mesh.vertices.copy()
@@ -38,7 +38,7 @@ def curved_box(cells=(3, 2, 2), size=(8.0, 6.0, 6.0), by=0.1):
 
 
 def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=None, planes=(-0.5, 0.5)):
-    """Returns zones by conditions on the facets' centroids in mm."""
+    """Return zones by conditions on the facets' centroids in mm."""
     facets, _ = boundary_faces(mesh)
     centre = mesh.vertices[facets].mean(axis=1)
     zone = np.full(len(facets), FREE)
@@ -51,7 +51,7 @@ def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=No
 
 
 def set_layers(problem, mu, dg, dr, normals):
-    """Sets shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
+    """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
     points = problem.points
     mu, dg, dr = (nodal[problem.domain.cells] @ points.smooth.T for nodal in (mu, dg, dr))
     repeated = np.repeat(normals[:, None], len(points.weights), axis=1)
@@ -74,7 +74,7 @@ class EvenGrowth(Growth):
 
 
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):
-    """Returns a problem with layers that are uniform, or nodal functions of the position in m."""
+    """Return a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(comm, mesh)
     problem = Problem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
     x = domain.local(domain.positions)
@@ -89,7 +89,7 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None
 
 
 def smooth_displacement(domain, size=1e-3):
-    """Returns a smooth displacement of the local nodes in m that does not depend on the ranks."""
+    """Return a smooth displacement of the local nodes in m that does not depend on the ranks."""
     x = domain.local(domain.positions) * 1e3
     return size * np.stack(
         [np.sin(0.3 * x[:, 1] + 0.1), np.cos(0.25 * x[:, 2]) - 0.4 * x[:, 0] / 8, np.sin(0.2 * x[:, 0] * x[:, 1] / 4)],
@@ -98,5 +98,5 @@ def smooth_displacement(domain, size=1e-3):
 
 
 def everywhere_known(problem):
-    """Returns the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
+    """Return the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
     return problem.domain.gathered(problem.displacement[: problem.domain.owned])

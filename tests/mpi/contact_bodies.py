@@ -20,7 +20,7 @@ MU, NU = 1000.0, MATERIAL.poisson_ratio
 
 
 def two_blocks(cells=(5, 5, 3), other=(5, 5, 3), gap=GAP_MM):
-    """Returns two boxes, one above the other, a gap apart."""
+    """Return two boxes, one above the other, a gap apart."""
     low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, other))
     shift = np.array([0.0, 0.0, (HEIGHT_MM + gap) / 2])
     vertices = np.concatenate([low.vertices - shift, high.vertices + shift])
@@ -28,7 +28,7 @@ def two_blocks(cells=(5, 5, 3), other=(5, 5, 3), gap=GAP_MM):
 
 
 def in_a_tube(mesh):
-    """Returns zones that hold the ends of two blocks and let their sides slide."""
+    """Return zones that hold the ends of two blocks and let their sides slide."""
     facets, _ = boundary_faces(mesh)
     centre = mesh.vertices[facets].mean(axis=1)
     zone = np.full(len(facets), FREE)
@@ -50,7 +50,7 @@ def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z
 
 
 def approach(domain):
-    """Returns displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
+    """Return displacements of the local nodes in m by which two blocks close half of their gap, not evenly."""
     x = domain.local(domain.positions)
     u = smooth_displacement(domain, 1e-5)
     u[:, 2] -= np.sign(x[:, 2]) * GAP_MM / 4 * M_PER_MM
@@ -58,7 +58,7 @@ def approach(domain):
 
 
 def stress_at(stretch, growth):
-    """Returns the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
+    """Return the first Piola-Kirchhoff stress in Pa along z of uniaxial strain after growth along z."""
     K = 2 * MU * (1 + NU) / (3 * (1 - 2 * NU))
     Fe = stretch / (1 + growth)
     by_Fe = MU / 2 * (2 * Fe ** (1 / 3) - 2 / 3 * (2 + Fe**2) * Fe ** (-5 / 3)) + K * (Fe - 1)
@@ -66,7 +66,7 @@ def stress_at(stretch, growth):
 
 
 def slab_with_a_sulcus():
-    """Returns a block with a narrow groove along y in its top, in mm."""
+    """Return a block with a narrow groove along y in its top, in mm."""
     mesh = grid([np.linspace(-6.0, 6.0, 25), np.linspace(-1.5, 1.5, 4), np.linspace(0.0, 6.0, 11)])
     x, y, z = mesh.vertices.T
     groove = 3.0 * np.exp(-((x / 0.5) ** 2))
@@ -76,7 +76,7 @@ def slab_with_a_sulcus():
 
 
 def closing_sulcus(kind, comm=COMM, **changes):
-    """Returns what folds a block with a groove that closes in some steps, and the state at the start."""
+    """Return what folds a block with a groove that closes in some steps, and the state at the start."""
     mesh = slab_with_a_sulcus()
     p = parameters_from(
         {

@@ -76,7 +76,7 @@ def test_hemispheres_that_press_on_each_other_stay_mirror_images():
 
 
 def free_blocks(gap, **changes):
-    """Returns what folds two free blocks whose meshes match across a gap, and the state at the start."""
+    """Return what folds two free blocks whose meshes match across a gap, and the state at the start."""
     mesh = two_blocks(gap=gap)
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-0.5, 0.5), free=True)
@@ -113,7 +113,7 @@ def test_parts_that_touch_move_as_one():
 
 
 def pressed(step_s, days=4, **changes):
-    """Returns what has folded two blocks that grow evenly against each other in a tube, and the last state."""
+    """Return what has folded two blocks that grow evenly against each other in a tube, and the last state."""
     mesh = two_blocks(other=(4, 3, 3))
     values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
     values |= {"no_growth": {"kind": "none"}, "support": "box", "step_s": step_s, "fields": ["stress", "strain"]}

@@ -34,7 +34,7 @@ def fold(mesh, out, ranks=1, **changes):
 
 
 def failing_after(steps):
-    """Returns a step of the folding that fails once a number of steps has been done."""
+    """Return a step of the folding that fails once a number of steps has been done."""
     honest = Folding.step
 
     def step(self, state, step_s):
@@ -46,5 +46,5 @@ def failing_after(steps):
 
 
 def kill(process):
-    """Kills a program with its ranks, which Open MPI's daemon puts into groups of their own."""
+    """Kill a program with its ranks, which Open MPI's daemon puts into groups of their own."""
     processes.kill([process.pid, *processes.below(process.pid)])

@@ -8,7 +8,7 @@ TIGHT = {"solver": {"newton_tolerance": 1e-9}}
 
 
 def counted(monkeypatch, problem):
-    """Returns a list that grows by one with each elastic tangent that is assembled."""
+    """Return a list that grows by one with each elastic tangent that is assembled."""
     assemble, calls = problem._elastic.matrix.assemble, []
 
     def noted():

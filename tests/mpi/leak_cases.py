@@ -16,7 +16,7 @@ SPARE = 2
 
 
 def alive(folding, path):
-    """Returns how many objects of each class PETSc has made and not destroyed, so far."""
+    """Return how many objects of each class PETSc has made and not destroyed, so far."""
     # what was let go of waits for the next clean-up, and how much that is differs from step to step
     gc.collect()
     folding.problem.tangent()

@@ -65,7 +65,7 @@ def test_an_element_that_folds_over_between_its_points_is_seen():
 
 
 def pressed_blocks(comm, growth, distance):
-    """Returns the problem of two blocks in a tube that grow towards each other, their contact, and the mesh."""
+    """Return the problem of two blocks in a tube that grow towards each other, their contact, and the mesh."""
     mesh = quadratic(two_blocks((2, 2, 1), (3, 2, 2)))
     zones = in_a_tube(mesh)
     problem = problem_on(mesh, zones, dr=growth, comm=comm)

@@ -13,7 +13,7 @@ from gyriflow.units import M_PER_MM
 
 
 def contact_in(comm, mesh, distance=0.15):
-    """Returns a domain, an array for the displacement of its nodes, and the contact of the mesh with itself."""
+    """Return a domain, an array for the displacement of its nodes, and the contact of the mesh with itself."""
     domain = Domain(comm, mesh)
     displacement = np.zeros((len(domain.vertex_of_node), 3))
     contact = SelfContact(domain, displacement, boundary_faces(mesh)[0], 2 * MU, distance)
@@ -21,7 +21,7 @@ def contact_in(comm, mesh, distance=0.15):
 
 
 def blocks(order):
-    """Returns two blocks whose meshes do not match, and what brings them near each other, shaken, in mm."""
+    """Return two blocks whose meshes do not match, and what brings them near each other, shaken, in mm."""
     mesh = two_blocks(other=(4, 3, 3))
     if order == 2:
         mesh = quadratic(two_blocks(cells=(3, 3, 1), other=(2, 2, 1)))
@@ -33,7 +33,7 @@ def blocks(order):
 
 
 def what_is_found(comm, mesh, moved_mm, further_mm):
-    """Returns what contact says of a displaced body: numbers, fields on all vertices, and a product's."""
+    """Return what contact says of a displaced body: numbers, fields on all vertices, and a product's."""
     domain, displacement, contact = contact_in(comm, mesh)
     displacement[:] = domain.local(moved_mm) * M_PER_MM
     x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)

@@ -19,7 +19,7 @@ DAY_S = 86_400.0
 
 
 def following(growth, **changes):
-    """Returns a free ellipsoid that is to grow by (area, volume) per week as logarithms, and the state before."""
+    """Return a free ellipsoid that is to grow by (area, volume) per week as logarithms, and the state before."""
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
     known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S}
     known |= {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}

@@ -25,14 +25,14 @@ TIGHT = {"solver": {"newton_tolerance": 1e-11}}
 
 
 def bent(week):
-    """Returns where the body's vertices are to be after some weeks: larger, and bent smoothly."""
+    """Return where the body's vertices are to be after some weeks: larger, and bent smoothly."""
     x, y, z = BODY.vertices.T
     wave = np.stack([1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1)
     return 1.04**week * BODY.vertices + week * wave
 
 
 def towards(targets, **changes):
-    """Returns a free body that is to have shapes, by week, and its state before."""
+    """Return a free body that is to have shapes, by week, and its state before."""
     known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
     settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
     alike = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
@@ -54,7 +54,7 @@ def volume(vertices):
 
 
 def away(state, target):
-    """Returns how far vertices are from where they are to be, root mean square in mm, without rigid motion."""
+    """Return how far vertices are from where they are to be, root mean square in mm, without rigid motion."""
     now = state.positions * MM_PER_M
     sizes = vertex_sizes(now, linear_pieces(BODY))
     left = without_rigid_motion(now, target, sizes)

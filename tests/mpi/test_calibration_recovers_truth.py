@@ -30,7 +30,7 @@ BOUNDS = {"growth_rate_per_s": (1e-7, 4e-7)}
 
 
 def folded(mesh, values, out):
-    """Returns the surface of a brain after half a week with some parameters."""
+    """Return the surface of a brain after half a week with some parameters."""
     parameters = parameters_from(calibrated_parameters(BASE, values, 21.5))
     run(MPI.COMM_SELF, mesh, zones_of_run(mesh, parameters), parameters, {}, out, may_diverge=True)
     positions = read_positions(out / "frames.h5", 21.5)

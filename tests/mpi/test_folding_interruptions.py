@@ -37,7 +37,7 @@ def mesh(tmp_path_factory):
 
 
 def curved_brain(path):
-    """Writes an ellipsoid of quadratic elements that follow it."""
+    """Write an ellipsoid of quadratic elements that follow it."""
     ball = icosphere(subdivisions=4)
     surface = TriangleMesh(ball.vertices * [20.0, 26.0, 18.0], ball.faces)
     write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
@@ -84,7 +84,7 @@ def long_run(mesh, tmp_path_factory):
 
 
 def killed_after(step, arguments):
-    """Starts the program, kills it when it has printed a step, and returns what it printed."""
+    """Start the program, kill it when it has printed a step, and return what it printed."""
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         printed = []
         for line in process.stdout:

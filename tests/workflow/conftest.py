@@ -20,7 +20,7 @@ CHECKOUT = Path(__file__).parents[2]
 
 
 def labelled(week: int) -> dict:
-    """Returns the source of a brain whose labels `Workflow.write` makes, synthetic ones of a week."""
+    """Return the source of a brain whose labels `Workflow.write` makes, synthetic ones of a week."""
     return {"labels": f"phantom-{week}.nii.gz", "scheme": "spina-bifida-atlas"}
 
 
@@ -55,23 +55,23 @@ class Surfaces:
         return self.directory / "results" / "brains"
 
     def report(self, brain: str) -> dict:
-        """Returns the report on a brain's surface."""
+        """Return the report on a brain's surface."""
         return read_json(self.results / brain / "surface" / "surface.json")
 
     def log(self, brain: str, rule: str = "pial_from_*") -> str:
-        """Returns what the step that made a brain's surface, or refused to, has said."""
+        """Return what the step that made a brain's surface, or refused to, has said."""
         (log,) = (self.results / brain / "logs").glob(f"{rule}.log")
         return log.read_text()
 
     def require_refused(self, brain: str, *said: str) -> None:
-        """Checks that a brain was refused with messages, in its log and on the terminal, and that nothing is left."""
+        """Check that a brain was refused with messages, in its log and on the terminal, and that nothing is left."""
         for text in said:
             assert text in self.log(brain)
             assert text in self.outcome.stderr
         assert not [path for path in (self.results / brain / "surface").rglob("*") if path.is_file()]
 
     def require_exit_code(self, code: int) -> None:
-        """Checks how the run ended, and that it showed no traceback."""
+        """Check how the run ended, and that it showed no traceback."""
         assert self.outcome.returncode == code, self.outcome.stderr
         assert "Traceback" not in self.outcome.stderr
 
@@ -84,7 +84,7 @@ class Workflow:
     directory: Path
 
     def command(self, *arguments: str) -> list[str]:
-        """Returns the command that `./run snakemake` runs."""
+        """Return the command that `./run snakemake` runs."""
         return [sys.executable, "-m", "gyriflow.cli.launch", *arguments]
 
     @property
@@ -92,7 +92,7 @@ class Workflow:
         return os.environ | {"PYTHONPATH": str(self.checkout / "src")}
 
     def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
-        """Runs the launcher in the working directory."""
+        """Run the launcher in the working directory."""
         return subprocess.run(
             self.command(*arguments),
             cwd=self.directory,
@@ -104,7 +104,7 @@ class Workflow:
         )
 
     def jobs(self, *arguments: str) -> dict[str, int]:
-        """Returns the number of jobs per rule that a dry run plans."""
+        """Return the number of jobs per rule that a dry run plans."""
         outcome = self.run("-n", *arguments)
         assert outcome.returncode == 0, outcome.stdout + outcome.stderr
         if "Nothing to be done" in outcome.stdout + outcome.stderr:
@@ -114,7 +114,7 @@ class Workflow:
         return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, flags=re.MULTILINE)}
 
     def write(self, name: str, config: dict) -> str:
-        """Writes a configuration, and labels that it calls `labelled`, and returns its name."""
+        """Write a configuration, and labels that it calls `labelled`, and return its name."""
         for brain in config.get("brains", []):
             given = re.fullmatch(r"phantom-(\d+)\.nii\.gz", brain.get("labels", ""))
             # a newer file would have its surface made again
@@ -124,7 +124,7 @@ class Workflow:
         return name
 
     def lay_out(self, *arguments: str) -> list[str]:
-        """Makes all files that a call would make, empty, and returns their names."""
+        """Make all files that a call would make, empty, and return their names."""
         summary = self.run(*arguments, "--forceall", "--summary").stdout
         files = [line.split("\t")[0] for line in summary.splitlines()[1:]]
         for file in files:
@@ -134,12 +134,12 @@ class Workflow:
         return files
 
     def count_as_made(self, *arguments: str) -> None:
-        """Has Snakemake take the files of a call that are there for made."""
+        """Have Snakemake take the files of a call that are there for made."""
         touched = self.run("--touch", "--cores", "1", *arguments)
         assert touched.returncode == 0, touched.stderr
 
     def count_ellipsoid_as_meshed(self, config: dict, cells: int) -> None:
-        """Writes a configuration of one brain, `a`, as study.yaml, with an ellipsoid's surface and mesh taken for made.
+        """Write a configuration of one brain, `a`, as study.yaml, with an ellipsoid's surface and mesh taken for made.
 
         `cells` is the number of the mesh's cells along an axis.
         """
@@ -153,7 +153,7 @@ class Workflow:
         self.count_as_made(*arguments)
 
     def surfaces(self, config: dict, *more: str) -> Surfaces:
-        """Makes the pial surfaces of all brains of a configuration, and more targets, as far as that goes."""
+        """Make the pial surfaces of all brains of a configuration, and more targets, as far as that goes."""
         name = self.write("study.yaml", config)
         targets = [f"results/brains/{brain['id']}/surface/pial.surf.gii" for brain in config["brains"]]
         outcome = self.run(*more, *targets, "--cores", "2", "--keep-going", "--configfile", name, timeout_s=900)

@@ -33,7 +33,7 @@ def inner(mesh, depth_mm):
 
 
 def with_polyp(mesh):
-    """Returns the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm length below it."""
+    """Return the surface with a ball of 4 mm radius on a stalk of 1 mm radius and 8 mm length below it."""
     grid = np.indices((40, 40, 60)).reshape(3, -1).T * 0.4 - [8.0, 8.0, 18.0]
     ball = np.linalg.norm(grid - [0, 0, -12.0], axis=1) < 4.0
     stalk = (np.hypot(grid[:, 0], grid[:, 1]) < 1.1) & (grid[:, 2] > -12.0) & (grid[:, 2] < 4.0)
@@ -66,7 +66,7 @@ def whole(mesh, suffix="surf.gii"):
 
 
 def both_sides(left, right, *, white_mm=None, coordinates="ras"):
-    """Writes hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
+    """Write hemispheres as FreeSurfer does, and white surfaces inside the pial ones."""
 
     def made(folder, name):
         entry, white = {}, []
@@ -82,7 +82,7 @@ def both_sides(left, right, *, white_mm=None, coordinates="ras"):
 
 
 def alone(side, change):
-    """Writes labels as the only hemisphere of a brain."""
+    """Write labels as the only hemisphere of a brain."""
 
     def made(folder, name):
         entry = labelled(change)(folder, name)

@@ -22,13 +22,13 @@ def image(labels=LABELS, affine=AFFINE, kind=np.int16, unit="mm"):
 
 
 def with_two_matrices(made):
-    """Returns an image whose qform is not its sform."""
+    """Return an image whose qform is not its sform."""
     made.set_qform(np.diag([2.0, 2.0, 2.0, 1.0]), code=2)
     return made
 
 
 def flat():
-    """Returns the same brain in slices of 2.4 mm, three times the voxels' edge in the other directions."""
+    """Return the same brain in slices of 2.4 mm, three times the voxels' edge in the other directions."""
     labels, affine = phantom(21.0, 0.8)
     return image(labels[1::3], affine @ np.array([[3, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
 

@@ -22,7 +22,7 @@ def blocks(page, kind):
 
 
 def completed(block):
-    """Returns the configuration of a block that shows part of one."""
+    """Return the configuration of a block that shows part of one."""
     given = yaml.safe_load(block)
     if {"brains", "atlas", "participants"} & set(given):
         rest = {"start": given["brains"][0]["id"]} if isinstance(given.get("brains"), list) else {"start": "all"}

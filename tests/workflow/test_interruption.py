@@ -34,7 +34,7 @@ def meshed(checkout_copy, tmp_path_factory):
 
 
 def started(workflow, until):
-    """Starts the folding and returns its process when the log has a line with `until`."""
+    """Start the folding and return its process when the log has a line with `until`."""
     process = subprocess.Popen(
         workflow.command("--cores", "2", SUMMARY, "--configfile", "study.yaml"),
         cwd=workflow.directory, env=workflow.environment, start_new_session=True,

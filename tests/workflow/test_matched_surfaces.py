@@ -33,7 +33,7 @@ POSES = {21: np.eye(4), 22: LPS, 23: rigid(4, -3, 5, shift=(30.0, -20.0, 10.0))}
 
 
 def grown(points: np.ndarray, week: int) -> np.ndarray:
-    """Returns where places of week 21 are in another week: a harmonic displacement, so that the inside is known too."""
+    """Return where places of week 21 are in another week: a harmonic displacement, so that the inside is known too."""
     weeks = week - 21
     x, y, z = points.T
     faster = FASTER_PER_MM * weeks * (y**2 - x**2) / 2
@@ -51,7 +51,7 @@ def hemispheres() -> dict[str, TriangleMesh]:
 
 
 def write_study(workflow, hemispheres, kind="hemispheres") -> str:
-    """Writes the surfaces of all weeks and their study."""
+    """Write the surfaces of all weeks and their study."""
     brains = []
     for week in WEEKS:
         files = {}
@@ -68,7 +68,7 @@ def write_study(workflow, hemispheres, kind="hemispheres") -> str:
 
 
 def in_week_21(results, points: np.ndarray) -> np.ndarray:
-    """Returns the places of mesh points in the files of week 21, by the motion of their hemisphere."""
+    """Return the places of mesh points in the files of week 21, by the motion of their hemisphere."""
     path = results / "brains/b21/surface/surface.json"
     pose = read_pose(path)
     left, right = (transform_points(points, np.linalg.inv(pose.of_file(side))) for side in SIDES)

@@ -25,7 +25,7 @@ THERE_MM = 2.74
 
 
 def groove(depth_mm):
-    """Returns a ball with a groove along the equator's front."""
+    """Return a ball with a groove along the equator's front."""
     x, y, z = BALL.vertices.T
     depth = depth_mm * np.exp(-((z / 4) ** 2)) * (np.abs(np.arctan2(y, x)) * 20 < 15)
     return TriangleMesh(BALL.vertices * (1 - depth / 20)[:, None], BALL.faces)

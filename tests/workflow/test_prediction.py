@@ -29,7 +29,7 @@ STUDY = {
 
 
 def brains_of(workflow, population, seed, *weeks):
-    """Returns the entries of synthetic brains of a population, written as label volumes."""
+    """Return the entries of synthetic brains of a population, written as label volumes."""
     entries = []
     for week in weeks:
         file = f"{population}{week}.nii.gz"

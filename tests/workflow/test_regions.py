@@ -34,12 +34,12 @@ TARGETS = ["export", "results/study/figures/regions.png", *(f"results/study/{nam
 
 
 def middle(points: np.ndarray) -> float:
-    """Returns where the middle of points is from back to front."""
+    """Return where the middle of points is from back to front."""
     return float(points[:, 1].min() + points[:, 1].max()) / 2
 
 
 def write_regions(path) -> None:
-    """Writes the cortex of the phantom of week 22, in front of its middle and behind it, right and left."""
+    """Write the cortex of the phantom of week 22, in front of its middle and behind it, right and left."""
     labels, affine = phantom_labels(22, voxel_mm=VOXEL_MM)
     cortex = np.argwhere(labels == CORTEX)
     points = cortex @ affine[:3, :3].T + affine[:3, 3]

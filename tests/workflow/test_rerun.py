@@ -34,13 +34,13 @@ OF_THE_OTHER_BRAIN = RESULTS | CARRIED | CURVES | {
 
 
 def planned(workflow: Workflow, *arguments: str) -> dict[str, int]:
-    """Returns the jobs of `STAGES` that a dry run plans."""
+    """Return the jobs of `STAGES` that a dry run plans."""
     return {rule: count for rule, count in workflow.jobs(*arguments).items() if rule in STAGES}
 
 
 @contextmanager
 def changed_files(root, *names, content=b"\n# changed\n"):
-    """Has something else at the end of files of a checkout or study for as long as the block lasts."""
+    """Have something else at the end of files of a checkout or study for as long as the block lasts."""
     kept = {root / name: ((root / name).read_bytes(), (root / name).stat()) for name in names}
     try:
         for path, (before, _) in kept.items():

@@ -26,7 +26,7 @@ def server():
 
 
 def study(folder: Path, url: str, **changes) -> dict:
-    """Writes an atlas whose files are at a server into a folder and returns a study of it."""
+    """Write an atlas whose files are at a server into a folder and return a study of it."""
     atlas = {
         "name": "far",
         "title": "An atlas elsewhere",

@@ -55,7 +55,7 @@ sys.exit(libc.mount(source.encode(), place.encode(), kind, flags, data) and ctyp
 
 @pytest.fixture
 def outside(tmp_path):
-    """Returns the variables of a shell outside of any environment, with a stand-in for conda first on PATH."""
+    """Return the variables of a shell outside of any environment, with a stand-in for conda first on PATH."""
     programs = tmp_path / "programs"
     programs.mkdir()
     conda = programs / "conda"
@@ -75,7 +75,7 @@ def run(*command, env=None, **options):
 
 
 def start(*command, env):
-    """Starts ./run with signals as a shell starts it, whatever they are here."""
+    """Start ./run with signals as a shell starts it, whatever they are here."""
     return subprocess.Popen(
         [RUN, *command], env=env,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -84,7 +84,7 @@ def start(*command, env):
 
 
 def wait_until(condition, seconds=20.0):
-    """Returns whether a condition came true in time."""
+    """Return whether a condition came true in time."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if condition():
@@ -94,7 +94,7 @@ def wait_until(condition, seconds=20.0):
 
 
 def running(word):
-    """Returns the processes that have a word in their command line."""
+    """Return the processes that have a word in their command line."""
     pids = [int(process.name) for process in Path("/proc").glob("[0-9]*")]
     return [pid for pid in pids if pid != os.getpid() and any(word in part for part in command_of(pid))]
 
@@ -188,7 +188,7 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
 
 @pytest.fixture
 def tree(outside, tmp_path):
-    """Returns the variables of a shell in which ./run has to enter the Debian tree that the tests run in."""
+    """Return the variables of a shell in which ./run has to enter the Debian tree that the tests run in."""
     venv = Path(os.environ.get("VIRTUAL_ENV", "/nowhere"))
     (recipe,) = re.findall(r"^recipe=(\d+)", RUN.read_text(), flags=re.MULTILINE)
     lists = [(ROOT / "envs" / name).read_bytes() for name in ("debian.txt", "requirements.txt")]

@@ -19,7 +19,7 @@ STUDY = {
 
 
 def ellipsoids(first_week, *semi_axes_mm):
-    """Returns brains of ellipsoids, of a week and the next, with the end of folding in the latter."""
+    """Return brains of ellipsoids, of a week and the next, with the end of folding in the latter."""
     weeks = (first_week, first_week + 1)
     brains = [
         {"id": name, "week": week, "shape": {"semi_axes_mm": axes}}

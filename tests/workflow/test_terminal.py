@@ -21,7 +21,7 @@ FILE = "$(touch pwned) 'x' \"y\"; touch pwned & -é.nii.gz"
 
 
 def on_a_terminal(workflow, *arguments):
-    """Returns the exit code of a run on a pseudo terminal, and what it has written."""
+    """Return the exit code of a run on a pseudo terminal, and what it has written."""
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
         workflow.command(*arguments), cwd=workflow.directory, env=workflow.environment | {"TERM": "xterm"},

@@ -30,7 +30,7 @@ from .zones import zones_of_run
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Returns the command line's values."""
+    """Return the command line's values."""
     parser = argparse.ArgumentParser(prog="python -m gyriflow.folding", description=__doc__)
     parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
@@ -47,7 +47,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Holds the folder for this run; StorageError where another run holds it or it cannot be written."""
+    """Hold the folder for this run; StorageError where another run holds it or it cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / ".lock").open("w")
@@ -62,7 +62,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
-    """Raises StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
+    """Raise StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
     # positions in double precision, fields in single
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
     frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
@@ -109,7 +109,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
-    """Runs `main` under the folder's lock and ends every rank with the exit code of the first error."""
+    """Run `main` under the folder's lock and end every rank with the exit code of the first error."""
     try:
         if comm.rank == 0:
             with locked(arguments.out):

@@ -52,11 +52,11 @@ class State:
 
     @classmethod
     def at_start(cls, positions: Floats, step_s: float) -> "State":
-        """Returns the state before the first step, free of stress."""
+        """Return the state before the first step, free of stress."""
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
     def predicted(self, step_s: float) -> list[Floats]:
-        """Returns (n, 3) first guesses in m for a step of a given length, the best one first where growth is steady.
+        """Return (n, 3) first guesses in m for a step of a given length, the best one first where growth is steady.
 
         They are the two last steps' rates extended, and the last one's alone, for the step after growth has changed.
         """
@@ -77,7 +77,7 @@ class State:
         learnt: Sequence[float] | None = None,
         log_growth: Floats | None = None,
     ) -> "State":
-        """Returns the state after an accepted step with its (n, 3) displacement in m; what it left and taught."""
+        """Return the state after an accepted step with its (n, 3) displacement in m; what it left and taught."""
         grown = self.grown if self.grown is None or log_growth is None else self.grown + log_growth
         return replace(
             self,
@@ -97,7 +97,7 @@ class State:
 
 
 def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
-    """Returns a hash of all that decides the course of a run: mesh, parameters, maps, and the code of model and solver.
+    """Return a hash of all that decides the course of a run: mesh, parameters, maps, and the code of model and solver.
 
     Left out is what only decides how far it goes, when it writes and on how many ranks: a run that failed can be
     called again with an earlier end or more halvings and goes on.
@@ -126,7 +126,7 @@ def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
 
 
 def write_checkpoint(path: Path, key: str, state: State) -> None:
-    """Writes the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
+    """Write the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
     values = dict(vars(state))
     arrays = {name: values.pop(name) for name in ARRAYS if values[name] is not None}
     for name in ARRAYS:
@@ -141,7 +141,7 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
 
 
 def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
-    """Returns the state of the run `key`, or None, and what to tell the user about it (empty: there is none)."""
+    """Return the state of the run `key`, or None, and what to tell the user about it (empty: there is none)."""
     if not path.exists():
         return None, ""
     try:

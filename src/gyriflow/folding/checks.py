@@ -18,7 +18,7 @@ of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak 
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
-    """Returns facets and area per zone, the clamped share of each hemisphere, the initial penetration of the planes in
+    """Return facets and area per zone, the clamped share of each hemisphere, the initial penetration of the planes in
     mm (0 by construction), and the number of elements through the cortex."""
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
@@ -40,7 +40,7 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 
 
 def zone_warnings(report: dict) -> list[str]:
-    """Returns what a user should know of the zones, from their report, before trusting a run."""
+    """Return what a user should know of the zones, from their report, before trusting a run."""
     areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
     share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
     if share <= MUCH_BETWEEN_PLANES:
@@ -52,7 +52,7 @@ def zone_warnings(report: dict) -> list[str]:
 
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
-    """Returns the mean edge length in mm of the elements whose centroid lies in the cortex."""
+    """Return the mean edge length in mm of the elements whose centroid lies in the cortex."""
     centroids = mesh.vertices[mesh.corners].mean(axis=1)
     depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
     cortex = mesh.corners[depth <= thickness_mm]
@@ -63,7 +63,7 @@ def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float)
 
 
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
-    """Raises an error for a brain that cannot be folded with these zones.
+    """Raise an error for a brain that cannot be folded with these zones.
 
     InputError where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain;
     MeshError where elements are inside out, the surface is not closed, or a part has no clamped facet and would float.
@@ -107,7 +107,7 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
 
 
 def stiffness_warning(poisson_ratio: float) -> str:
-    """Returns what to say of a Poisson's ratio that linear elements are too stiff for; empty where they are not."""
+    """Return what to say of a Poisson's ratio that linear elements are too stiff for; empty where they are not."""
     if poisson_ratio <= LARGEST_POISSON_RATIO:
         return ""
     return (

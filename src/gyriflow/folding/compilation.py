@@ -17,7 +17,7 @@ COMPILER_ARGUMENTS = ["-O3", "-march=native", *REORDERED_SUMS]
 
 
 def processor() -> str:
-    """Returns a text that differs between processors for which -march=native means different things."""
+    """Return a text that differs between processors for which -march=native means different things."""
     described = Path("/proc/cpuinfo")
     lines = described.read_text().splitlines() if described.exists() else []
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())
@@ -25,7 +25,7 @@ def processor() -> str:
 
 @contextmanager
 def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
-    """Yields the options of the form compiler; forms are to be made inside the block, by all ranks.
+    """Yield the options of the form compiler; forms are to be made inside the block, by all ranks.
 
     Rank 0 holds the cache for the block, since concurrent runs share it and a compilation that was killed leaves a
     source file for which everyone would wait.
@@ -45,7 +45,7 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
 
 
 def drop_torn_entries(cache: Path) -> None:
-    """Removes the files of every form that lacks its source, its library, or the mark that both are whole."""
+    """Remove the files of every form that lacks its source, its library, or the mark that both are whole."""
     names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}
     for name in names:
         whole = (cache / f"{name}.c").exists() and (cache / f"{name}.c.cached").exists()

@@ -141,7 +141,7 @@ class SelfContact:
             self.mesh_moved()
 
     def mesh_moved(self) -> None:
-        """Takes note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
+        """Take note of a mesh that has been placed anew: areas weigh the barrier as they are now."""
         self._start = self._weights @ self.domain.positions[self._vertices] * MM_PER_M
         # the same whatever a rank's processor rounds
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._start, self._edges)
@@ -152,7 +152,7 @@ class SelfContact:
         self._known: ContactCache | None = None
 
     def adapt(self, rows: Sequence[dict]) -> None:
-        """Sets the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
+        """Set the stiffness of the next step from the table of the steps so far; call `mesh_moved` after it."""
         self.stiffness_pa = self._softest_pa
         if not rows:
             return
@@ -207,7 +207,7 @@ class SelfContact:
         return self._known
 
     def joined(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Returns the numbers (n,) of parts of the mesh, those of parts that touch at the step's start made one."""
+        """Return the numbers (n,) of parts of the mesh, those of parts that touch at the step's start made one."""
         if part.max() == 0:
             return part
         state = self._state_at(np.zeros_like(self._start))
@@ -224,13 +224,13 @@ class SelfContact:
         return connected_components(graph, directed=False)[1][part].astype(np.int64)
 
     def energy(self) -> float:
-        """Returns the barrier's energy in J."""
+        """Return the barrier's energy in J."""
         state = self._state()
         of_rank = float(self._barrier(state.pairs, state.surface, state.positions)) * J_PER_PA_MM3
         return self.domain.comm.allreduce(of_rank)
 
     def forces(self) -> Floats:
-        """Returns the (n, 3) derivative of the energy in N at the surface's nodes."""
+        """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
         state = self._state()
         return self._summed(self._follow.T @ self._own_forces(state))
 
@@ -246,11 +246,11 @@ class SelfContact:
         return total
 
     def add_residual(self, out: PETSc.Vec) -> None:
-        """Adds the forces in N to the owned components of a vector."""
+        """Add the forces in N to the owned components of a vector."""
         out.array.reshape(-1, 3)[self._owned_nodes] += self.forces()[self._owned_rows]
 
     def stiffness(self, *, convex: bool = False) -> PETSc.Mat | None:
-        """Returns the second derivative in N/m, None without any pair; `convex` drops the negative part of each."""
+        """Return the second derivative in N/m, None without any pair; `convex` drops the negative part of each."""
         state, comm = self._state(), self.domain.comm
         if not comm.allreduce(len(state.pairs)):
             return None
@@ -284,7 +284,7 @@ class SelfContact:
         return result
 
     def largest_step(self, direction: Floats) -> float:
-        """Returns the part of (k, 3) local displacements that can be added without any touch on the way."""
+        """Return the part of (k, 3) local displacements that can be added without any touch on the way."""
         way = self._on_surface(direction) * MM_PER_M
         # what is near a longer way would fill the memory
         part = LONGEST_MM / max(float(np.linalg.norm(way, axis=1).max()), LONGEST_MM)
@@ -306,15 +306,15 @@ class SelfContact:
         )
 
     def smallest_distance_mm(self) -> float:
-        """Returns the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
+        """Return the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""
         return self.domain.comm.allreduce(self._state().gap, op=MPI.MIN)
 
     def pair_count(self) -> int:
-        """Returns the number of pairs within the distance."""
+        """Return the number of pairs within the distance."""
         return self.domain.comm.allreduce(len(self._state().pairs))
 
     def pressure(self) -> Floats:
-        """Returns the (n,) contact pressure in Pa at all vertices of the file, 0 off the surface: force per area."""
+        """Return the (n,) contact pressure in Pa at all vertices of the file, 0 off the surface: force per area."""
         state = self._state()
         forces, areas = np.zeros_like(self._start), np.zeros(len(self._start))
         forces[state.part.vertices] = self._own_forces(state)

@@ -17,7 +17,7 @@ EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
-    """Returns a thickness below the pial surface in mean edges of the present elements in it; NaN where there are none.
+    """Return a thickness below the pial surface in mean edges of the present elements in it; NaN where there are none.
 
     `distance` (k,) is that of the local nodes to the pial surface, in m as the thickness.
     """
@@ -29,7 +29,7 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
-    """Returns what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
+    """Return what to say where the cortex has just come to be resolved too coarsely; empty where it has not."""
     # not a number where no element has its centre in the cortex: none lies through it
     through = [
         0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]
@@ -45,7 +45,7 @@ def resolution_warning(rows: Sequence[dict], order: int) -> str:
 
 
 def unconverged_warning(row: dict) -> str:
-    """Returns what to say of a step that ended above the tolerance; empty of others."""
+    """Return what to say of a step that ended above the tolerance; empty of others."""
     if row["converged"]:
         return ""
     return (
@@ -55,7 +55,7 @@ def unconverged_warning(row: dict) -> str:
 
 
 def contact_row(contact: SelfContact | None, zones: Zones, positions: Floats) -> dict[str, float]:
-    """Returns what the step table says of contact right after a solve that led to (n, 3) positions in m."""
+    """Return what the step table says of contact right after a solve that led to (n, 3) positions in m."""
     if contact is None:
         return {"plane_penetration_mm": zones.penetration_mm(positions * MM_PER_M)}
     distance = contact.smallest_distance_mm()
@@ -69,7 +69,7 @@ def contact_row(contact: SelfContact | None, zones: Zones, positions: Floats) ->
 
 
 def worst_places(solver: NewtonSolver) -> str:
-    """Returns where the last solve stood worst: the most compressed element and the largest residual, in mm."""
+    """Return where the last solve stood worst: the most compressed element and the largest residual, in mm."""
     problem, domain = solver.problem, solver.problem.domain
     before = domain.local(domain.positions)
     ratios = problem.volume_ratios() if solver.inverting is None else solver.inverting

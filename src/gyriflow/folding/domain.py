@@ -81,7 +81,7 @@ class Domain:
         self.node_of_vertex[self._order] = np.arange(len(self._order))
 
     def gathered(self, owned_values: Floats) -> Floats:
-        """Returns on every rank the (n, 3) vectors of all vertices from the owned (owned, 3) ones of each."""
+        """Return on every rank the (n, 3) vectors of all vertices from the owned (owned, 3) ones of each."""
         received = np.empty((len(self._order), 3))
         self.comm.Allgatherv(np.ascontiguousarray(owned_values), (received, self._counts))
         values = np.empty_like(received)
@@ -89,7 +89,7 @@ class Domain:
         return values
 
     def gathered_cells(self, cell_values: Floats) -> Floats:
-        """Returns on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
+        """Return on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
         shape = cell_values.shape[1:]
         width = int(np.prod(shape))
         received = np.empty((len(self._tets), width))
@@ -100,11 +100,11 @@ class Domain:
         return values.reshape(-1, *shape)
 
     def local(self, values: NDArray) -> NDArray:
-        """Returns the values of the local nodes from those of all vertices."""
+        """Return the values of the local nodes from those of all vertices."""
         return values[self.vertex_of_node]
 
     def place(self, positions: Floats) -> None:
-        """Moves the mesh to (n, 3) positions in m."""
+        """Move the mesh to (n, 3) positions in m."""
         self.positions = positions
         nodes = self.local(positions)
         self.mesh.geometry.x[self._geometry_node] = nodes
@@ -122,13 +122,13 @@ class Domain:
             self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
 
     def volume_ratios(self, node_positions: Floats) -> Floats:
-        """Returns det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
+        """Return det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
         if self.order == 1:
             return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
         return jacobians(node_positions, self.cells, AT_NODES) / self._maps_at_nodes
 
     def smallest_volume_ratio(self, node_positions: Floats) -> float:
-        """Returns a number that det F of a move is nowhere below, in no element of any rank.
+        """Return a number that det F of a move is nowhere below, in no element of any rank.
 
         It is positive only where no element is turned inside out anywhere. For linear elements it is the smallest
         det F itself; that of quadratic ones varies, and the bound is that of the map's determinant after the move, over
@@ -139,11 +139,11 @@ class Domain:
         return self.minimum(lower_bounds(node_positions, self.cells) / self._largest_maps)
 
     def minimum(self, local_values: Floats) -> float:
-        """Returns the smallest value over all ranks."""
+        """Return the smallest value over all ranks."""
         return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
 
     def least(self, values: Floats, numbers: NDArray, places: Floats) -> tuple[float, int, Floats]:
-        """Returns the smallest of the local values over all ranks, with its number in the file and its place."""
+        """Return the smallest of the local values over all ranks, with its number in the file and its place."""
         local_least = (np.inf, -1, np.full(3, np.nan))
         if len(values):
             i = int(values.argmin())
@@ -151,7 +151,7 @@ class Domain:
         return min(self.comm.allgather(local_least), key=lambda entry: entry[:2])
 
     def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
-        """Returns the tags of boundary facets on the local facets.
+        """Return the tags of boundary facets on the local facets.
 
         They are given as vertex indices of the file; the triangles of a quadratic element's face have one tag.
         """

@@ -31,7 +31,7 @@ class Size:
     volume_mm3: float
 
     def rates_to(self, after: "Size", step_s: float) -> Floats:
-        """Returns the (2,) rates in 1/s of the logarithms of area and volume that lead to another size in a step."""
+        """Return the (2,) rates in 1/s of the logarithms of area and volume that lead to another size in a step."""
         return np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3]) / step_s
 
 
@@ -48,11 +48,11 @@ class GrowthInputs:
 
     @classmethod
     def of(cls, mesh: TetrahedralMesh, zones: Zones, maps: Maps) -> "GrowthInputs":
-        """Returns the inputs for a mesh."""
+        """Return the inputs for a mesh."""
         return cls(linear_pieces(mesh), zones, maps)
 
     def size(self, positions_mm: Floats) -> Size:
-        """Returns the size of the brain, for (n, 3) positions of all vertices."""
+        """Return the size of the brain, for (n, 3) positions of all vertices."""
         return Size(
             area(TriangleMesh(positions_mm, self.zones.measured_facets)),
             signed_volume(TriangleMesh(positions_mm, self.zones.facets)),
@@ -73,7 +73,7 @@ class StepStart:
     learnt: Sequence[float] | None = None
 
     def week(self, p: FoldingParameters, part: float) -> float:
-        """Returns the gestational week at a part of the step, of 0 at its start to 1 at its end."""
+        """Return the gestational week at a part of the step, of 0 at its start to 1 at its end."""
         return p.start_week + (self.time_s + part * self.step_s) / SECONDS_PER_GW
 
 
@@ -86,18 +86,18 @@ class Growth(ABC):
 
     @abstractmethod
     def inverse(self, tissue: Tissue) -> Floats:
-        """Returns G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
+        """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
     def logarithm(self) -> Floats | None:
-        """Returns ln G (6, n) at all vertices, None where growth is by the rates of the parameters."""
+        """Return ln G (6, n) at all vertices, None where growth is by the rates of the parameters."""
         return None
 
     def learnt(self, after: Size) -> tuple[float, ...] | None:
-        """Returns what a step that has led to a size teaches the next ones, None where that is nothing."""
+        """Return what a step that has led to a size teaches the next ones, None where that is nothing."""
         return None
 
     def row(self, after: Size) -> dict[str, Any]:
-        """Returns what the step table says of growth after the step has led to a size."""
+        """Return what the step table says of growth after the step has led to a size."""
         return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
 
 
@@ -118,7 +118,7 @@ class GrowthByRates(Growth):
 
 
 def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
-    """Returns the increments dg along the pial surface and dr across it, as stretches less 1.
+    """Return the increments dg along the pial surface and dr across it, as stretches less 1.
 
     dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt, with the cortical weight w, g 1
     where tissue grows and else 0, and rates in 1/s: α_TAN of the cortex along its surface, α_RAD of the core along the
@@ -131,7 +131,7 @@ def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: 
 def increments_at(
     p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
 ) -> tuple[Floats, Floats]:
-    """Returns the increments of a step by the parameters' rates at a week, at points where maps have their values."""
+    """Return the increments of a step by the parameters' rates at a week, at points where maps have their values."""
     tangential, radial, core = (
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
@@ -140,7 +140,7 @@ def increments_at(
 
 
 def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: Floats) -> Floats:
-    """Returns G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
+    """Return G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
 
     The (c,) `chosen` elements have unit normals N (w, q, 3); others grow by dg in all directions.
     """

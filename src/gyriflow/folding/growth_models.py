@@ -9,7 +9,7 @@ from .targets import GrowthToTargets
 
 
 def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats) -> GrowthModel:
-    """Returns the model of a run that starts at (n, 3) positions."""
+    """Return the model of a run that starts at (n, 3) positions."""
     if p.targets:
         return GrowthToTargets.of(p, inputs).growth
     if p.growth.model == "sizes":

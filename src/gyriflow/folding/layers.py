@@ -28,12 +28,12 @@ TIE = 1e-9
 
 
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
-    """Returns w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (paper, after Tallinen et al. 2016)."""
+    """Return w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (paper, after Tallinen et al. 2016)."""
     return 1.0 / (1.0 + np.exp(np.minimum(CORTICAL_STEEPNESS * (distance / thickness - 1.0), 700.0)))
 
 
 def shear_modulus(p: FoldingParameters, w: Floats, maps: Maps, week: float) -> Floats:
-    """Returns the shear modulus (k,) in Pa at points of cortical weight w (k,), where maps have (k,) values."""
+    """Return the shear modulus (k,) in Pa at points of cortical weight w (k,), where maps have (k,) values."""
     core, cortex = (value_at(value, week, maps) for value in (p.shear_modulus_core_pa, p.shear_modulus_cortex_pa))
     return core * (1 - w) + cortex * w
 
@@ -52,7 +52,7 @@ class PialSearch:
         self._order[np.lexsort(self.surface.vertices.T[::-1])] = np.arange(len(self.pial))
 
     def distance(self, points: Floats, reach: float = np.inf, to_vertex: Floats | None = None) -> Floats:
-        """Returns the distances of (k, 3) points to the pial triangles.
+        """Return the distances of (k, 3) points to the pial triangles.
 
         Where a distance is beyond `reach`, that to the nearest vertex may stand for it. `to_vertex` are the distances
         to the nearest vertices, where they are known.
@@ -64,7 +64,7 @@ class PialSearch:
         return distance
 
     def distance_and_normals(self, points: Floats, reach: float = np.inf) -> tuple[Floats, Floats]:
-        """Returns the distances of (k, 3) points to the pial triangles, and the unit normals at the nearest places.
+        """Return the distances of (k, 3) points to the pial triangles, and the unit normals at the nearest places.
 
         Normals are linear in each triangle between those of its vertices. Beyond `reach` the nearest vertex may stand
         for the nearest place.
@@ -84,7 +84,7 @@ class PialSearch:
         return np.asarray(to_vertex <= np.hypot(reach, longest / np.sqrt(3)))
 
     def normals_from(self, points: Floats, candidates: Ints) -> Floats:
-        """Returns for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
+        """Return for (k, 3) points the unit normals of the nearest of (k, c) candidate pial vertices.
 
         Where several are as near it is their mean, so that mirrored brains have mirrored normals; where that all but
         vanishes, as between opposed walls, that of the vertex with the smaller coordinates. The order of points and
@@ -105,14 +105,14 @@ class PialSearch:
         return normals
 
     def nearest_normals(self, points: Floats) -> Floats:
-        """Returns the (k, 3) unit normals of the pial vertices nearest to (k, 3) points, ties as in `normals_from`."""
+        """Return the (k, 3) unit normals of the pial vertices nearest to (k, 3) points, ties as in `normals_from`."""
         neighbours = min(8, len(self.pial))
         index = self.tree.query(points, k=neighbours)[1].reshape(len(points), neighbours)
         return self.normals_from(points, index)
 
 
 def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
-    """Returns the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
+    """Return the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
 
     Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
     turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
@@ -163,7 +163,7 @@ class Tissue:
         thickness_mm: Callable[[Maps], float | Floats],
         thickest_mm: float,
     ) -> "Tissue":
-        """Returns the tissue from (k,) `growing` and maps at the nodes, other parameters as the attributes.
+        """Return the tissue from (k,) `growing` and maps at the nodes, other parameters as the attributes.
 
         `thickness_mm` gives the cortex's where maps have their values, `thickest_mm` is its largest anywhere.
         """
@@ -184,16 +184,16 @@ class Tissue:
         return cls(cells, vertices, points, nodes, depth, pial, nearest, weight, growing, maps)
 
     def at_points(self, values: Floats) -> Floats:
-        """Returns (..., c, q) values at the integration points from those at the tissue's own places."""
+        """Return (..., c, q) values at the integration points from those at the tissue's own places."""
         return values[..., self.cells] @ self.points.smooth.T if self.points.order == 1 else values
 
     def from_vertices(self, values: Floats) -> Floats:
-        """Returns (..., c, q) values at the integration points, linear between those (..., n) of the whole mesh."""
+        """Return (..., c, q) values at the integration points, linear between those (..., n) of the whole mesh."""
         linear = self.points.smooth if self.points.order == 1 else self.points.bounded
         return np.asarray(values[..., self.vertices[self.cells]] @ linear.T)
 
     def normals(self, wanted: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
-        """Returns which elements (c,) hold a place where a normal is `wanted`, and their (w, q, 3) unit normals.
+        """Return which elements (c,) hold a place where a normal is `wanted`, and their (w, q, 3) unit normals.
 
         Linear elements have one normal each, that of the pial vertex nearest to their centres.
         """

@@ -62,14 +62,14 @@ class TwoLevelPreconditioner:
         self._made_at = -LIFETIME
 
     def renew(self) -> None:
-        """Takes over the tangent's diagonal, and its coarse level where that has served its time: before each use."""
+        """Take over the tangent's diagonal, and its coarse level where that has served its time: before each use."""
         self._set_diagonal()
         if self._tangent.elastic.assembled >= self._made_at + LIFETIME:
             self._made_at = self._tangent.elastic.assembled
             self._set_coarse_level()
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Sets y to the preconditioned x."""
+        """Set y to the preconditioned x."""
         coarse = self._restriction @ x.array_r
         self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
         y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ (self._inverse_coarse @ coarse)
@@ -108,7 +108,7 @@ class TwoLevelPreconditioner:
 
 
 def positive_inverses(matrices: Floats) -> Floats:
-    """Returns inverses of (..., k, k) symmetric matrices, made positive definite: eigenvalues below 0 change sign."""
+    """Return inverses of (..., k, k) symmetric matrices, made positive definite: eigenvalues below 0 change sign."""
     try:
         np.linalg.cholesky(matrices)
     except np.linalg.LinAlgError:
@@ -138,7 +138,7 @@ class LinearSolver:
     def solve(
         self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
     ) -> LinearCount:
-        """Leaves in `direction` a solution of J d = −r that descends, with the tangent J and the residual r.
+        """Leave in `direction` a solution of J d = −r that descends, with the tangent J and the residual r.
 
         `reduction` is the part of the right-hand side that may be left. Where J is indefinite, it is shifted; with
         `convexify` its further parts are made convex before that. NotConvergedError where no shift helps.
@@ -169,7 +169,7 @@ class LinearSolver:
         raise NotConvergedError("the linear solver found no descent direction")
 
     def _run(self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec) -> tuple[int, int]:
-        """Solves into the direction; returns PETSc's reason for the end, 0 without a descent, and the iterations."""
+        """Solve into the direction; return PETSc's reason for the end, 0 without a descent, and the iterations."""
         if self._preconditioner is None:
             self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
             multilevel = self._cg.getPC()

@@ -69,7 +69,7 @@ class Iterate:
 
 
 def linear_tolerance(enough: float, left: float, least: float) -> float:
-    """Returns the part of the residual that a linear solve may leave (forcing terms as of Eisenstat and Walker 1996).
+    """Return the part of the residual that a linear solve may leave (forcing terms as of Eisenstat and Walker 1996).
 
     `enough` ends the step, `left` is what the last iteration left of its residual (the next one leaves about the
     square, however well it is solved), and `least` the tolerance of solves in which the iteration converges fast.
@@ -102,7 +102,7 @@ class NewtonSolver:
         self.inverting: NDArray[np.float64] | None = None
 
     def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
-        """Solves for the displacement from the first good one of some guesses (k, 3) in m; it is left in the problem.
+        """Solve for the displacement from the first good one of some guesses (k, 3) in m; it is left in the problem.
 
         NotConvergedError where the residual does not fall below the tolerance.
         """
@@ -171,7 +171,7 @@ class NewtonSolver:
         return self._residual_at(np.zeros_like(problem.displacement))
 
     def _advance(self, iterate: Iterate, *, convex: bool) -> Iterate:
-        """Moves along the direction as far as energy and elements allow; returns where that leads.
+        """Move along the direction as far as energy and elements allow; return where that leads.
 
         `convex` says that the tangent was positive definite as it was.
         """

@@ -29,19 +29,19 @@ ZONES = "zones.json"
 
 
 def say(text: str, event: str = "", **facts: float | str | None) -> None:
-    """Prints a line at once, so that a log follows the run, and tells what has happened, if it is an event."""
+    """Print a line at once, so that a log follows the run, and tell what has happened, if it is an event."""
     print(text, flush=True)
     if event:
         log_event(event, **facts)
 
 
 def log_event(event: str, **facts: float | str | None) -> None:
-    """Hands an event with its facts on to the file of `write_events`, where there is one."""
+    """Hand an event with its facts on to the file of `write_events`, where there is one."""
     log.info(event, extra={"facts": facts})
 
 
 def warn(text: str) -> None:
-    """Prints a warning, which is an event too."""
+    """Print a warning, which is an event too."""
     say(f"warning: {text}", "warning", message=text)
 
 
@@ -51,7 +51,7 @@ class _Events(logging.Formatter):
 
 
 def write_events(path: Path) -> None:
-    """Has all events written to a file from now on, each as a JSON object on a line of its own."""
+    """Have all events written to a file from now on, each as a JSON object on a line of its own."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handler = logging.FileHandler(path, mode="w")
@@ -63,7 +63,7 @@ def write_events(path: Path) -> None:
 
 
 def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
-    """Returns the line of a step: week, iterations, displacement, time."""
+    """Return the line of a step: week, iterations, displacement, time."""
     minutes, seconds = divmod(round(seconds_left), 60)
     return (
         f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
@@ -73,7 +73,7 @@ def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
 
 
 def frame_path(folder: Path, week: float) -> Path:
-    """Returns the file of a single frame, kept until the run has ended."""
+    """Return the file of a single frame, kept until the run has ended."""
     return folder / f"frame-{week_tag(week)}.h5"
 
 
@@ -86,7 +86,7 @@ def layer_fields(
     wanted: Iterable[str],
     log_growth: Floats | None = None,
 ) -> dict[str, NDArray]:
-    """Returns the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
+    """Return the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
 
     Positions are (n, 3) in mm. The names of the arrays carry their units. Growth is by the parameters' rates, or has
     the logarithm (6, n).
@@ -117,7 +117,7 @@ def layer_fields(
 
 
 def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
-    """Returns the fields of growth with the logarithm (6, n) at vertices with the (n, 3) unit normals of the surface.
+    """Return the fields of growth with the logarithm (6, n) at vertices with the (n, 3) unit normals of the surface.
 
     Its direction is that along the surface in which it is largest; its length is by how much it exceeds the growth
     across that direction.
@@ -134,6 +134,6 @@ def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
 
 
 def peak_memory_mib() -> float:
-    """Returns the peak memory of this process in MiB."""
+    """Return the peak memory of this process in MiB."""
     unit = 1024 if sys.platform != "darwin" else 1024**2
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

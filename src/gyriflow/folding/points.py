@@ -27,7 +27,7 @@ class IntegrationPoints:
 
     @classmethod
     def of_degree(cls, order: int, degree: int | None = None) -> "IntegrationPoints":
-        """Returns the points of a symmetric rule that is exact for polynomials of a degree, or of that of the order."""
+        """Return the points of a symmetric rule that is exact for polynomials of a degree, or of that of the order."""
         degree = degree or DEGREE_OF_ORDER[order]
         if degree == 3:
             places = np.concatenate([a + (1 - 4 * a) * np.eye(4) for a, _ in CUBIC])

@@ -13,7 +13,7 @@ MIB_PER_RANK_OF_CONTACT = {1: 0.0, 2: 180.0}
 
 
 def predicted_memory_mib(tets: int, ranks: int, contact: str, order: int = 1) -> float:
-    """Returns the peak memory in MiB, over all ranks, that a run with elements of an order is likely to take."""
+    """Return the peak memory in MiB, over all ranks, that a run with elements of an order is likely to take."""
     per_tet = KIB_PER_TET[order] + KIB_PER_TET_AND_RANK[order] * ranks
     factor, per_rank = (GLOBAL_CONTACT[order], MIB_PER_RANK_OF_CONTACT[order]) if contact == "global" else (1.0, 0.0)
     return (MIB_PER_RANK + per_rank) * ranks + per_tet * factor * tets / 1024

@@ -113,7 +113,7 @@ class Problem:
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
     def mesh_moved(self, part: NDArray[np.int64]) -> None:
-        """Takes note of a mesh that has been placed anew.
+        """Take note of a mesh that has been placed anew.
 
         Where the body is unconstrained, its rigid motions are taken out of each of the parts that the (n,) numbers of
         all vertices name.
@@ -123,7 +123,7 @@ class Problem:
             self._tangent.remove(RigidMotions(self.domain, part))
 
     def admissible(self, values: Floats) -> Floats:
-        """Returns (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""
+        """Return (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""
         if self._tangent.motions is None:
             return values
         self.displacement[:] = values
@@ -132,22 +132,22 @@ class Problem:
         return self.displacement.copy()
 
     def set_shear_modulus(self, mu: Floats) -> None:
-        """Sets the shear modulus (c, q) in Pa at the integration points."""
+        """Set the shear modulus (c, q) in Pa at the integration points."""
         self._elastic.forget()
         set_at_points(self._mu, mu)
 
     def set_growth(self, G_inverse: Floats) -> None:
-        """Sets the inverse (c, q, 3, 3) of the step's growth tensor at the integration points."""
+        """Set the inverse (c, q, 3, 3) of the step's growth tensor at the integration points."""
         self._elastic.forget()
         set_at_points(self._G_inverse, G_inverse)
 
     def set_stretch(self, V: Floats) -> None:
-        """Sets the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
+        """Set the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
         self._elastic.forget()
         set_at_points(self._V, V)
 
     def outcome(self, name: Literal["deformation", "elastic", "stress"]) -> Floats:
-        """Returns the (c, q, 3, 3) tensors at the integration points of the local elements; all ranks have to ask.
+        """Return the (c, q, 3, 3) tensors at the integration points of the local elements; all ranks have to ask.
 
         `deformation` is the step's F and `elastic` its Fe = F·V·G⁻¹; `stress` is Cauchy's, in Pa, of the energy that
         is minimised. They refer to the mesh before the step: while it has not been placed anew.
@@ -165,16 +165,16 @@ class Problem:
         return self.u.x.array.reshape(-1, 3)
 
     def set_displacement(self, values: Floats) -> None:
-        """Sets the (k, 3) displacements of the local nodes in m."""
+        """Set the (k, 3) displacements of the local nodes in m."""
         self.displacement[:] = values
 
     def energy(self) -> float:
-        """Returns the total energy in J, contact included."""
+        """Return the total energy in J, contact included."""
         elastic = self.domain.comm.allreduce(dolfinx.fem.assemble_scalar(self._energy))
         return float(np.real(elastic)) + sum(part.energy() for part in self.contributions)
 
     def residual(self, out: PETSc.Vec) -> float:
-        """Assembles the residual in N into `out`, zero where the displacement is fixed, and returns its norm."""
+        """Assemble the residual in N into `out`, zero where the displacement is fixed, and return its norm."""
         with out.localForm() as local:
             local.set(0.0)
         dolfinx.fem.petsc.assemble_vector(out, self._residual)
@@ -189,7 +189,7 @@ class Problem:
         return out.norm()
 
     def tangent(self, *, within: float = 0.0) -> Tangent:
-        """Returns the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
+        """Return the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.
 
         Terms of the contributions are those of the present displacement. The elastic part may be a kept one where its
         error is at most a part `within`, see `KeptTangent.at`; the residual must then have been assembled at this
@@ -212,7 +212,7 @@ class Problem:
         return not self.contributions
 
     def convexify(self) -> None:
-        """Makes the contributions' terms in the present tangent positive semidefinite."""
+        """Make the contributions' terms in the present tangent positive semidefinite."""
         self._set_parts(convex=True)
 
     def _set_parts(self, *, convex: bool) -> None:
@@ -222,23 +222,23 @@ class Problem:
         self._tangent.parts = parts
 
     def apply_boundary_conditions(self, direction: PETSc.Vec) -> None:
-        """Sets the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""
+        """Set the fixed components of a direction to exactly 0, which preconditioners miss by their tolerance."""
         direction.array[self._fixed_owned] = 0.0
 
     def largest_step(self, direction: Floats) -> float:
-        """Returns the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""
+        """Return the part of (k, 3) local displacements in m that all contributions allow to add, at most 1."""
         return min((part.largest_step(direction) for part in self.contributions), default=1.0)
 
     def new_vector(self) -> PETSc.Vec:
-        """Returns a vector for residuals and directions, without values."""
+        """Return a vector for residuals and directions, without values."""
         return self.vector.duplicate()
 
     def volume_ratios(self) -> Floats:
-        """Returns det F of the local elements: (c, 1), or (c, 10) at the nodes of quadratic ones."""
+        """Return det F of the local elements: (c, 1), or (c, 10) at the nodes of quadratic ones."""
         return self.domain.volume_ratios(self._moved())
 
     def smallest_volume_ratio(self) -> float:
-        """Returns a number that det F is nowhere below: positive only where no element is inside out anywhere."""
+        """Return a number that det F is nowhere below: positive only where no element is inside out anywhere."""
         return self.domain.smallest_volume_ratio(self._moved())
 
     def _moved(self) -> Floats:

@@ -52,7 +52,7 @@ def run(
     start, weeks, wanted = mesh.vertices * M_PER_MM, parameters.output_weeks, parameters.fields
 
     def save(week: float, state: State) -> State:
-        """Writes the frame of a week and returns the state to go on with; all ranks have to take part."""
+        """Write the frame of a week and return the state to go on with; all ranks have to take part."""
         contact, elements = folding.fields.of_contact(wanted), folding.fields.of_elements(wanted)
         # a mean over the steps since the last frame: before the first one, that step's
         grown = folding.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
@@ -129,7 +129,7 @@ def run(
 
 
 def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
-    """Returns the state to go on from, or None, and what to tell the user.
+    """Return the state to go on from, or None, and what to tell the user.
 
     The frames of all output weeks that the state has passed must be there.
     """
@@ -145,12 +145,12 @@ def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[St
 
 
 def seconds_to(week: float, parameters: FoldingParameters) -> float:
-    """Returns the time in s from the start of the run to a week."""
+    """Return the time in s from the start of the run to a week."""
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
 def foreign_checkpoints(out: Path, present: Path) -> list[str]:
-    """Returns what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
+    """Return what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
     others = sorted(
         (path for path in out.glob("checkpoint-*") if path != present),
         key=lambda path: path.stat().st_mtime,
@@ -162,7 +162,7 @@ def foreign_checkpoints(out: Path, present: Path) -> list[str]:
 
 
 def shortened_steps(parameters: FoldingParameters) -> str:
-    """Returns what to say where the time step does not divide the time between two outputs; empty where it does."""
+    """Return what to say where the time step does not divide the time between two outputs; empty where it does."""
     step = parameters.step_s
     for a, b in pairwise(parameters.output_weeks):
         if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:

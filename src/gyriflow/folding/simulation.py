@@ -86,7 +86,7 @@ class Folding:
         self._pial = np.unique(zones.cortex_facets)
 
     def step(self, state: State, step_s: float) -> State:
-        """Returns the state after a step of a given length, the mesh moved along; its last row says what it took.
+        """Return the state after a step of a given length, the mesh moved along; its last row says what it took.
 
         NotConvergedError where the step is too large; the mesh is as before.
         """
@@ -119,7 +119,7 @@ class Folding:
         return after
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, Growth]:
-        """Sets all that a step is solved with, and returns the tissue as in the middle of the step, and the growth."""
+        """Set all that a step is solved with, and return the tissue as in the middle of the step, and the growth."""
         start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.learnt)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
@@ -173,7 +173,7 @@ class Folding:
 
 
 def advance(folding: Folding, state: State, until_s: float) -> State:
-    """Returns the state after one accepted step towards `until_s`; the step is halved while its solve fails.
+    """Return the state after one accepted step towards `until_s`; the step is halved while its solve fails.
 
     SolverError where the smallest step fails too.
     """

@@ -75,7 +75,7 @@ class SteeredGrowth:
         return SteeredStep(p, start, before, aim, made @ rates + other, bool(limited))
 
     def aim(self, week: float) -> Size:
-        """Returns the size to be reached at a week."""
+        """Return the size to be reached at a week."""
         start, at_start, growth = self.parameters.start_week, self.at_start, self.parameters.growth
         return Size(
             joined(growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, start, week) / CM2_PER_MM2,
@@ -84,7 +84,7 @@ class SteeredGrowth:
 
 
 def steered_rates(wanted: Floats, made: Floats, bounds: tuple[float, float]) -> tuple[float, float, bool]:
-    """Returns the rates of cortex and core, and whether bounds keep the brain from its curves.
+    """Return the rates of cortex and core, and whether bounds keep the brain from its curves.
 
     The cortex grows as the area is to, the core by what the volume then lacks. Where bounds leave no room for both
     curves, the volume's is met. `wanted` are the (2,) rates of the logarithms of area and volume, `made` (2, 2) is what
@@ -105,7 +105,7 @@ def steered_rates(wanted: Floats, made: Floats, bounds: tuple[float, float]) -> 
 
 
 def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs, week: float) -> tuple[Floats, Floats]:
-    """Returns what growth would make of the logarithms of area and volume at (n, 3) positions if nothing held it.
+    """Return what growth would make of the logarithms of area and volume at (n, 3) positions if nothing held it.
 
     A (2, 2) array for unit rates of cortex and core, and the (2,) rates in 1/s without either.
     """
@@ -125,7 +125,7 @@ def free_growth(p: FoldingParameters, positions_mm: Floats, inputs: GrowthInputs
 
 
 def missed_curves(row: dict[str, Any]) -> str:
-    """Returns what to say of a step of the table that ends more than `FOLLOWED` off a curve; empty where none does."""
+    """Return what to say of a step of the table that ends more than `FOLLOWED` off a curve; empty where none does."""
     if row.get("area_aim_cm2") is None:
         return ""
     errors = {"area": row["area_cm2"] / row["area_aim_cm2"] - 1, "volume": row["volume_ml"] / row["volume_aim_ml"] - 1}
@@ -135,7 +135,7 @@ def missed_curves(row: dict[str, Any]) -> str:
 
 
 def joined(curve: Any, at_start: float, start_week: float, week: float) -> float:
-    """Returns a {week: value} curve's value at a week, for a brain that had another value at the start.
+    """Return a {week: value} curve's value at a week, for a brain that had another value at the start.
 
     The logarithm is linear between the weeks, and off the curve by as much as at the start until `JOINING_GW` ago.
     """

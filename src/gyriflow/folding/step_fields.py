@@ -39,7 +39,7 @@ class StepFields:
             self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
 
     def of_elements(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Returns those among `wanted`, (m,) for all elements, equal on every rank: means over integration points.
+        """Return those among `wanted`, (m,) for all elements, equal on every rank: means over integration points.
 
         Right after a step only.
         """
@@ -73,7 +73,7 @@ class StepFields:
         return dict(zip(fields, together.T, strict=True))
 
     def of_contact(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Returns the contact pressure (n,) at all vertices if it is among `wanted`. Right after a step only."""
+        """Return the contact pressure (n,) at all vertices if it is among `wanted`. Right after a step only."""
         if self.contact is None or "contact_pressure" not in wanted:
             return {}
         return self._per_gw({"contact_pressure_pa": self.contact.pressure()})
@@ -85,7 +85,7 @@ class StepFields:
 
 
 def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:
-    """Returns the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
+    """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
 
     Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the elements have a volume before.
     `slopes` (q, n, 3) are the gradients of the nodes' shape functions in the regular element, at the points.
@@ -96,24 +96,24 @@ def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integ
 
 
 def pressure(stress: Floats) -> Floats:
-    """Returns the (c,) pressures −tr(σ)/3, positive where tissue is pressed, in the unit of the stress."""
+    """Return the (c,) pressures −tr(σ)/3, positive where tissue is pressed, in the unit of the stress."""
     return -np.trace(stress, axis1=1, axis2=2) / 3
 
 
 def von_mises(stress: Floats) -> Floats:
-    """Returns the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the stress."""
+    """Return the (c,) equivalent stresses √(3/2 dev σ : dev σ), in the unit of the stress."""
     mean = (np.trace(stress, axis1=1, axis2=2) / 3)[:, None, None] * np.eye(3)
     return np.sqrt(1.5) * np.linalg.norm(stress - mean, axis=(1, 2))
 
 
 def principal_stretches(F: Floats) -> Floats:
-    """Returns the (c, 3) principal stretches of (c, 3, 3) deformation gradients, ascending."""
+    """Return the (c, 3) principal stretches of (c, 3, 3) deformation gradients, ascending."""
     # twice as fast as singular values
     return np.sqrt(np.linalg.eigvalsh(F @ F.transpose(0, 2, 1)))
 
 
 def hencky_equivalent(F: Floats) -> Floats:
-    """Returns the (c,) equivalent strains √(2/3 dev h : dev h) of the Hencky strain h = ln V.
+    """Return the (c,) equivalent strains √(2/3 dev h : dev h) of the Hencky strain h = ln V.
 
     It is 0 where the shape is unchanged, and the logarithm of the stretch in a bar drawn out at constant volume.
     """
@@ -122,11 +122,11 @@ def hencky_equivalent(F: Floats) -> Floats:
 
 
 def green_lagrange_maximum(F: Floats) -> Floats:
-    """Returns the (c,) largest principal values of the Green-Lagrange strain (FᵀF − I)/2."""
+    """Return the (c,) largest principal values of the Green-Lagrange strain (FᵀF − I)/2."""
     return (principal_stretches(F)[:, -1] ** 2 - 1) / 2
 
 
 def areal_stretch(F: Floats, N: Floats) -> Floats:
-    """Returns the (c,) ratios of areas, after to before, of planes with unit normals N (c, 3) before: det F·|F⁻ᵀ·N|."""
+    """Return the (c,) ratios of areas, after to before, of planes with unit normals N (c, 3) before: det F·|F⁻ᵀ·N|."""
     rows = np.linalg.solve(F.transpose(0, 2, 1), N[:, :, None])[:, :, 0]
     return np.linalg.det(F) * np.linalg.norm(rows, axis=1)

@@ -28,11 +28,11 @@ class SurfacePart:
     owned: NDArray[np.bool_]
 
     def at(self, values: Floats) -> Floats:
-        """Returns the (p, 3) values at the part's vertices from those of the whole surface, column by column."""
+        """Return the (p, 3) values at the part's vertices from those of the whole surface, column by column."""
         return np.asfortranarray(values[self.vertices])
 
     def of_own(self, pairs: ipctk.NormalCollisions) -> ipctk.NormalCollisions:
-        """Returns those of the part's pairs that belong to this rank: each pair of the surface is one rank's.
+        """Return those of the part's pairs that belong to this rank: each pair of the surface is one rank's.
 
         The vertex that decides is the lowest of two, the one opposite an edge or a face, or the lowest of two edges.
         """
@@ -59,13 +59,13 @@ class SearchRange:
     reach: float
 
     def at(self, distance_mm: float, *places: Floats) -> bool:
-        """Returns whether the search found all pairs that are within a distance at some other positions."""
+        """Return whether the search found all pairs that are within a distance at some other positions."""
         margin = self.reach - distance_mm / 2
         return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
 
 
 def shared_out(positions: Floats, ranks: int) -> NDArray[np.int64]:
-    """Returns the rank (n,) that owns each vertex at (n, 3) positions: of nearly equal numbers, in a box each.
+    """Return the rank (n,) that owns each vertex at (n, 3) positions: of nearly equal numbers, in a box each.
 
     The box is halved, or cut as the numbers of ranks on either side want it, across its longest side, and so on
     (recursive coordinate bisection, Berger and Bokhari 1987).
@@ -88,7 +88,7 @@ def shared_out(positions: Floats, ranks: int) -> NDArray[np.int64]:
 def part_of_surface(
     positions: Floats, faces: NDArray[np.integer], owned: NDArray[np.bool_], reach: float
 ) -> SurfacePart:
-    """Returns what has to be looked at for the pairs that belong to the (n,) `owned` vertices of a surface.
+    """Return what has to be looked at for the pairs that belong to the (n,) `owned` vertices of a surface.
 
     `reach` is the largest distance, along the axes, between two things that make a pair.
     """

@@ -18,7 +18,7 @@ from .domain import Domain
 
 
 def rigid_motions(positions: Floats, part: NDArray[np.int64]) -> Floats:
-    """Returns the (n, 3, 6) translations and rotations of points at (n, 3) positions.
+    """Return the (n, 3, 6) translations and rotations of points at (n, 3) positions.
 
     Rotations are about the centres of the parts that the (n,) numbers name, scaled by the size of the largest one.
     """
@@ -49,12 +49,12 @@ class RigidMotions:
         self.modes: Floats = np.concatenate(modes, axis=2).reshape(3 * domain.owned, -1)
 
     def remove(self, values: Floats) -> None:
-        """Takes the rigid motions out of the owned components of a vector, in place."""
+        """Take the rigid motions out of the owned components of a vector, in place."""
         amounts = self.comm.allreduce(self.modes.T @ values, op=MPI.SUM)
         values -= self.modes @ amounts
 
     def null_space(self, like: PETSc.Vec) -> PETSc.NullSpace:
-        """Returns the motions as PETSc vectors of the layout of `like`."""
+        """Return the motions as PETSc vectors of the layout of `like`."""
         vectors = []
         for mode in self.modes.T:
             vector = like.duplicate()
@@ -102,7 +102,7 @@ class ElasticMatrix:
         )
 
     def assemble(self) -> None:
-        """Assembles the tangent at the present displacement."""
+        """Assemble the tangent at the present displacement."""
         self._blocks.set_value(0.0)
         dolfinx.fem.assemble_matrix(self._blocks, self._form)
         self._blocks.scatter_reverse()
@@ -139,15 +139,15 @@ class KeptTangent:
         self._forces, self._at_u, self._at_forces, self._change, self._product = (like.duplicate() for _ in range(5))
 
     def forget(self) -> None:
-        """Takes note that mesh, stiffness, growth or kept stretch have changed: the next tangent is assembled."""
+        """Take note that mesh, stiffness, growth or kept stretch have changed: the next tangent is assembled."""
         self._valid = False
 
     def note_forces(self, forces: PETSc.Vec) -> None:
-        """Takes note of the elastic forces at the present displacement."""
+        """Take note of the elastic forces at the present displacement."""
         forces.copy(self._forces)
 
     def move_to(self, displacement: PETSc.Vec, within: float) -> None:
-        """Makes the matrix that of a displacement, unless the kept one is good enough.
+        """Make the matrix that of a displacement, unless the kept one is good enough.
 
         It is good enough where it predicts the change of the forces since the last call with an error of at most a part
         `within`. If `within` is above 0, the forces at this displacement must have been noted last.
@@ -161,7 +161,7 @@ class KeptTangent:
         self._forces.copy(self._at_forces)
 
     def predicts(self, displacement: PETSc.Vec, within: float) -> bool:
-        """Returns whether the tangent predicts the change of forces since the last call to within a part."""
+        """Return whether the tangent predicts the change of forces since the last call to within a part."""
         if not self._valid:
             return False
         self._change.waxpy(-1.0, self._at_u, displacement)
@@ -191,16 +191,16 @@ class Tangent:
         self.matrix.setUp()
 
     def remove(self, motions: RigidMotions) -> None:
-        """Has rigid motions taken out of all products from now on; they become the matrix' null space."""
+        """Have rigid motions taken out of all products from now on; they become the matrix' null space."""
         self.motions = motions
         self.matrix.setNullSpace(motions.null_space(self._like))
 
     def raise_diagonal(self, part: float) -> None:
-        """Adds a part of its absolute diagonal to all products from now on; with 0 nothing."""
+        """Add a part of its absolute diagonal to all products from now on; with 0 nothing."""
         self._shift = part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel() if part else None
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Sets y to the product with x."""
+        """Set y to the product with x."""
         self.elastic.matrix.products.mult(x, y)
         for part in self.parts:
             part.multAdd(x, y, y)
@@ -210,7 +210,7 @@ class Tangent:
             self.motions.remove(y.array_w)
 
     def diagonal(self) -> Floats:
-        """Returns the (owned, 3, 3) blocks on the diagonal, as raised."""
+        """Return the (owned, 3, 3) blocks on the diagonal, as raised."""
         blocks = self._diagonal()
         if self._shift is not None:
             np.einsum("nii->ni", blocks)[:] += self._shift.reshape(-1, 3)

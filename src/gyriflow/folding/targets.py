@@ -65,7 +65,7 @@ class GrowthToTargets:
 
     @classmethod
     def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
-        """Returns the model of a run whose maps hold the targets that its parameters name."""
+        """Return the model of a run whose maps hold the targets that its parameters name."""
         targets = {
             week: np.stack([inputs.maps[f"{name}_{axis}"] for axis in AXES], axis=1) for week, name in p.targets.items()
         }
@@ -78,7 +78,7 @@ class GrowthToTargets:
         return cls(p, inputs, targets)
 
     def growth(self, start: StepStart) -> Growth:
-        """Returns the growth of a step: its part of what is left to the next target.
+        """Return the growth of a step: its part of what is left to the next target.
 
         A step across a target leads to the shape between it and the one after it.
         """
@@ -103,7 +103,7 @@ class GrowthToTargets:
 
 
 def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoothing_mm: float) -> Floats:
-    """Returns the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
+    """Return the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
     Positions and displacement are (n, 3) in mm, `pieces` (p, 4) linear tetrahedra.
     """
@@ -118,7 +118,7 @@ def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoo
 
 
 def log_stretch(F: Floats) -> Floats:
-    """Returns the (m, 3, 3) logarithms ln U of the right stretch of (m, 3, 3) gradients, none above `MOST_STRAIN`.
+    """Return the (m, 3, 3) logarithms ln U of the right stretch of (m, 3, 3) gradients, none above `MOST_STRAIN`.
 
     Where all of FᵀF − 1 is below `SMALL`, six terms of the series of ln(1 + x) give it to 3e-8.
     """
@@ -136,7 +136,7 @@ def log_stretch(F: Floats) -> Floats:
 
 
 def inverse_exponential(logs: Floats) -> Floats:
-    """Returns exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for growth of a tenth."""
+    """Return exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for growth of a tenth."""
     result = np.eye(3) - logs / 4
     for order in (3, 2, 1):
         result = np.eye(3) - logs @ result / order

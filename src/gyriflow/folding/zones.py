@@ -45,11 +45,11 @@ class Zones:
     anchors: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None
 
     def vertices_of(self, *zones: int) -> NDArray[np.int64]:
-        """Returns the vertices of the facets of some zones, each once."""
+        """Return the vertices of the facets of some zones, each once."""
         return np.unique(self.facets[np.isin(self.facet_zone, zones)])
 
     def penetration_mm(self, positions: Floats) -> float:
-        """Returns how far the fissure's walls stand beyond their planes at most, for (n, 3) positions in mm."""
+        """Return how far the fissure's walls stand beyond their planes at most, for (n, 3) positions in mm."""
         left = positions[self.vertices_of(terms.LEFT_CONTACT), 0] - self.planes_mm[0]
         right = self.planes_mm[1] - positions[self.vertices_of(terms.RIGHT_CONTACT), 0]
         return float(max(left.max(initial=0.0), right.max(initial=0.0)))
@@ -80,7 +80,7 @@ class Zones:
 
 
 def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floats]:
-    """Returns the least and the greatest coordinates (3,) of a brain, for one hemisphere alone with its mirror image.
+    """Return the least and the greatest coordinates (3,) of a brain, for one hemisphere alone with its mirror image.
 
     The mirror is at the innermost place of the hemisphere `side`.
     """
@@ -94,7 +94,7 @@ def brain_box(vertices: NDArray, side: Side | None = None) -> tuple[Floats, Floa
 
 
 def medial_wall_facets(mesh: TetrahedralMesh, facets: NDArray[np.int64], side: Side) -> NDArray[np.bool_]:
-    """Returns the (f,) mask of the facets of the only hemisphere that face the other side, near its innermost place."""
+    """Return the (f,) mask of the facets of the only hemisphere that face the other side, near its innermost place."""
     x = mesh.vertices[:, 0] if side == "left" else -mesh.vertices[:, 0]
     facing = face_normals(TriangleMesh(mesh.vertices, facets))[:, 0] * (1.0 if side == "left" else -1.0)
     near = (x[facets] > x.max() - WALL_MM).all(axis=1)
@@ -110,7 +110,7 @@ def _wall_anchors(vertices: Floats, wall: NDArray[np.int64]) -> tuple[NDArray[np
 
 
 def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Returns which vertices lie in the ellipsoid of no growth of a brain with (3,) ends `low` and `high`."""
+    """Return which vertices lie in the ellipsoid of no growth of a brain with (3,) ends `low` and `high`."""
     extent = high - low
     centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
     return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
@@ -136,7 +136,7 @@ def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64]) -> NDArray[np.in
 
 
 def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
-    """Returns the zones of a brain in RAS+ mm for the parameters of a run.
+    """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
     The planes stand a quarter of `contact.gap_mm` to the left and to the right of the fissure's middle. With contact of
     any kind, facets near the fissure are not clamped. The ellipsoid of no growth is in fractions of the brain's extents
@@ -157,7 +157,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     still = inside_ellipsoid(mesh.vertices, ellipsoid, low, high)
 
     def faces_where(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Returns the facets on faces of elements at all of whose vertices something holds."""
+        """Return the facets on faces of elements at all of whose vertices something holds."""
         return on_whole_faces(np.asarray(holds.all(axis=1)), mesh.order)
 
     zone = np.full(len(facets), terms.FREE)
@@ -189,7 +189,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
 def bridge_vertices(
     mesh: TetrahedralMesh, facets: NDArray[np.int64], left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
-    """Returns the vertices of the elements whose innermost vertex lies between the planes, each once."""
+    """Return the vertices of the elements whose innermost vertex lies between the planes, each once."""
     x = mesh.vertices[:, 0]
     depth = PialSearch(mesh.vertices, facets).distance(mesh.vertices)[mesh.tets]
     # where several vertices are as deep, all of them must lie between the planes
@@ -199,7 +199,7 @@ def bridge_vertices(
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
-    """Returns the (m,) tags of the elements.
+    """Return the (m,) tags of the elements.
 
     `hemisphere` is LEFT or RIGHT by the element's centroid, BRIDGE between the two contact planes. `growing` is 0
     where the model lets none of an element's vertices grow, else 1. `layer` is CORTEX where the mean cortical `weight`
@@ -215,7 +215,7 @@ def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:
 
 
 def facet_tags(zones: Zones, on_left: NDArray[np.bool_]) -> Tags:
-    """Returns the (f,) tags of `zones.facets`: `zone`, and `hemisphere` LEFT or RIGHT.
+    """Return the (f,) tags of `zones.facets`: `zone`, and `hemisphere` LEFT or RIGHT.
 
     The fissure may be curved, so that no plane tells which facets are `on_left`.
     """

@@ -30,7 +30,7 @@ ELSEWHERE_MM = 5.0
 
 
 def number_regions(*tables: Mapping[int, str]) -> dict[str, int]:
-    """Returns a number from 1 for each name in tables of labels, in the order of the labels.
+    """Return a number from 1 for each name in tables of labels, in the order of the labels.
 
     Labels of one name, such as those of left and right, are one region.
     """
@@ -39,14 +39,14 @@ def number_regions(*tables: Mapping[int, str]) -> dict[str, int]:
 
 
 def renumber(labels: NDArray[np.integer], names: Mapping[int, str], numbers: Mapping[str, int]) -> Ints:
-    """Returns labels as numbers of the regions that they name; 0 for those without a name."""
+    """Return labels as numbers of the regions that they name; 0 for those without a name."""
     values, back = np.unique(labels, return_inverse=True)
     regions = [numbers[names[int(value)]] if int(value) in names else NO_REGION for value in values]
     return np.array(regions, dtype=np.int64)[back].reshape(np.shape(labels))
 
 
 def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.integer], affine: Floats) -> dict[str, Ints]:
-    """Returns for vertices in mm the region of the nearest voxel that has one, 0 where none is within 4 mm.
+    """Return for vertices in mm the region of the nearest voxel that has one, 0 where none is within 4 mm.
 
     `points` are the (n, 3) vertices of the pial surfaces by side, `regions` (i, j, k) numbers, 0 for none, and `affine`
     (4, 4) leads from index to the points' space.
@@ -98,7 +98,7 @@ def _require_along(share: float) -> None:
 
 
 def find_places(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deformation | None:
-    """Returns where a brain's points lie in the one that sulci are drawn on; None, with a warning, where it fails.
+    """Return where a brain's points lie in the one that sulci are drawn on; None, with a warning, where it fails.
 
     A place needs no overlap of the cortex, which is thin in early weeks: that of the cerebrum is judged, and folding.
     """
@@ -114,7 +114,7 @@ def find_places(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deform
 
 
 def regions_by_deformation(points: Floats, between: Deformation, regions: NDArray[np.integer], affine: Floats) -> Ints:
-    """Returns for (n, 3) points in mm the region of the voxel that a deformation carries them to, 0 beyond the volume.
+    """Return for (n, 3) points in mm the region of the voxel that a deformation carries them to, 0 beyond the volume.
 
     `regions` (i, j, k) and `affine` (4, 4) are of the brain that the deformation leads to.
     """
@@ -126,7 +126,7 @@ def regions_by_deformation(points: Floats, between: Deformation, regions: NDArra
 
 
 def regions_from_surface(target: TriangleMesh, surface: TriangleMesh, regions: NDArray[np.integer]) -> Ints:
-    """Returns for the vertices of `target` the regions of the nearest points of another surface of the same hemisphere.
+    """Return for the vertices of `target` the regions of the nearest points of another surface of the same hemisphere.
 
     Normals of both have to agree, so that no vertex takes the region of the other wall of a sulcus. InputError where
     the labels are not those of the surface, or the surface lies elsewhere.

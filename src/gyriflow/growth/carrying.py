@@ -21,7 +21,7 @@ OUTSIDE = 0.001
 
 
 def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
-    """Returns the (w + 1, n, 3) positions of (n, 3) points, the first as given, carried through w deformations in turn.
+    """Return the (w + 1, n, 3) positions of (n, 3) points, the first as given, carried through w deformations in turn.
 
     InputError where points leave the grids that the deformations are known on.
     """
@@ -33,7 +33,7 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
 
 
 def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats:
-    """Returns the (w + 1, n, 3) positions of a mesh's vertices: as given, and carried to the later weeks.
+    """Return the (w + 1, n, 3) positions of a mesh's vertices: as given, and carried to the later weeks.
 
     Along matched surfaces its boundary follows them, and the inside harmonically.
     """
@@ -43,7 +43,7 @@ def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats
 
 
 def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
-    """Returns the (n, 3) positions of a surface's vertices in the last brain, those given where there is no other."""
+    """Return the (n, 3) positions of a surface's vertices in the last brain, those given where there is no other."""
     if not between:
         return mesh.vertices
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
@@ -55,7 +55,7 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
 def carry_regions(
     labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
 ) -> Ints:
-    """Returns the region labels of the (n,) vertices of `source` at those of `target`.
+    """Return the region labels of the (n,) vertices of `source` at those of `target`.
 
     The source is carried into the target's space; each vertex of the target takes the label of the nearest point whose
     normal agrees.
@@ -69,7 +69,7 @@ def carry_regions(
 def maps_on_template(
     maps: Mapping[str, NDArray], surface: TriangleMesh, template: TriangleMesh, between: Sequence[Correspondence]
 ) -> dict[str, NDArray]:
-    """Returns maps at the vertices of a brain's surface at the (n,) places of the vertices of a template.
+    """Return maps at the vertices of a brain's surface at the (n,) places of the vertices of a template.
 
     The template is carried into the brain's space; each of its vertices takes the value at the nearest point whose
     normal agrees, linear in between, and the nearest one of a map of whole numbers. `template_distance_mm` is how far

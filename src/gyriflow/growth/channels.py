@@ -53,7 +53,7 @@ def channels(
     image: tuple[NDArray[np.number], Floats] | None = None,
     voxel_mm: float | None = None,
 ) -> Channels:
-    """Returns the channels of a brain from its label volume, and from its image where there is one.
+    """Return the channels of a brain from its label volume, and from its image where there is one.
 
     `labels` (i, j, k) are on any grid, turned or sheared, `affine` (4, 4) leads from index to RAS+ mm; `cerebrum` and
     `cortex` are the numbers that make them. `image` has intensities and their own affine. `voxel_mm` is the edge of the

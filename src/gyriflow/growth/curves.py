@@ -61,17 +61,17 @@ class Fit:
 
 
 def value(curve: Curve, week: ArrayLike) -> Floats:
-    """Returns the quantity at weeks, in the curve's unit."""
+    """Return the quantity at weeks, in the curve's unit."""
     return np.exp(_log_and_rate(curve, week)[0])
 
 
 def rate(curve: Curve, week: ArrayLike) -> Floats:
-    """Returns the rate of growth d(ln y)/dt at weeks, in 1/week."""
+    """Return the rate of growth d(ln y)/dt at weeks, in 1/week."""
     return _log_and_rate(curve, week)[1]
 
 
 def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
-    """Returns the bounds of the 95 % interval of the curve at weeks; beyond its ends as wide as there."""
+    """Return the bounds of the 95 % interval of the curve at weeks; beyond its ends as wide as there."""
     sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
     middle = value(curve, week)
     return middle * np.exp(-CERTAIN * sd), middle * np.exp(CERTAIN * sd)
@@ -80,7 +80,7 @@ def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
 def tabulated(
     weeks: Sequence[float], values: Sequence[float], *, name: str = "curve", may_shrink: bool = False
 ) -> Curve:
-    """Returns the curve of a given table, such as a norm; InputError where it is no table or shrinks unnamed."""
+    """Return the curve of a given table, such as a norm; InputError where it is no table or shrinks unnamed."""
     weeks_, values_ = _checked(weeks, values, name)
     if len(np.unique(weeks_)) < len(weeks_):
         raise InputError(f"a week of the {name} is there twice", found=weeks_.tolist(), expected="one value a week")
@@ -97,7 +97,7 @@ def fitted(
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
     may_shrink: bool = False,
 ) -> Fit:
-    """Returns a smooth curve through measured weeks that does not follow a single week that leaps.
+    """Return a smooth curve through measured weeks that does not follow a single week that leaps.
 
     The rate of growth of the logarithm is a quadratic spline with a penalty on its second differences (on its first
     ones below three degrees of freedom, P-splines of Eilers and Marx 1996), not negative unless `may_shrink`. The
@@ -136,7 +136,7 @@ def fitted(
 
 
 def errors(fits: Mapping[str, Fit]) -> pd.DataFrame:
-    """Returns how far curves are from the weeks that they were fitted to, a row per quantity and measured value.
+    """Return how far curves are from the weeks that they were fitted to, a row per quantity and measured value.
 
     Columns quantity, week, measured, curve, low, high (95 % interval), error (the curve's, as a fraction of what was
     measured), weight.
@@ -152,7 +152,7 @@ def errors(fits: Mapping[str, Fit]) -> pd.DataFrame:
 
 
 def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
-    """Returns curves as a table: quantity, week, value, low, high (95 % interval), rate_per_week."""
+    """Return curves as a table: quantity, week, value, low, high (95 % interval), rate_per_week."""
     tables = []
     for name, curve in curves.items():
         low, high = interval(curve, curve.weeks)

@@ -55,7 +55,7 @@ class Registration:
 
 
 def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registration:
-    """Returns the registration of an earlier brain with a later one.
+    """Return the registration of an earlier brain with a later one.
 
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
     cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that

@@ -31,7 +31,7 @@ FADING_GW = 1.0
 
 
 def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
-    """Returns the (n, 3) vertices of a surface moved smoothly onto another one that lies near it, in mm.
+    """Return the (n, 3) vertices of a surface moved smoothly onto another one that lies near it, in mm.
 
     Each round pulls the vertices to the nearest points of the other surface whose normals agree, and to those vertices
     of the other surface that find their nearest point beside them, so that the fundus of a sulcus pulls although no
@@ -60,7 +60,7 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
 def carry_sharply(
     mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh] | None
 ) -> Floats:
-    """Returns the (w + 1, n, 3) positions of a mesh's vertices carried through w brains, its boundary on theirs.
+    """Return the (w + 1, n, 3) positions of a mesh's vertices carried through w brains, its boundary on theirs.
 
     Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds. So
     the boundary is fitted onto that brain's surface week by week, and the inside goes along harmonically. Matched
@@ -92,7 +92,7 @@ def carry_sharply(
 
 
 def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
-    """Returns the (n, 3) positions of an atlas at a week from its (k, n, 3) in k weeks, linear between two of them.
+    """Return the (n, 3) positions of an atlas at a week from its (k, n, 3) in k weeks, linear between two of them.
 
     The later one is laid onto the earlier rigidly, points counted by their (n,) sizes.
     """
@@ -111,7 +111,7 @@ def expected_positions(
     also: Sequence[float] = (),
     own_mm: float = OWN_MM,
 ) -> tuple[list[float], Floats]:
-    """Returns the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
+    """Return the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
 
     A brain moves as the atlas does from where the atlas is at its week, and keeps what sets it apart from the atlas, in
     proportion to the size, as far as that is smooth (`own_mm`, with 0 all of it); what is finer fades (`FADING_GW`).
@@ -155,7 +155,7 @@ def predict_shapes(
     weeks: Sequence[float],
     also: Sequence[float] = (),
 ) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
-    """Returns the weeks from the start on, the (w, n, 3) positions in which a mesh is expected, and its boundary's.
+    """Return the weeks from the start on, the (w, n, 3) positions in which a mesh is expected, and its boundary's.
 
     The latter are where simpler ways put the boundary's vertices: `atlas`, the atlas' brain itself, `atlas_deformed`,
     this brain with all that sets the start apart from it, and `displaced`, the start moved as registration alone sees
@@ -175,7 +175,7 @@ def predict_shapes(
 
 
 def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Floats]:
-    """Returns the area_cm2 and volume_ml (w,) that a mesh's boundary has and encloses at w positions (n, 3)."""
+    """Return the area_cm2 and volume_ml (w,) that a mesh's boundary has and encloses at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
     return {

@@ -17,7 +17,7 @@ SPACING_GW = 0.25
 
 
 def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str, dict[str, Fit]]:
-    """Returns the curves through the measured sizes of each series of brains, by series and quantity.
+    """Return the curves through the measured sizes of each series of brains, by series and quantity.
 
     Areas have the columns series, week, area_cm2, volume_ml, and `THICKNESS` where it is known; series of two weeks or
     more. Where brains of less than two weeks have a thickness, no curve of it is fitted.
@@ -38,7 +38,7 @@ def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str
 def followed_sizes(
     growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
 ) -> dict[str, dict[float, float]]:
-    """Returns the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
+    """Return the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
 
     `growth` has for each of `SIZES`, and for the thickness if given, `measured` or a table of values by week, which may
     decrease with `shrink`. Where one is `measured`, `curves` has the columns series, quantity, week and value;
@@ -60,7 +60,7 @@ def followed_sizes(
 
 
 def curves_of_run(growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None) -> list[Curve]:
-    """Returns the curves of `SIZES` that a run followed, those through the measured brains, or none.
+    """Return the curves of `SIZES` that a run followed, those through the measured brains, or none.
 
     `growth` is the section of the run's parameters.
     """

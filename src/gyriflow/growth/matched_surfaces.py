@@ -22,12 +22,12 @@ MOST_SCATTER = 0.3
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns a surface whose triangles are seen counter-clockwise from outside, whatever their order was."""
+    """Return a surface whose triangles are seen counter-clockwise from outside, whatever their order was."""
     return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
 def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSurfaces, dict[str, float]]:
-    """Returns the surfaces of two posed brains as matched, and how far their vertices are from being the same places.
+    """Return the surfaces of two posed brains as matched, and how far their vertices are from being the same places.
 
     Triangles may be listed in any order and seen from either side. The numbers are vertices, turn_deg, scatter (root
     mean square distance of the vertices after a similarity, as a share of the root mean square radius) and area_ratio.
@@ -66,7 +66,7 @@ def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSu
 
 
 def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Returns the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
+    """Return the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
 
     Each vertex keeps its place beside the point of the first matched surface that is nearest with an agreeing
     normal, turned as the whole surface is, and moves as that point does. The surface is of the first week: of the same
@@ -91,7 +91,7 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
 
 
 def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Returns the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that go along matched surfaces.
+    """Return the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that go along matched surfaces.
 
     Its boundary follows them; the displacement inside is harmonic, as smooth as the boundary allows.
     """

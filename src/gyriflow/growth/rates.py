@@ -12,7 +12,7 @@ TISSUES = ("tissue", "ventricles", "cortex")
 
 
 def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]) -> pd.DataFrame:
-    """Returns the growth rates between successive weeks, at least two different ones in any order, with positive sizes.
+    """Return the growth rates between successive weeks, at least two different ones in any order, with positive sizes.
 
     The cortex grows in its surface: α = (θ^(1/2) − 1)/Δt with the growth multiplier θ = A₂/A₁ (the paper's equation,
     dim = 2), the core in volume: ((V₂/V₁)^(1/3) − 1)/Δt (dim = 3), with Δt the true time between the two weeks. These
@@ -44,7 +44,7 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
 
 
 def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
-    """Returns the growth rates of each series of brains: the table of `growth_rates` under its name, in `series`.
+    """Return the growth rates of each series of brains: the table of `growth_rates` under its name, in `series`.
 
     Areas have the columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where
     they have tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and

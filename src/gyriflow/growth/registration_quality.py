@@ -39,7 +39,7 @@ class Quality:
 
 
 def judge(earlier: Channels, later: Channels, deformation: Deformation) -> Quality:
-    """Returns the quality of a deformation between two brains, by their masks as they are.
+    """Return the quality of a deformation between two brains, by their masks as they are.
 
     Folding is judged in the earlier cerebrum, on the deformation's own grid.
     """
@@ -66,7 +66,7 @@ def judge(earlier: Channels, later: Channels, deformation: Deformation) -> Quali
 
 
 def require_good(quality: Quality, *, pair: str) -> None:
-    """Raises InputError, with all numbers, where a registration of a named `pair` of brains must not be used."""
+    """Raise InputError, with all numbers, where a registration of a named `pair` of brains must not be used."""
     values = asdict(quality)
     faults = [
         f"Dice of the {mask} {values[f'dice_{mask}']:.3f} below {least:g}"

@@ -27,10 +27,10 @@ class Material(ABC):
     @staticmethod
     @abstractmethod
     def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Returns ψ in Pa of the elastic deformation Fe; μ and K, in Pa, are the moduli of small strains."""
+        """Return ψ in Pa of the elastic deformation Fe; μ and K, in Pa, are the moduli of small strains."""
 
     def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Returns Cauchy's stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
+        """Return Cauchy's stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
 
         The energy that the model minimises counts per volume before the step's growth (docs/model.md), so that the
         stress in its equilibrium is smaller by the factor det Fg: by less than 2 % in a step of the reference
@@ -47,7 +47,7 @@ class NeoHookean(Material):
 
     @staticmethod
     def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Returns ψ = μ/2 (tr(Feᵀ·Fe) Je^(−2/3) − 3) + K/2 (Je − 1)² in Pa."""
+        """Return ψ = μ/2 (tr(Feᵀ·Fe) Je^(−2/3) − 3) + K/2 (Je − 1)² in Pa."""
         Je = ufl.det(Fe)
         return mu / 2 * (ufl.inner(Fe, Fe) * Je ** (-2 / 3) - 3) + K / 2 * (Je - 1) ** 2
 
@@ -62,7 +62,7 @@ class CompressibleNeoHookean(Material):
 
     @staticmethod
     def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Returns ψ = μ/2 (tr(Feᵀ·Fe) − 3 − 2 ln Je) + λ/2 (Je − 1)² in Pa, with λ = K − 2μ/3."""
+        """Return ψ = μ/2 (tr(Feᵀ·Fe) − 3 − 2 ln Je) + λ/2 (Je − 1)² in Pa, with λ = K − 2μ/3."""
         Je = ufl.det(Fe)
         return mu / 2 * (ufl.inner(Fe, Fe) - 3 - 2 * ufl.ln(Je)) + (K - 2 * mu / 3) / 2 * (Je - 1) ** 2
 

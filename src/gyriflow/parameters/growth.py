@@ -51,7 +51,7 @@ class Growth(Settings):
         return {"model": raw} if isinstance(raw, str) else raw
 
     def own_keys(self) -> dict[str, Any]:
-        """Returns the model and the keys that mean something with it, as they are written in a file."""
+        """Return the model and the keys that mean something with it, as they are written in a file."""
         values = self.model_dump(mode="json")
         return {key: value for key, value in values.items() if self.model in MODELS_OF_KEY.get(key, (self.model,))}
 

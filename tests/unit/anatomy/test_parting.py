@@ -92,7 +92,7 @@ def test_a_bend_of_more_than_5_mm_is_followed():
 
 
 def block(gap_voxels):
-    """Returns two blocks of core in cortex, joined by a bar, with a gap of CSF between their cortex, and the affine."""
+    """Return two blocks of core in cortex, joined by a bar, with a gap of CSF between their cortex, and the affine."""
     brain, core = np.zeros((41, 40, 30), dtype=bool), np.zeros((41, 40, 30), dtype=bool)
     brain[4:37, 4:36, 4:26] = True
     core[6:18, 6:34, 6:24], core[23:35, 6:34, 6:24] = True, True

@@ -41,7 +41,7 @@ def linear(mesh, matrix):
 
 
 def require_upright(pose, moved, pitch=10.0, tilt=2.0):
-    """Requires that the pose takes the motions of both sides back, but for pitch and tilt in degrees."""
+    """Require that the pose takes the motions of both sides back, but for pitch and tilt in degrees."""
     for side, there in zip(SIDES, moved, strict=True):
         vector = Rotation.from_matrix((pose.of_file(side) @ there)[:3, :3]).as_rotvec(degrees=True)
         assert abs(vector[0]) < pitch

@@ -27,7 +27,7 @@ def ball(edge_mm=1.5, **more):
 
 
 def ellipsoid_area(a, b, c):
-    """Returns the area of an ellipsoid by midpoint quadrature over the unit sphere."""
+    """Return the area of an ellipsoid by midpoint quadrature over the unit sphere."""
     z = np.linspace(-1, 1, 4001)[:-1] + 1 / 4000
     turn = np.linspace(0, 2 * np.pi, 1001)[:-1]
     ring = np.sqrt(1 - z**2)[:, None]

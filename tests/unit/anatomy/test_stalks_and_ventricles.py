@@ -19,7 +19,7 @@ AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
 
 
 def body(stalk_mm, ball_mm=4.0):
-    """Returns a ball of 15 mm radius from which a smaller one hangs by a stalk of a radius."""
+    """Return a ball of 15 mm radius from which a smaller one hangs by a stalk of a radius."""
     x, y, z = (0.8 * np.indices((60, 60, 80)).astype(float)) - np.array([24, 24, 40])[:, None, None, None]
     large = np.sqrt(x**2 + y**2 + z**2) < 15.0
     stalk = (np.hypot(x, y) < stalk_mm) & (z < 0) & (z > -24.0)

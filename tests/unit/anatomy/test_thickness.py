@@ -18,7 +18,7 @@ FOLDS_MM = 2.0
 
 
 def depth_below(points, folds_mm):
-    """Returns the distance in mm of (..., 3) points from a folded ball's surface, and where they are inside it."""
+    """Return the distance in mm of (..., 3) points from a folded ball's surface, and where they are inside it."""
 
     def level(x, y, z):
         r = np.sqrt(x**2 + y**2 + z**2) + 1e-9

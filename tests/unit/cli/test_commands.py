@@ -13,7 +13,7 @@ from gyriflow.study import resolve
 
 @pytest.fixture
 def handed_on(monkeypatch, tmp_path):
-    """Returns the arguments that Snakemake gets for those of `gyriflow run`, beside a configuration."""
+    """Return the arguments that Snakemake gets for those of `gyriflow run`, beside a configuration."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "gyriflow.yaml").touch()
 
@@ -48,7 +48,7 @@ def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
 
 @pytest.fixture
 def predicted(monkeypatch, tmp_path):
-    """Returns what `gyriflow predict` says of the shipped brain of 22 GW, and hands the run's arguments on."""
+    """Return what `gyriflow predict` says of the shipped brain of 22 GW, and hand the run's arguments on."""
     monkeypatch.setattr(launch, "main", lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0)
     labels = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"
 

@@ -11,7 +11,7 @@ RADIUS = 20.0
 
 
 def field(directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 40) -> Floats:
-    """Returns the (n,) sum of bumps and dents at places that a seed gives, for unit vectors."""
+    """Return the (n,) sum of bumps and dents at places that a seed gives, for unit vectors."""
     generator = np.random.default_rng(seed)
     places = generator.normal(size=(bumps, 3))
     places /= np.linalg.norm(places, axis=1)[:, None]
@@ -19,7 +19,7 @@ def field(directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 4
 
 
 def bumpy(seed: int, height: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
-    """Returns a sphere with bumps and dents of a height in mm."""
+    """Return a sphere with bumps and dents of a height in mm."""
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     directions = np.asarray(ball.vertices)
     radius = RADIUS + height * field(directions, seed)
@@ -27,7 +27,7 @@ def bumpy(seed: int, height: float = 1.0, subdivisions: int = 4) -> TriangleMesh
 
 
 def shaped(mesh: TriangleMesh, pattern: Floats | None = None) -> Shape:
-    """Returns a shape with its curvature, or with a pattern in its place."""
+    """Return a shape with its curvature, or with a pattern in its place."""
     if pattern is None:
         bend = curvature(mesh, radius_mm=3.0)
         return Shape(mesh, bend.mean, bend.shape_index)

@@ -24,7 +24,7 @@ SCORES = ("shape_index", "mean_curvature", "curvature_distribution")
 
 
 def scored(design):
-    """Returns a design with the score of a bowl around the truth, steeper along the rate."""
+    """Return a design with the score of a bowl around the truth, steeper along the rate."""
     away = in_unit_box(design, BOUNDS) - in_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
     return design.assign(score=0.1 + 0.3 * away[:, 0] ** 2 + 2.0 * away[:, 1] ** 2)
 

@@ -14,7 +14,7 @@ TURN = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
 
 
 def stretched(week: float, factor: float = 1.0) -> np.ndarray:
-    """Returns a sphere that grows along x by a tenth a week, and along y by a part of it."""
+    """Return a sphere that grows along x by a tenth a week, and along y by a part of it."""
     grown = 1 + factor * (week - 21) * np.array([0.10, 0.05, 0.0])
     return POINTS * grown
 
@@ -76,7 +76,7 @@ def test_a_single_week_is_refused():
 
 
 def groove(depth: float) -> tuple[TriangleMesh, np.ndarray]:
-    """Returns a sphere with a groove along the equator's front, and the depth of its vertices below the ball."""
+    """Return a sphere with a groove along the equator's front, and the depth of its vertices below the ball."""
     across, along = POINTS[:, 2], np.abs(np.arctan2(POINTS[:, 1], POINTS[:, 0])) * 20
     depths = depth * np.exp(-((across / 2) ** 2)) * (along < 15)
     return TriangleMesh(POINTS * (1 - depths / 20)[:, None], FACES), depths
@@ -98,7 +98,7 @@ def test_relief_is_bottom_below_crowns_not_depth_below_the_hull():
 
 
 def reliefs_of(depths):
-    """Returns tables of `relief` by week, with what is known of two regions beside the ball."""
+    """Return tables of `relief` by week, with what is known of two regions beside the ball."""
     return {
         week: pd.DataFrame({"region": ["central", "calcarine"], "relief_mm": [d, 0.1]}) for week, d in depths.items()
     }

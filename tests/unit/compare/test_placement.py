@@ -74,7 +74,7 @@ def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
 
 
 def two_sided(mesh: TriangleMesh) -> TriangleMesh:
-    """Returns the surface beside its mirror image."""
+    """Return the surface beside its mirror image."""
     away = mesh.vertices + [1.5 * RADIUS, 0, 0]
     return TriangleMesh(
         np.concatenate([away, away * [-1, 1, 1]]),

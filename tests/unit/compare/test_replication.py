@@ -14,13 +14,13 @@ SUMMARY = {"weeks": [21.0, 23.0], "reached_week": 23.0, "seconds": 3600, "cpu_se
 
 
 def moves(**largest: float) -> pd.DataFrame:
-    """Returns displacements of 21 to 22 GW, half as large on average."""
+    """Return displacements of 21 to 22 GW, half as large on average."""
     rows = [(21.0, 22.0, nodes, value, value / 2) for nodes, value in largest.items()]
     return pd.DataFrame(rows, columns=["from_week", "to_week", "nodes", "max_mm", "mean_mm"])
 
 
 def study(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, ...], whole_b6: float) -> StudyTables:
-    """Returns a study of thickness from shares of B4 and B5 (cut) by run and side, and those of the real brain."""
+    """Return a study of thickness from shares of B4 and B5 (cut) by run and side, and those of the real brain."""
     rows = []
     for (run, side), own in shares.items():
         cut = zip((4, 5, 6), (*own, float("nan")), (*real, float("nan")), strict=True)

@@ -33,7 +33,7 @@ def study(atlas, start, **changes):
 
 
 def own_atlas(folder, **changes):
-    """Writes an atlas of two weeks and returns its description."""
+    """Write an atlas of two weeks and return its description."""
     series = {
         "population": "sheep",
         "scheme": "binary",

@@ -49,7 +49,7 @@ VALUES = st.recursive(
 
 
 def places(value, path=()):
-    """Yields the paths of all values in nested dictionaries and lists."""
+    """Yield the paths of all values in nested dictionaries and lists."""
     yield path
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
@@ -61,7 +61,7 @@ PLACES = [path for path in places(STUDY) if path]
 
 @st.composite
 def changed(draw):
-    """Draws the study with one to three of its values replaced, dropped or added to."""
+    """Draw the study with one to three of its values replaced, dropped or added to."""
     study = copy.deepcopy(STUDY)
     for path in draw(st.lists(st.sampled_from(PLACES), min_size=1, max_size=3)):
         holder = study

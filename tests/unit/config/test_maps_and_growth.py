@@ -52,7 +52,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
 
 
 def both_kinds(tmp_path, weeks):
-    """Returns a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
     touched(tmp_path, "pial.surf.gii")
     made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
     given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]

@@ -20,7 +20,7 @@ def contact():
 
 
 def after(part, stiffness_pa):
-    """Returns the table's row of a step whose smallest gap was a part of the distance."""
+    """Return the table's row of a step whose smallest gap was a part of the distance."""
     return {"min_distance_mm": part * 0.2, "contact_distance_mm": 0.2, "contact_stiffness_pa": stiffness_pa}
 
 

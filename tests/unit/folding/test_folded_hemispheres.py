@@ -21,12 +21,12 @@ SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
 
 
 def beyond_fissure(points):
-    """Returns how far (n, 3) points are to the right of a fissure that swings by 4 mm to both sides."""
+    """Return how far (n, 3) points are to the right of a fissure that swings by 4 mm to both sides."""
     return points[:, 0] - 4.0 * np.sin(points[:, 1] / 8.0)
 
 
 def folded(points):
-    """Returns points where a folded brain could have them: larger, and all to the right of the start's fissure."""
+    """Return points where a folded brain could have them: larger, and all to the right of the start's fissure."""
     return 1.3 * points + [40.0, 0.0, 0.01] * (1 + points[:, 1:2] ** 2 / 100)
 
 
@@ -37,7 +37,7 @@ class Named(dict):
 
 
 def run(script, folder, inputs, outputs, **more):
-    """Runs a script of the workflow on files of a folder, as Snakemake would."""
+    """Run a script of the workflow on files of a folder, as Snakemake would."""
     inputs, outputs = (
         Named(
             {

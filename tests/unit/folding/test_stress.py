@@ -37,7 +37,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @cache
 def problem_of(law: type[Material], order: int) -> Problem:
-    """Returns a problem on a few elements that may remember stress."""
+    """Return a problem on a few elements that may remember stress."""
     mesh = box_mesh((1, 1, 1), (2.0, 3.0, 1.0))
     mesh = quadratic(mesh) if order == 2 else mesh
     facets, _ = boundary_faces(mesh)
@@ -46,7 +46,7 @@ def problem_of(law: type[Material], order: int) -> Problem:
 
 
 def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
-    """Returns the tensor that linear and quadratic elements have at all points after a homogeneous deformation."""
+    """Return the tensor that linear and quadratic elements have at all points after a homogeneous deformation."""
     found = []
     for order in (1, 2):
         problem = problem_of(law, order)
@@ -70,7 +70,7 @@ def turn(angle, *axis):
 
 
 def energy(Fe, law):
-    """Returns a law's energy density from its UFL expression."""
+    """Return a law's energy density from its UFL expression."""
     return float(law.energy_density(ufl.as_matrix(Fe.tolist()), MU, K)(()))
 
 

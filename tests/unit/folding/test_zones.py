@@ -26,7 +26,7 @@ ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
 
 def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
-    """Returns the zones of a run by the settings that decide them."""
+    """Return the zones of a run by the settings that decide them."""
     values = {"contact": {"gap_mm": gap_mm, "kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
     return zones_of_run(mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given))
 
@@ -131,7 +131,7 @@ def test_a_fissure_outside_the_brain_is_refused(brain):
 
 
 def half(side):
-    """Returns the half of an ellipsoid on one side of x = 0, flat there."""
+    """Return the half of an ellipsoid on one side of x = 0, flat there."""
     mesh = ellipsoid_mesh(12, (20.0, 26.0, 18.0))
     sign = -1.0 if side == "left" else 1.0
     # pressed flat: the other half becomes a sheet, so only elements of one side are kept

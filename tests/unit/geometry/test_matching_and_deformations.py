@@ -20,7 +20,7 @@ GRID[:3, 3] = -30.0
 
 
 def bent(amplitude: float) -> Deformation:
-    """Returns a map with u = (a sin(y/8), 0, 0) before a scaling by 1.1 and a shift."""
+    """Return a map with u = (a sin(y/8), 0, 0) before a scaling by 1.1 and a shift."""
     index = np.moveaxis(np.indices((31, 31, 31)), 0, -1).reshape(-1, 3)
     points = transform_points(index, GRID)
     displacement = np.zeros((31, 31, 31, 3))
@@ -67,7 +67,7 @@ def test_determinant_is_the_growth_of_volume():
 
 
 def walls() -> TriangleMesh:
-    """Returns two boxes with a gap of 1 mm between their facing walls x = -0.5 and x = 0.5."""
+    """Return two boxes with a gap of 1 mm between their facing walls x = -0.5 and x = 0.5."""
     return merged(*(box((10, 10, 10), (side * 5.5, 0, 0), 2) for side in (-1, 1)))
 
 

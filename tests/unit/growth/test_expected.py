@@ -23,7 +23,7 @@ WEEKS = [22.0, 23.0, 24.0]
 
 
 def apart_mm(moving, surface):
-    """Returns the mean distance of a surface's vertices from another one, weighted by area."""
+    """Return the mean distance of a surface's vertices from another one, weighted by area."""
     return float(np.average(nearest_on(moving.vertices, surface)[0], weights=vertex_areas(moving)))
 
 
@@ -50,7 +50,7 @@ def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
 
 
 def shift_map(factor, shift=(0.0, 0.0, 0.0)):
-    """Returns a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
+    """Return a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
     matrix = np.diag([factor] * 3 + [1.0])
     matrix[:3, 3] = shift
     affine = np.diag([10.0, 10.0, 10.0, 1.0])
@@ -101,7 +101,7 @@ def test_a_run_of_matched_surfaces_is_followed_from_its_first():
 
 
 def atlas_of(places, weeks=WEEKS):
-    """Returns an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
+    """Return an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
 
     def grown(week):
         t = week - weeks[0]
@@ -215,7 +215,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
 
 
 def sampled(moved, points, spacing_mm=3.0):
-    """Returns a map of space as a registration knows it, on a grid round points."""
+    """Return a map of space as a registration knows it, on a grid round points."""
     low = points.min(axis=0) - 6.0
     shape = np.ceil((np.ptp(points, axis=0) + 12.0) / spacing_mm).astype(int) + 1
     affine = np.diag([spacing_mm, spacing_mm, spacing_mm, 1.0])

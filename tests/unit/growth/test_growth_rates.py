@@ -47,7 +47,7 @@ def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
 
 
 def brains(series: str, areas_cm2: dict[float, float], volumes_ml: dict[float, float]) -> pd.DataFrame:
-    """Returns areas and volumes by week as the workflow's table has them."""
+    """Return areas and volumes by week as the workflow's table has them."""
     columns = {"week": list(areas_cm2), "area_cm2": list(areas_cm2.values()), "volume_ml": list(volumes_ml.values())}
     return pd.DataFrame({"series": series, "subject": "brain", **columns})
 

@@ -23,7 +23,7 @@ TURN = rigid(10, 20, 150)[:3, :3]
 
 
 def own_surface() -> TriangleMesh:
-    """Returns another mesh of the same brain."""
+    """Return another mesh of the same brain."""
     ball = sphere(10.1, 3)
     return TriangleMesh(ball.vertices @ np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1.0]]), ball.faces)
 

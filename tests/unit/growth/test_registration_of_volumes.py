@@ -16,7 +16,7 @@ CORTEX, WHITE, OTHER = 2, 1, 7
 
 
 def grown(points: np.ndarray) -> np.ndarray:
-    """Returns where points of the earlier phantom are in the later one: larger, longer in front, bent, moved."""
+    """Return where points of the earlier phantom are in the later one: larger, longer in front, bent, moved."""
     x, _, z = points.T
     out = points * [1.10, 1.14, 1.08]
     out[:, 0] += 2.0 * np.sin(z / 4)
@@ -32,7 +32,7 @@ def not_grown(points: np.ndarray) -> np.ndarray:
 
 
 def beyond_rim(points: np.ndarray) -> np.ndarray:
-    """Returns how far points are outside an egg with a bump on the right and a dent on the left, in its radii."""
+    """Return how far points are outside an egg with a bump on the right and a dent on the left, in its radii."""
     x, y, z = points.T
     angle = np.arctan2(y, x)
     radius = np.sqrt((x / 16) ** 2 + (y / 22) ** 2 + (z / 14) ** 2)
@@ -40,7 +40,7 @@ def beyond_rim(points: np.ndarray) -> np.ndarray:
 
 
 def phantom(points: np.ndarray) -> np.ndarray:
-    """Returns the labels at points: the egg with a cortex of 3 mm."""
+    """Return the labels at points: the egg with a cortex of 3 mm."""
     labels = np.where(beyond_rim(points) < 0, CORTEX, 0)
     return np.where(beyond_rim(points) < -0.18, WHITE, labels)
 
@@ -78,7 +78,7 @@ RIM_MM = 17.0
 
 
 def rim_errors(carried_points: np.ndarray) -> np.ndarray:
-    """Returns how far points of the earlier brain's rim end from the later brain's rim, in mm.
+    """Return how far points of the earlier brain's rim end from the later brain's rim, in mm.
 
     Along the rim, and inside, the phantom is all alike, and shows no one where it went.
     """

@@ -28,7 +28,7 @@ def server():
 
 
 def fetched(folder, server, name, **known):
-    """Fetches a file of the server and returns the lines that were said."""
+    """Fetches a file of the server and return the lines that were said."""
     said: list[str] = []
     fetch(folder / name, f"{server.url}/{name}", said.append, **known)
     return said
@@ -39,7 +39,7 @@ def sha256(content):
 
 
 def files_in(folder):
-    """Returns the content of each file of a folder by its path."""
+    """Return the content of each file of a folder by its path."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

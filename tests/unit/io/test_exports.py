@@ -134,7 +134,7 @@ TABLES_OF_TWO = {
 
 
 def labels_of(folder):
-    """Returns a volume of labels, and the sphere and its thickness that those of a simulated brain are made of."""
+    """Return a volume of labels, and the sphere and its thickness that those of a simulated brain are made of."""
     files = {"labels": "labels.nii.gz", "surface": "whole.surf.gii", "thickness": "thickness.shape.gii"}
     files = {kind: str(folder / name) for kind, name in files.items()}
     affine = np.diag([1.0, 1, 2, 1])

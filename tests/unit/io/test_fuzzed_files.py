@@ -50,7 +50,7 @@ class Wholes(dict):
 
 @pytest.fixture(scope="module")
 def wholes(tmp_path_factory):
-    """Returns the bytes of a small whole file of each kind."""
+    """Return the bytes of a small whole file of each kind."""
     folder = tmp_path_factory.mktemp("whole")
     image = nib.Nifti1Image(LABELS, np.diag([2.0, 2.0, 2.0, 1.0]))
     image.header.set_xyzt_units("mm")

@@ -58,7 +58,7 @@ U, SCANNER, ALIGNED, TALAIRACH, MNI = NAMES
 
 
 def in_spaces(path, ball, *systems):
-    """Writes a surface whose points have one coordinate system or several, as (data space, space, matrix)."""
+    """Write a surface whose points have one coordinate system or several, as (data space, space, matrix)."""
     gifti(path, ball.vertices, ball.faces)
     blocks = "".join(
         f"<CoordinateSystemTransformMatrix><DataSpace><![CDATA[NIFTI_XFORM_{NAMES[data]}]]></DataSpace>"

@@ -26,7 +26,7 @@ from gyriflow.io.tetmeshes import (
 
 
 def by_vtk(path):
-    """Returns what VTK's reader, which is ParaView's, reads of an XDMF file."""
+    """Return what VTK's reader, which is ParaView's, reads of an XDMF file."""
     reader = vtkXdmfReader()
     reader.SetFileName(str(path))
     reader.Update()
@@ -152,7 +152,7 @@ def domain(written):
 
 
 def midpoints(tags, domain):
-    """Returns where the tagged entities lie."""
+    """Return where the tagged entities lie."""
     return dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)
 
 

@@ -139,7 +139,7 @@ def test_an_open_or_inverted_surface_is_refused():
 
 @pytest.fixture
 def stand_in(tmp_path, monkeypatch):
-    """Puts code in the place of a mesher's function, in the mesher's process."""
+    """Put code in the place of a mesher's function, in the mesher's process."""
 
     def put(mesher, *code):
         path = tmp_path / STAND_INS[mesher]
@@ -192,7 +192,7 @@ def test_a_mesher_that_is_not_installed_is_said_so(stand_in):
 
 
 def mesh_in(folder, mesher, gates=GATES):
-    """Runs the workflow's script on a ball; returns the exit code and the files that it wrote for good."""
+    """Run the workflow's script on a ball; return the exit code and the files that it wrote for good."""
     write_surface(folder / "pial.surf.gii", BALL)
     outputs = {name: str(folder / file) for name, file in OUTPUTS.items()}
     settings = SIZES | {"mesher": mesher, "surface_edge_mm": 2.5}

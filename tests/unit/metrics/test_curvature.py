@@ -28,7 +28,7 @@ from gyriflow.metrics.curvature import (
 
 
 def torus_and_angle() -> tuple[TriangleMesh, np.ndarray]:
-    """Returns a torus of 20 and 8 mm and the (n,) angle across its tube, 0 at the outer rim."""
+    """Return a torus of 20 and 8 mm and the (n,) angle across its tube, 0 at the outer rim."""
     mesh = torus(20.0, 8.0, 120, 60)
     return mesh, np.arctan2(mesh.vertices[:, 2], np.hypot(*mesh.vertices[:, :2].T) - 20.0)
 
@@ -48,7 +48,7 @@ def test_irregular_triangles_of_any_density_give_the_same_curvature_and_noise_is
 
 
 def grid(size: int) -> TriangleMesh:
-    """Returns a flat square of size x size vertices, 1 mm apart."""
+    """Return a flat square of size x size vertices, 1 mm apart."""
     vertices, faces = igl.triangulated_grid(size, size)
     return TriangleMesh(np.column_stack([(size - 1) * vertices, np.zeros(len(vertices))]), faces)
 
@@ -133,7 +133,7 @@ ANGLES = 2 * np.pi * (np.arange(400) + 0.5) / 400
 
 
 def rings_of_a_torus() -> tuple[Curvature, Floats]:
-    """Returns the curvature of a torus at 400 angles round its tube, and the area of each ring."""
+    """Return the curvature of a torus at 400 angles round its tube, and the area of each ring."""
     from_axis = LARGE + SMALL * np.cos(ANGLES)
     around, along = np.full(400, 1 / SMALL), np.cos(ANGLES) / from_axis
     areas = 2 * np.pi * from_axis * SMALL * (2 * np.pi / 400)
@@ -142,7 +142,7 @@ def rings_of_a_torus() -> tuple[Curvature, Floats]:
 
 
 def expected() -> dict[str, float]:
-    """Returns the measures of the torus: c = R/r; the outer half of a torus has ∫K dA = 4π, as a sphere."""
+    """Return the measures of the torus: c = R/r; the outer half of a torus has ∫K dA = 4π, as a sphere."""
     c = LARGE / SMALL
     ring = np.cos(ANGLES) / (c + np.cos(ANGLES))  # r times the smaller principal curvature
     weight = c + np.cos(ANGLES)

@@ -23,7 +23,7 @@ def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
 
 
 def half_sphere(radius: float = 25.0) -> TriangleMesh:
-    """Returns half a sphere, open in the plane x = 0, where the edges of an octahedron lie."""
+    """Return half a sphere, open in the plane x = 0, where the edges of an octahedron lie."""
     shape = trimesh.Trimesh(
         [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1]], [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]
     )
@@ -33,7 +33,7 @@ def half_sphere(radius: float = 25.0) -> TriangleMesh:
 
 
 def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
-    """Returns a sphere of 25 mm with a round dent of that depth and width (mm) at the top."""
+    """Return a sphere of 25 mm with a round dent of that depth and width (mm) at the top."""
     shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=25.0)
     across = np.linalg.norm(shape.vertices[:, :2], axis=1)
     dent = np.where(shape.vertices[:, 2] > 0, depth * np.exp(-((across / (0.5 * width)) ** 2) * 2), 0.0)

@@ -22,7 +22,7 @@ NORMS = published_norms(yaml.safe_load(FILE.read_text()))
 
 
 def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, float]) -> tuple[pd.DataFrame, list[str]]:
-    """Returns metrics of reference brains and of others (run, week, value), and the reference."""
+    """Return metrics of reference brains and of others (run, week, value), and the reference."""
     rows = [
         (f"s{i}", "real", week, "whole", "area", value, "cm2")
         for i, (week, value) in enumerate(zip(weeks, values, strict=True))

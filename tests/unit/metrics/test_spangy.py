@@ -130,7 +130,7 @@ def test_bands_are_held_entirely_with_no_more_modes_than_needed(last: int) -> No
 
 
 def written(subject: str, run: str, powers: list[float], cut_off: int = 7, coarse: int = 7) -> pd.DataFrame:
-    """Returns the table of a hemisphere with the powers of B1 to B6, incomplete or unresolved from these bands on."""
+    """Return the table of a hemisphere with the powers of B1 to B6, incomplete or unresolved from these bands on."""
     bands = np.arange(7)
     table = pd.DataFrame({"subject": subject, "run": run, "week": 22.0, "hemisphere": "left", "band": bands})
     return table.assign(power=[100.0, *powers], complete=bands < cut_off, resolved=bands < coarse)

@@ -12,7 +12,7 @@ MAP = {"thickness_mm": np.array([1.0, 2.0, 4.0])}
 
 
 def value(given):
-    """Returns a parameter as a run has it."""
+    """Return a parameter as a run has it."""
     return parameters_from(RUN | {"thickness_mm": given}).thickness_mm
 
 

@@ -53,7 +53,7 @@ def require_legible(figure: Figure) -> None:
 
 
 def shown_texts(figure: Figure) -> set[Text]:
-    """Returns the texts that are seen: not those of ticks beyond an axis, nor of an axis that is off."""
+    """Return the texts that are seen: not those of ticks beyond an axis, nor of an axis that is off."""
     hidden = set()
     for axes in figure.findobj(Axes):
         for axis in (axes.xaxis, axes.yaxis):

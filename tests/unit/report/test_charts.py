@@ -51,7 +51,7 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
 
 
 def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
-    """Draws the spectra of a study with one member at 28 GW."""
+    """Draw the spectra of a study with one member at 28 GW."""
     values = {"thin": {"thickness_mm": 1.5}}
     return influence_spectra({"thin": pd.concat(members)}, real, values=values, week=28.0)
 
@@ -91,7 +91,7 @@ def test_spectra_bars_are_the_relative_powers_of_each_side():
 
 
 def hatches_and_open_stars(figure: Figure) -> tuple[bool, bool]:
-    """Returns whether the legend of a figure has a hatched patch, and whether it has an open star."""
+    """Return whether the legend of a figure has a hatched patch, and whether it has an open star."""
     handles = figure.legends[0].legend_handles
     hatched = any(handle.get_hatch() for handle in handles if isinstance(handle, Patch))
     stars = [mark for mark in handles if isinstance(mark, Line2D) and mark.get_marker() == "*"]

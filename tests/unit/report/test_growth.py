@@ -16,7 +16,7 @@ RATES = pd.DataFrame(
 
 
 def line_of(axes, label):
-    """Returns the (n, 2) data of the line whose label begins so."""
+    """Return the (n, 2) data of the line whose label begins so."""
     (line,) = [line for line in axes.lines if str(line.get_label()).startswith(label)]
     return np.array(line.get_xydata())
 

@@ -60,7 +60,7 @@ PROVENANCE = {
 
 
 def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains", content: str = "") -> list[dict]:
-    """Returns figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
+    """Return figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
     words = {
         rule: {"section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
         for rule in rules
@@ -147,7 +147,7 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
 
 
 def finished_run(order, *through):
-    """Returns a run to its end with so many elements through the cortex, before and in its steps of half a week."""
+    """Return a run to its end with so many elements through the cortex, before and in its steps of half a week."""
     steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
     run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
     return run | resolution_over_steps(order, steps)

@@ -77,7 +77,7 @@ def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
 
 
 def onsets(**weeks):
-    """Returns onsets by run of the sulci left central, left 2 and one that is there at the start."""
+    """Return onsets by run of the sulci left central, left 2 and one that is there at the start."""
     rows = [
         {"run": run, "subject": "a", "region": name, "there_at_start": name == "left calcarine", "onset_week": week}
         for run, found in weeks.items()

@@ -22,12 +22,12 @@ def shorts(text: str) -> np.ndarray:
 
 
 def positions(data: dict, frame: dict) -> np.ndarray:
-    """Returns positions as the view makes them."""
+    """Return positions as the view makes them."""
     return np.array(data["low"]) + shorts(frame["positions"]).reshape(-1, 3) / 65535 * data["size"]
 
 
 def growing(values: np.ndarray | None = None) -> list:
-    """Returns a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a map."""
+    """Return a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a map."""
     mesh, maps = ball(), {} if values is None else {"curvedness": values}
     return [(21.0, [(mesh, maps)]), (22.0, [(TriangleMesh(1.2 * mesh.vertices, mesh.faces), maps)])]
 

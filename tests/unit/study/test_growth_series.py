@@ -8,7 +8,7 @@ from gyriflow.study import resolve
 
 
 def both_kinds(folder, weeks):
-    """Returns a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
     touched(folder, "pial.surf.gii")
     made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
     given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
