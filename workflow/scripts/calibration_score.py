@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from gyriflow.compare.calibration import shape_scores, size_score
+from gyriflow.compare.calibration import SIZE_SCORES, shape_scores
 from gyriflow.compare.shapes import Shape, ready
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface
@@ -27,9 +27,9 @@ with step(snakemake.log[0]):
     simulated, reals, rows = list(map(read_surface, files.simulated)), list(map(read_surface, files.real)), []
     pairs = zip(np.repeat(np.arange(len(params.compared)), params.compared), reals, strict=True)
     for mesh, real in [(simulated[number], real) for number, real in pairs] if not causes else []:
-        shapes = set(params.weights) - {"size", "surface_distance"}
+        shapes = set(params.weights) - {*SIZE_SCORES, "surface_distance"}
         row = shape_scores(shape(mesh, real), shape(real, real), shapes) if shapes else {}
-        row |= {"size": size_score(mesh, real)} if "size" in params.weights else {}
+        row |= {name: score(mesh, real) for name, score in SIZE_SCORES.items() if name in params.weights}
         distance = {"surface_distance": aligned_distance(mesh, real)["symmetric_mean"]}
         rows.append(row | (distance if "surface_distance" in params.weights else {}))
     found = pd.DataFrame(rows, columns=list(params.weights)).mean()

@@ -15,13 +15,12 @@ with step(snakemake.log[0]):
         at = targets.weeks.tolist()
         growth |= {name: dict(zip(at, sizes.tolist(), strict=True)) for name, sizes in targets.sizes.items()}
         settings["targets"] = {week: target_map(week) for week in at[1:]}
-    if growth["model"] != "rates":
-        curves = read_table(files.curves) if files.curves else None
-        shrink = settings["allow_negative_growth"] or bool(files.targets)
-        sizes = followed_sizes(growth, curves, snakemake.params.series, weeks, shrink)
-        settings["growth"] = growth | sizes
-        if THICKNESS in sizes:
-            settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
+    curves = read_table(files.curves) if files.curves else None
+    shrink = settings["allow_negative_growth"] or bool(files.targets)
+    sizes = followed_sizes(growth, curves, snakemake.params.series, weeks, shrink)
+    settings["growth"] = growth | sizes
+    if THICKNESS in sizes:
+        settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}
     surface = read_json(files.surface)
     start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}
     start["side"] = surface.get("side")

@@ -1,7 +1,7 @@
 """Calibration: designs of its rounds, the scores of their runs, and a surrogate that says where the least may be."""
 
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +83,10 @@ def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
 def size_score(simulated: TriangleMesh, real: TriangleMesh) -> float:
     """Return √(a² + v²) with a, v the relative differences in area and volume of two closed surfaces as they are."""
     return float(np.hypot(area(simulated) / area(real) - 1, signed_volume(simulated) / signed_volume(real) - 1))
+
+
+SIZE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {"size": size_score}
+"""Those scores that compare closed surfaces, simulated and real, as they are."""
 
 
 def shape_scores(run: Shape, real: Shape, names: Collection[Score]) -> dict[Score, float]:

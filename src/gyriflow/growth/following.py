@@ -40,13 +40,13 @@ def followed_sizes(
 ) -> dict[str, dict[float, float]]:
     """Return the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
 
-    `growth` has for each of `SIZES`, and for the thickness if given, `measured` or a table of values by week, which may
-    decrease with `shrink`. Where one is `measured`, `curves` has the columns series, quantity, week and value;
+    `growth` has for those of `SIZES` and the thickness that it follows `measured` or a table of values by week, which
+    may decrease with `shrink`. Where one is `measured`, `curves` has the columns series, quantity, week and value;
     InputError where the start brain's `series` is not among them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
-    for quantity in (*SIZES, *([THICKNESS] if growth.get(THICKNESS) is not None else [])):
+    for quantity in [name for name in (*SIZES, THICKNESS) if growth.get(name) is not None]:
         given = growth[quantity]
         if given == "measured":
             curve = _measured(curves, series, quantity)
@@ -64,7 +64,7 @@ def curves_of_run(growth: Mapping[str, Any], curves: pd.DataFrame | None, series
 
     `growth` is the section of the run's parameters.
     """
-    if growth["model"] != "rates":
+    if SIZES[0] in growth:
         return [tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True) for name in SIZES]
     return [] if curves is None else [_measured(curves, series, name) for name in SIZES]
 

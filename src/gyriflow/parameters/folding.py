@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .growth import Growth
+from .growth import SIZES, Growth
 from .settings import Problem, Settings, line, validated
 from .terms import FieldName, MaterialName, Side
 from .varying import (
@@ -142,7 +142,7 @@ class FoldingSettings(Settings):
 
     def problems(self) -> Iterator[Problem]:
         for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if self.growth.model != "rates" and self.gives(key):
+            if SIZES[0] in self.growth.own_keys() and self.gives(key):
                 yield Problem(f"has no meaning with the growth model {self.growth.model}", (key,))
 
     @field_validator("*")

@@ -29,6 +29,10 @@ def test_measured_sizes_are_followed_every_quarter_of_a_week():
     assert sizes["volume_ml"][23.0] == pytest.approx(np.sqrt(40 * 80), rel=1e-9)
 
 
+def test_a_growth_model_without_sizes_follows_none():
+    assert followed_sizes({"model": "rates"}, None, None, [21.0, 22.0], False) == {}
+
+
 def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, match="no measured curve of area_cm2"):
