@@ -17,8 +17,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import trimesh
+
 from gyriflow.errors import GyriflowError
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_table
+from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.yaml_files import write_yaml
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,8 +37,7 @@ def study(edge_mm: float) -> dict[str, Any]:
     return {
         "atlas": {"name": "spina-bifida", "series": "unoperated", "weeks": [21]},
         "start": START,
-        # so fine and unsmoothed, the folded surface is read again as it was written
-        "surface": {"edge_length_mm": edge_mm / 2, "smoothing_iterations": 0},
+        "surface": {"edge_length_mm": edge_mm / 2},
         "mesh": {
             "order": 1,
             "mesher": "tetgen",
@@ -72,8 +76,12 @@ def main() -> None:
     known = study(arguments.edge) | {"runs": {"truth": TRUTH}}
     surface = f"results/runs/truth/{START}/surfaces/week-22.00/pial.surf.gii"
     call(folder / "truth", known, surface, arguments.cores)
+    # on triangles a quarter as long, smoothing leaves the shape as it is
+    mesh = read_surface(folder / "truth" / surface)
+    fine = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).subdivide().subdivide()
+    write_surface(folder / "simulated.surf.gii", TriangleMesh(fine.vertices, fine.faces.astype(np.int32)))
     search = study(arguments.edge) | {
-        "brains": [{"id": "simulated", "week": 22, "pial": str(folder / "truth" / surface)}],
+        "brains": [{"id": "simulated", "week": 22, "pial": str(folder / "simulated.surf.gii")}],
         "runs": {"reference": {}},
         "calibrate": {
             "base": "reference",

@@ -32,7 +32,6 @@ for name, figures in by_rule(FIGURES).items():
             draw=some.draw,
             inputs=lambda wildcards, of=figure_of: inputs_of(of(wildcards)),
             options=lambda wildcards, of=figure_of: of(wildcards).options,
-            dpi=CONFIG.report.dpi if some.path.endswith(".png") else None,
             code=code_hash(
                 DRAW,
                 Path(SOURCE, "gyriflow", "report", f"{drawn_in}.py"),

@@ -20,8 +20,6 @@ rule growth_curves:
         GROWTH["areas"],
     output:
         **CURVES,
-    params:
-        may_shrink=CONFIG.folding.allow_negative_growth,
     script:
         "../scripts/growth_curves.py"
 

@@ -46,11 +46,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             scheme=from_brain("scheme"),
             # exchanged files are the same inputs to Snakemake
             source=from_brain("white_from"),
-            surface=surface_settings(
-                "edge_length_mm",
-                "smoothing_iterations",
-                "max_hole_mm",
-            ),
+            surface=surface_settings("edge_length_mm", "max_hole_mm"),
             curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         script:
             "../scripts/white.py"

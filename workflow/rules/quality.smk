@@ -12,7 +12,6 @@ rule quality_page:
         labels=lambda w: study.quality_labels(w.brain),
         scheme=from_brain("scheme"),
         logs=from_brain("surface_logs"),
-        dpi=CONFIG.report.dpi,
     script:
         "../scripts/quality_page.py"
 

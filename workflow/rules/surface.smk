@@ -24,7 +24,7 @@ def pial_settings(wildcards):
     given = study.brains[wildcards.brain].given
     if given.source == "shape":
         return {}
-    names = ["edge_length_mm", "smoothing_iterations"]
+    names = ["edge_length_mm"]
     if not given.has_labels:
         names += ["max_hole_mm"]
     return surface_settings(*names)

@@ -112,4 +112,4 @@ with step(snakemake.log[0]):
     elif isinstance(drawn, dict):
         write_json(output[0], drawn)
     else:
-        write_figure(*output, drawn, dpi=params.dpi)
+        write_figure(*output, drawn)

@@ -7,10 +7,10 @@ from gyriflow.growth.following import fits_of_series
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 
-params, output = snakemake.params, snakemake.output
+output = snakemake.output
 with step(snakemake.log[0]):
     areas, curves, away = read_table(snakemake.input[0]), [], []
-    for name, fits in fits_of_series(areas, may_shrink=params.may_shrink).items():
+    for name, fits in fits_of_series(areas).items():
         tables = curve_table({quantity: fit.curve for quantity, fit in fits.items()}), errors(fits)
         for table, joined in zip(tables, (curves, away), strict=True):
             joined.append(table.assign(series=name)[["series", *table.columns]])

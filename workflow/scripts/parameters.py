@@ -16,8 +16,7 @@ with step(snakemake.log[0]):
         growth |= {name: dict(zip(at, sizes.tolist(), strict=True)) for name, sizes in targets.sizes.items()}
         settings["targets"] = {week: target_map(week) for week in at[1:]}
     curves = read_table(files.curves) if files.curves else None
-    shrink = settings["allow_negative_growth"] or bool(files.targets)
-    sizes = followed_sizes(growth, curves, snakemake.params.series, weeks, shrink)
+    sizes = followed_sizes(growth, curves, snakemake.params.series, weeks, shrink=bool(files.targets))
     settings["growth"] = growth | sizes
     if THICKNESS in sizes:
         settings["thickness_mm"] = {"weeks": sizes[THICKNESS]}

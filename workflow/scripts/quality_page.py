@@ -31,5 +31,5 @@ with step(snakemake.log[0]):
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
     brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
-    write_figure(output.png, output.pdf, quality_page(brain, row, warnings), dpi=params.dpi)
+    write_figure(output.png, output.pdf, quality_page(brain, row, warnings))
     write_json(output.row, row)

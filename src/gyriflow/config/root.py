@@ -13,7 +13,7 @@ from .atlas import Atlas, AtlasSettings, UsedAtlas
 from .brains import Brain
 from .participants import ParticipantsSettings
 from .runs import Calibration, GrowthSettings, Run, RunName, Start, Study, StudyName
-from .stages import MeshSettings, MetricsSettings, ReportSettings, SurfaceSettings
+from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 
 
 class Config(Settings):
@@ -45,8 +45,6 @@ class Config(Settings):
     """A search for the parameters that meet a real brain best."""
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
-    report: ReportSettings = ReportSettings()
-    """Figures and report."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
 
     @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])

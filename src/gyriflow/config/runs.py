@@ -43,7 +43,6 @@ PRESETS: dict[str, dict[str, Any]] = {
     "fetalfoldsim": {
         "step_s": 43_200.0,
         "growth": {"model": "rates"},
-        "allow_negative_growth": False,
         "thickness_mm": 1.5,
         "shear_modulus_cortex_pa": 1500.0,
         "shear_modulus_core_pa": 300.0,

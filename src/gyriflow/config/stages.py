@@ -1,4 +1,4 @@
-"""Settings of the stages around the folding: surface, mesh, metrics, report."""
+"""Settings of the stages around the folding: surface, mesh, metrics."""
 
 from typing import Annotated, Literal
 
@@ -14,8 +14,6 @@ class SurfaceSettings(Settings):
 
     edge_length_mm: float = Field(1.0, gt=0.1, le=5)
     """Edge length of the remeshed surface, on which metrics are measured. [mm]"""
-    smoothing_iterations: int = Field(10, ge=0, le=200)
-    """Iterations of Taubin smoothing."""
     max_hole_mm: float = Field(3.0, ge=0, le=MOST_HOLE_MM)
     """Largest hole that is closed; a larger one is an error. [mm]"""
     asymmetric: bool = False
@@ -77,10 +75,3 @@ class MetricsSettings(Settings):
     """White surfaces that are measured: those given, or `all`, also the inner border of cortex in labels."""
     template: str | None = None
     """Id of a measured brain. The target `export` then has all maps at its vertices, too, by registration."""
-
-
-class ReportSettings(Settings):
-    """Figures and report."""
-
-    dpi: int = Field(300, ge=50, le=1200)
-    """Resolution of PNG figures; journals ask for 300 to 600. [dots per inch]"""

@@ -69,8 +69,7 @@ class SteeredGrowth:
         before, aim = self.inputs.size(start.positions_mm), self.aim(week)
         made, other = free_growth(p, start.positions_mm, self.inputs, week)
         wanted = before.rates_to(aim, start.step_s) - other - (start.learnt or (0.0, 0.0))
-        lowest = -FASTEST_PER_S if p.allow_negative_growth else 0.0
-        *rates, limited = steered_rates(wanted, made, (lowest, FASTEST_PER_S))
+        *rates, limited = steered_rates(wanted, made, (0.0, FASTEST_PER_S))
         p = p.model_copy(update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]})
         return SteeredStep(p, start, before, aim, made @ rates + other, bool(limited))
 

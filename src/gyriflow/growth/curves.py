@@ -250,5 +250,5 @@ def _refuse_shrinking(name: str, weeks: Floats) -> None:
         f"the {name} shrinks",
         found=f"at weeks {', '.join(f'{week:g}' for week in weeks)}",
         expected="growth",
-        remedy="Leave out the brains that do not fit, or allow shrinking by name.",
+        remedy="Leave out the brains that do not fit, or correct the table.",
     )

@@ -16,7 +16,7 @@ SPACING_GW = 0.25
 """Of the weeks that a run knows a curve at."""
 
 
-def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str, dict[str, Fit]]:
+def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, Fit]]:
     """Return the curves through the measured sizes of each series of brains, by series and quantity.
 
     Areas have the columns series, week, area_cm2, volume_ml, and `THICKNESS` where it is known; series of two weeks or
@@ -28,10 +28,8 @@ def fits_of_series(areas: pd.DataFrame, *, may_shrink: bool = False) -> dict[str
         for quantity in (*SIZES, *([THICKNESS] if THICKNESS in brains else [])):
             measured = brains.dropna(subset=quantity)
             if quantity in SIZES or len(measured["week"].unique()) > 1:
-                shrinks = may_shrink or quantity == THICKNESS
-                fits[str(name)][quantity] = fitted(
-                    *measured[["week", quantity]].to_numpy().T, name=quantity, may_shrink=shrinks
-                )
+                weeks, values = measured[["week", quantity]].to_numpy().T
+                fits[str(name)][quantity] = fitted(weeks, values, name=quantity, may_shrink=quantity == THICKNESS)
     return fits
 
 

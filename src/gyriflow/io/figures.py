@@ -16,6 +16,9 @@ WIDTHS = (1800, 1400, 1100, 800)
 """Widths in pixels that pictures are tried with, until all of them together fit."""
 QUALITY = 82
 
+DPI = 300
+"""Resolution of pictures as PNG, in dots per inch."""
+
 TABLE_LOOK = (
     "body { font: 13px sans-serif } p { max-width: 60em } table { border-collapse: collapse; margin: 1em 0 } "
     "caption { text-align: left; font-weight: bold; padding: 4px 0 } "
@@ -24,18 +27,18 @@ TABLE_LOOK = (
 """How tables look in a page of their own."""
 
 
-def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure, *, dpi: int) -> None:
-    """Write a figure twice, as pixels of `dpi` dots per inch and as vectors.
+def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
+    """Write a figure twice, as pixels, `DPI` to the inch, and as vectors.
 
     Pictures within the vectors keep all of their pixels.
     """
     with replaced(png) as temporary:
-        figure.savefig(temporary, dpi=dpi)
+        figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):
         picture.set_interpolation("none")
     # without a date, so that the same figure gives the same file
     with replaced(pdf) as temporary:
-        figure.savefig(temporary, dpi=dpi, metadata={"CreationDate": None})
+        figure.savefig(temporary, dpi=DPI, metadata={"CreationDate": None})
 
 
 def write_html(path: AnyPath, body: str) -> None:

@@ -110,16 +110,14 @@ class FoldingSettings(Settings):
     """Constitutive law (docs/model.md), as in the paper."""
     poisson_ratio: float = Field(0.45, ge=0, lt=0.5)
     """Poisson's ratio ν."""
-    growth_rate_per_s: VaryingNumber = varying(2.0e-7, ge=-1e-5, le=1e-5)
+    growth_rate_per_s: VaryingNumber = varying(2.0e-7, ge=0, le=1e-5)
     """Tangential growth rate of the cortex. [1/s]"""
-    radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=-1e-5, le=1e-5)
+    radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
     """Radial growth rate of the core, along the cortical normal. [1/s]"""
-    core_growth_rate_per_s: VaryingNumber = varying(0.0, ge=-1e-5, le=1e-5)
+    core_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
     """Isotropic growth rate of the core. [1/s]"""
     growth: Growth = Growth()
     """What the brain grows by."""
-    allow_negative_growth: bool = False
-    """Whether growth rates may be negative (atrophy)."""
     stress_memory_gw: Memory = 0.0
     """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
     [GW]"""
@@ -216,9 +214,9 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
             yield Problem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
     rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
     for key, (least, _) in rates.items():
-        if least < 0 and not p.allow_negative_growth:
-            yield Problem(f"found {least:g}; it should be 0 or more unless allow_negative_growth is true", (key,))
-    if (growth := p.step_s * sum(max(map(abs, rate)) for rate in rates.values())) >= 1:
+        if least < 0:
+            yield Problem(f"found {least:g}; it should be 0 or more", (key,))
+    if (growth := p.step_s * sum(most for _, most in rates.values())) >= 1:
         yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
 
 

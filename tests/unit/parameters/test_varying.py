@@ -39,8 +39,11 @@ def test_what_is_no_number_curve_or_map_is_refused(given):
 
 
 def test_values_are_checked_over_all_weeks_and_places():
-    with pytest.raises(InputError, match=r"growth_rate_per_s: found -.*allow_negative_growth"):
+    with pytest.raises(InputError, match=r"growth_rate_per_s: should be .* 0"):
         parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21: 1e-7, 30: -1e-7}}})
+    rates = parameters_from(RUN | {"growth_rate_per_s": {"map": "rate"}})
+    with pytest.raises(InputError, match=r"growth_rate_per_s: found -1e-08; it should be 0 or more"):
+        require_maps(rates, {"rate": np.array([1e-7, -1e-8])}, 2)
     mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
     require_maps(mapped, MAP, 3)
     with pytest.raises(InputError, match=r"thickness_mm: reaches 0 mm"):

@@ -101,7 +101,7 @@ def drawn(monkeypatch, tmp_path, rule, draw, inputs, **options):
         return Drawing()
 
     monkeypatch.setattr(import_module(f"gyriflow.report.{module}"), function, noted)
-    params = SimpleNamespace(draw=draw, inputs=inputs, options=options, dpi=50)
+    params = SimpleNamespace(draw=draw, inputs=inputs, options=options)
     output = [str(tmp_path / "a.png"), str(tmp_path / "a.pdf")]
     job = SimpleNamespace(params=params, output=output, log=[str(tmp_path / "log")], rule=rule)
     runpy.run_path(str(DRAW), init_globals={"snakemake": job})
