@@ -30,7 +30,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gyriflow.anatomy.pial import from_labels
+from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.labels import read_cerebrum
+from gyriflow.anatomy.pose import pose_of_hemisphere
+from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.compare.placement import correlation
 from gyriflow.geometry.alignment import motion, rigid_fit, without_rigid_motion
 from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
@@ -108,16 +111,10 @@ def start_surface() -> TriangleMesh:
     of_cerebrum = x[np.isin(volume.labels, scheme.cerebrum)]
     # half a voxel aside, since the middle lies on voxels
     left = np.where(x < (of_cerebrum.min() + of_cerebrum.max()) / 2 - volume.affine[0, 0] / 2, volume.labels, 0)
-    smooth = from_labels(
-        left,
-        volume.affine,
-        scheme,
-        "left",
-        week=START_WEEK,
-        smoothing_voxels=SMOOTHING_VOXELS,
-        edge_length_mm=FINE_EDGE_MM,
-        smoothing_iterations=20,
-    ).whole
+    cerebrum = read_cerebrum(left, volume.affine, scheme, 0.0)
+    field = smooth_mask(cerebrum.mask, SMOOTHING_VOXELS)
+    mesh = surface_of_mask(field, cerebrum.affine, cerebrum.volume_mm3, FINE_EDGE_MM).mesh
+    smooth = transformed(mesh, pose_of_hemisphere(mesh, "left", "auto", of_volume=True).of_file())
     height = bumps(smooth.vertices)
     return TriangleMesh(smooth.vertices + height[:, None] * vertex_normals(smooth), smooth.faces)
 

@@ -14,6 +14,8 @@ from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transforme
 
 Mask = NDArray[np.bool_]
 PAD_VOXELS = 6
+# σ of the Gaussian by which masks are smoothed before they become surfaces
+SMOOTHING_VOXELS = 1.0
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
@@ -66,14 +68,12 @@ def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
         yield box, number[box] == index
 
 
-def smooth_mask(mask: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
+def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArray[np.float32]:
     """Return the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def remove_bridges(
-    mask: Mask, field: NDArray[np.float32], smoothing_voxels: float, left_shut: Mask
-) -> tuple[NDArray[np.float32], int]:
+def remove_bridges(mask: Mask, field: NDArray[np.float32], left_shut: Mask) -> tuple[NDArray[np.float32], int]:
     """Return a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
 
     A slit is a group of voxels outside the mask, open to the outside: a sulcus, the fissure or the Sylvian opening,
@@ -91,7 +91,7 @@ def remove_bridges(
             inside[box] = opened
             slits[box] |= slit
     # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
-    beside = 1.0 - (ndtr(1.5 / smoothing_voxels) - ndtr(0.5 / smoothing_voxels)) if smoothing_voxels > 0 else 1.0
+    beside = 1.0 - (ndtr(1.5 / SMOOTHING_VOXELS) - ndtr(0.5 / SMOOTHING_VOXELS))
     return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
 
 

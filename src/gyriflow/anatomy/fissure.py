@@ -55,6 +55,8 @@ FURTHEST_MM = 5.0
 FOLLOWED = 4
 # a fissure is shown where it is so wide a gap in its own plane: twice this many half millimetres
 SHOWN_CELLS = 8
+# the width to which a fissure that cortex hides is opened
+FISSURE_MM = 1.5
 # cortex that stays on the tissue which joins the hemispheres
 FLOOR_MM = 1.2
 # hemispheres that overlap by more are not moved apart
@@ -258,10 +260,10 @@ class Fissure:
         flat = np.stack([a + self.corner[0], b + self.corner[1]], axis=-1)
         return np.asarray(flat @ self.axes + (self.plane.offset + self.heights)[..., None] * self.plane.normal)
 
-    def hidden(self, mask: Mask, affine: Floats, gap_mm: float) -> Mask:
+    def hidden(self, mask: Mask, affine: Floats) -> Mask:
         """Return where a brain's (i, j, k) mask shows no fissure within half a gap of the mid-surface, (a, b) bool."""
         voxel = float(np.linalg.norm(affine[:3, :3], axis=0).min())
-        reach = max(0.5 * gap_mm, voxel)
+        reach = max(0.5 * FISSURE_MM, voxel)
         shown = np.zeros(self.heights.shape, dtype=bool)
         for height in np.arange(-reach, reach + 0.25 * voxel, 0.5 * voxel):
             index = voxel_index(self.places + height * self.plane.normal, affine)
@@ -303,9 +305,9 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
 
 
 def open_fissure(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask
+    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, hidden: Mask
 ) -> NDArray[np.float32]:
-    """Return the smoothed (i, j, k) mask with the fissure at least `gap_mm` wide down to what joins the hemispheres.
+    """Return the smoothed (i, j, k) mask with the fissure `FISSURE_MM` wide or more down to what joins the hemispheres.
 
     Small fetal brains have no CSF label between their medial walls: there the cortex labels of both sides touch and
     hide the fissure. It lies half-way between the tissue inside the cortex (`core`) of the two sides, and ends where
@@ -329,9 +331,9 @@ def open_fissure(
     # voxels near the mid-surface: outside the opening by this distance
     points = transform_points(np.indices(field.shape).reshape(3, -1).T, affine)
     height = np.abs(fissure.height_above(points))
-    near = height < gap_mm / 2 + 2.0 * voxel
+    near = height < FISSURE_MM / 2 + 2.0 * voxel
     below = -ndimage.map_coordinates(depth, fissure.cells(points[near]), order=1, mode="nearest")
-    outside = np.maximum(height[near] - gap_mm / 2, below)
+    outside = np.maximum(height[near] - FISSURE_MM / 2, below)
     result = field.ravel().copy()
     result[near] = np.minimum(result[near], np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0))
     return result.reshape(field.shape)

@@ -35,6 +35,7 @@ from .extraction import (
     unambiguous,
 )
 from .fissure import (
+    FISSURE_MM,
     Fissure,
     MidPlane,
     between,
@@ -123,18 +124,15 @@ def from_labels(
     side: Side | None = None,
     *,
     week: float,
-    smoothing_voxels: float = 1.0,
     edge_length_mm: float = 1.0,
-    smoothing_iterations: int = 10,
-    fissure_mm: float = 1.5,
 ) -> PialSurface:
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
     A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say, or without these its shape. The
-    cerebrum's mask is smoothed (Gaussian, σ = `smoothing_voxels`), freed of handles and turned into an isosurface,
+    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel), freed of handles and turned into an isosurface,
     which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set
     outwards by what smoothing took of the volume. Where the scheme separates cortex from the tissue inside and cortex
-    labels of both sides touch, the fissure is opened there to `fissure_mm` (0: left shut). It is half-way between the
+    labels of both sides touch, the fissure is opened there to 1.5 mm. It is half-way between the
     labels of the two sides where the scheme has them. With `side` the volume holds that hemisphere only, which is posed
     as `from_surface` does.
 
@@ -152,7 +150,7 @@ def from_labels(
     if (share := report["border_share"]) > REPORTED_LOSS:
         cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
         warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
-    field = smooth_mask(mask, smoothing_voxels)
+    field = smooth_mask(mask)
     if not side:
         warnings += logged(_require_both(cerebrum, scheme, field))
     if pose is None:
@@ -160,7 +158,7 @@ def from_labels(
     warnings += logged(pose.warnings)
     affine = pose.world @ cerebrum.affine
     if side:
-        even = surface_of_mask(field, affine, cerebrum.volume_mm3, smoothing_iterations, edge_length_mm)
+        even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm)
         require_one(even.mesh)
         pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
         report = {"source": "hemisphere", "side": side, **report, **even.report}
@@ -169,24 +167,22 @@ def from_labels(
     grid, opened_ml = affine, 0.0
     core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
-    walls = isosurface(smooth_mask(core, smoothing_voxels) if scheme.cortex else field, affine)
+    walls = isosurface(smooth_mask(core) if scheme.cortex else field, affine)
     fissure, to_right, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
     warnings += logged(doubts)
-    opens = bool(scheme.cortex) and fissure_mm > 0
     # what smoothing would shut, and reopened slits leave shut, is not shown
-    slit, _ = remove_bridges(mask, field, smoothing_voxels, np.zeros_like(mask))
-    hidden = fissure.hidden(slit > LEVEL, affine, fissure_mm)
+    slit, _ = remove_bridges(mask, field, np.zeros_like(mask))
+    hidden = fissure.hidden(slit > LEVEL, affine)
     # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
-    left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if opens else np.zeros_like(mask)
-    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, smoothing_voxels, left_shut)
-    if opens:
-        field, affine, opened_ml = _with_fissure(field, affine, core, fissure, fissure_mm, hidden)
+    left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if scheme.cortex else np.zeros_like(mask)
+    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, left_shut)
+    if scheme.cortex:
+        field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
     even = surface_of_mask(
         field,
         affine,
         cerebrum.volume_mm3,
-        smoothing_iterations,
         edge_length_mm,
         smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
@@ -232,7 +228,6 @@ def from_hemispheres(
     coordinates: Coordinates = "ras",
     declared: bool = False,
     edge_length_mm: float = 1.0,
-    smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
     max_hemisphere_ratio: float = 1.15,
     max_asymmetry: float = 0.02,
@@ -262,7 +257,7 @@ def from_hemispheres(
     warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
         warnings += logged(doubts_of_hemispheres(left, right, coordinates))
-    even = [make_sound(mesh, smoothing_iterations, edge_length_mm) for mesh in (left, right)]
+    even = [make_sound(mesh, edge_length_mm) for mesh in (left, right)]
     warnings += logged(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
     plane = mid_plane(merged(left, right), named=named)
@@ -290,7 +285,6 @@ def from_surface(
     week: float,
     coordinates: Coordinates = "ras",
     edge_length_mm: float = 1.0,
-    smoothing_iterations: int = 10,
     max_hole_mm: float = 3.0,
 ) -> PialSurface:
     """Return the pial surface of a brain, or of the only hemisphere that there is, from one closed surface.
@@ -306,7 +300,7 @@ def from_surface(
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
         require_one(clean.mesh)
-    even = make_sound(clean.mesh, smoothing_iterations, edge_length_mm)
+    even = make_sound(clean.mesh, edge_length_mm)
     warnings += logged(even.warnings)
     if side:
         pose = pose_of_hemisphere(even.mesh, side, coordinates)
@@ -433,25 +427,25 @@ def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.flo
         )
     # a part that is left out below, for its size, makes no second hemisphere
     parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
-    surface = isosurface(smooth_mask(parts, 1.0), cerebrum.affine)
+    surface = isosurface(smooth_mask(parts), cerebrum.affine)
     # a brain that the field of view cuts off may be as flat, which has been reported already
     return require_whole(surface, "volume", refuses=cerebrum.report["border_share"] <= REPORTED_LOSS)
 
 
 def _with_fissure(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, gap_mm: float, hidden: Mask
+    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, hidden: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
     """Return the field with the fissure opened, its affine, and the volume (mL) that this took.
 
     Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
     walls are then made finer first.
     """
-    wide = open_fissure(field, affine, core, fissure, gap_mm, hidden)
+    wide = open_fissure(field, affine, core, fissure, hidden)
     # an opening of less than two voxels would be lost between them
-    factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / gap_mm))
+    factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / FISSURE_MM))
     if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
         solid, _ = refine(core.astype(np.float32), affine, factor)
         field, affine = refine(field, affine, factor)
-        wide = open_fissure(field, affine, solid > 0.5, fissure, gap_mm, hidden)
+        wide = open_fissure(field, affine, solid > 0.5, fissure, hidden)
     voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
     return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)

@@ -56,6 +56,8 @@ MARGIN_VOXELS = 6
 KEPT = 0.01
 # beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
 MOST_GIVEN_BACK = 0.05
+# of Taubin smoothing
+SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
 # how many times walls that would cut each other are held back, with their neighbours
 HELD_BACK = 4
@@ -90,18 +92,18 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -
     return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
 
 
-def make_sound(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> Sound:
+def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> Sound:
     """Return the surface smoothed and remeshed, each piece a sphere that does not cut itself.
 
     Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length. The report has
     what `rebuild` says as "remade". MeshError where that stays tangled.
     """
-    smooth, cutting = make_even(mesh, smoothing_iterations, edge_length_mm)
+    smooth, cutting = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
     if not (remaining := faults(smooth)):
         return Sound(smooth, report, [])
     mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
-    smooth, _ = make_even(mesh, smoothing_iterations, edge_length_mm)
+    smooth, _ = make_even(mesh, edge_length_mm)
     require_sound(smooth)
     return Sound(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
 
@@ -128,16 +130,14 @@ def faults(mesh: TriangleMesh) -> str:
     return ", ".join(fault for fault in problems if fault)
 
 
-def make_even(mesh: TriangleMesh, smoothing_iterations: int, edge_length_mm: float) -> tuple[TriangleMesh, int]:
+def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
     """Return the surface smoothed, remeshed and untangled, and the number of faces that cut others before that.
 
     Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53).
     """
-    if smoothing_iterations > 0:
-        document = in_meshlab(mesh)
-        document.apply_coord_taubin_smoothing(stepsmoothnum=smoothing_iterations)
-        mesh = from_meshlab(document)
-    even = remesh(mesh, edge_length_mm)
+    document = in_meshlab(mesh)
+    document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
+    even = remesh(from_meshlab(document), edge_length_mm)
     cutting = int(self_intersecting_faces(even).sum())
     return untangle(even) if cutting else even, cutting
 
@@ -273,7 +273,6 @@ def surface_of_mask(
     field: NDArray[np.float32],
     affine: Floats,
     volume_mm3: float,
-    smoothing_iterations: int,
     edge_length_mm: float,
     *,
     smallest: float = COMPARABLE_PARTS,
@@ -286,13 +285,13 @@ def surface_of_mask(
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)
-    even = make_sound(rough, smoothing_iterations, edge_length_mm)
+    even = make_sound(rough, edge_length_mm)
     voxels = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(even.mesh, repaired_mm3 - taken_mm3, area(rough))
     warnings = list(even.warnings)
     if abs(change := smoothing["volume_change"]) > KEPT:
-        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels or less smoothing keep it")
+        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels keep it")
     return Sound(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
 
 

@@ -54,9 +54,7 @@ class Thickness:
         return np.where(self.measured, self.values_mm, np.nan)
 
 
-def cortical_thickness(
-    pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, smoothing_voxels: float
-) -> Thickness:
+def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats) -> Thickness:
     """Return the cortical thickness at the vertices of a pial surface; InputError where it has no cortex under it.
 
     The inner border is the isosurface of the smoothed mask of the cerebrum without its cortex, which lies between
@@ -66,9 +64,9 @@ def cortical_thickness(
     brainstem), and where a fissure that the labels hide was opened.
 
     `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
-    its cortex; it was made with a Gaussian of σ = `smoothing_voxels`.
+    its cortex; it was made with the same smoothing.
     """
-    core = smooth_mask(cerebrum & ~cortex, smoothing_voxels)
+    core = smooth_mask(cerebrum & ~cortex)
     kept, _, _ = main_parts(core > LEVEL)
     core = np.where(kept, np.maximum(core, LEVEL + 1e-3), np.minimum(core, LEVEL - 1e-3)).astype(np.float32)
     inner = isosurface(core, affine)
@@ -95,13 +93,7 @@ def cortical_thickness(
 
 
 def thickness_from_labels(
-    labels: Labels,
-    affine: Floats,
-    scheme: LabelScheme,
-    surface: TriangleMesh,
-    pose: Pose,
-    *,
-    smoothing_voxels: float = 1.0,
+    labels: Labels, affine: Floats, scheme: LabelScheme, surface: TriangleMesh, pose: Pose
 ) -> Thickness:
     """Return the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
 
@@ -109,7 +101,7 @@ def thickness_from_labels(
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     cortex = np.isin(cerebrum.tissue, scheme.cortex)
-    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine, smoothing_voxels)
+    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine)
     mean = thickness.report["mean_mm"]
     log.info("cortical thickness: %.2f mm on average", mean)
     if not USUAL_MM[0] <= mean <= USUAL_MM[1]:

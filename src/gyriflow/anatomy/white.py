@@ -22,9 +22,7 @@ def white_from_labels(
     pial: Mapping[Side, TriangleMesh],
     pose: Pose,
     *,
-    smoothing_voxels: float = 1.0,
     edge_length_mm: float = 1.0,
-    smoothing_iterations: int = 10,
 ) -> dict[Side, TriangleMesh]:
     """Return by side the surface around what lies within the cortex of an (i, j, k) label volume.
 
@@ -34,10 +32,8 @@ def white_from_labels(
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     volume = float(core.sum() * abs(np.linalg.det(cerebrum.affine[:3, :3])))
-    field = smooth_mask(core, smoothing_voxels)
-    even = surface_of_mask(
-        field, cerebrum.affine, volume, smoothing_iterations, edge_length_mm, smallest=cerebrum.smallest_part
-    )
+    field, smallest = smooth_mask(core), cerebrum.smallest_part
+    even = surface_of_mask(field, cerebrum.affine, volume, edge_length_mm, smallest=smallest)
     return _sides(even.mesh, pial)
 
 
@@ -48,14 +44,13 @@ def white_from_surfaces(
     *,
     max_hole_mm: float = 3.0,
     edge_length_mm: float = 1.0,
-    smoothing_iterations: int = 10,
 ) -> dict[Side, TriangleMesh]:
     """Return by side the given white surfaces of "left" and "right" or of the "whole", posed and made even.
 
     MeshError where one can't be made a closed surface without handles and intersections.
     """
     even = {
-        name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, smoothing_iterations, edge_length_mm).mesh
+        name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh
         for name, mesh in posed_whites(pose, whites).items()
     }
     return _sides(even["whole"], pial) if "whole" in even else {side: even[side] for side in pial}

@@ -80,7 +80,7 @@ def test_slit_one_voxel_wide_stays_open_at_its_width():
     # from above, 16 voxels deep: a narrow fissure
     split[21, :, 18:] = False
     whole = smooth_mask(solid, 1.0)
-    field, reopened = remove_bridges(split, smooth_mask(split, 1.0), 1.0, np.zeros_like(split))
+    field, reopened = remove_bridges(split, smooth_mask(split), np.zeros_like(split))
     affine = np.diag([0.5, 0.5, 0.5, 1.0])
     block, opened = isosurface(whole, affine), isosurface(field, affine)
     removed = signed_volume(block) - signed_volume(opened)
@@ -99,6 +99,6 @@ def test_what_is_no_slit_stays_as_smoothing_leaves_it(case):
     else:
         mask[20, 14:26, :] = False
     field = smooth_mask(mask, 1.0)
-    same, reopened = remove_bridges(mask, field, 1.0, np.zeros_like(mask))
+    same, reopened = remove_bridges(mask, field, np.zeros_like(mask))
     assert reopened == 0
     np.testing.assert_array_equal(same, field)

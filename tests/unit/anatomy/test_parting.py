@@ -110,8 +110,8 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     walls = isosurface(smooth_mask(core, 1.0), affine)
     fissure = fissure_between(walls, mid_plane(walls))
     field = smooth_mask(brain, 0.5)
-    hidden = fissure.hidden(brain, affine, 1.5)
-    wide = open_fissure(field, affine, core, fissure, 1.5, hidden)
+    hidden = fissure.hidden(brain, affine)
+    wide = open_fissure(field, affine, core, fissure, hidden)
     # cortex beside a fissure that CSF shows stays; a hidden one is opened
     taken = (field > 0.5) & (wide <= 0.5)
     assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)

@@ -115,7 +115,7 @@ def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
 
 
 def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
-    even, cutting = make_even(ball(), 10, 1.0)
+    even, cutting = make_even(ball(), 1.0)
     assert is_closed(even)
     lengths = np.linalg.norm(np.diff(even.vertices[even.faces[:, :2]], axis=1), axis=-1)
     assert lengths.mean() == pytest.approx(1.0, rel=0.1)

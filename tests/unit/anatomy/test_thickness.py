@@ -39,7 +39,7 @@ def layered(folds_mm, voxel_mm):
     depth, inside = depth_below(points, folds_mm)
     affine = np.diag([voxel_mm] * 3 + [1.0])
     affine[:3, 3] = axis[0]
-    pial, _ = make_even(isosurface(make_simple(smooth_mask(inside, 1.0))[0], affine), 10, 1.0)
+    pial, _ = make_even(isosurface(make_simple(smooth_mask(inside, 1.0))[0], affine), 1.0)
     return pial, depth, inside, affine
 
 
@@ -55,7 +55,7 @@ def folded():
 
 def errors(brain, thickness_mm):
     pial, depth, inside, affine = brain
-    found = cortical_thickness(pial, inside, inside & (depth < thickness_mm), affine, 1.0)
+    found = cortical_thickness(pial, inside, inside & (depth < thickness_mm), affine)
     assert found.measured.mean() > 0.99
     return found, found.values_mm[found.measured] - thickness_mm
 
@@ -82,8 +82,8 @@ def test_a_turned_volume_gives_the_same(ball):
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_euler("xyz", [20, -30, 10], degrees=True).as_matrix()
     turn[:3, 3] = 5, -7, 2
-    straight = cortical_thickness(pial, inside, cortex, affine, 1.0)
-    turned = cortical_thickness(transformed(pial, turn), inside, cortex, turn @ affine, 1.0)
+    straight = cortical_thickness(pial, inside, cortex, affine)
+    turned = cortical_thickness(transformed(pial, turn), inside, cortex, turn @ affine)
     np.testing.assert_allclose(turned.values_mm, straight.values_mm, atol=1e-4)
 
 
@@ -91,7 +91,7 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
     pial, depth, inside, affine = ball
     x = affine[0, 3] + 0.8 * np.arange(inside.shape[0])
     cortex = inside & (depth < 2.4) & (x < 10)[:, None, None]
-    found = cortical_thickness(pial, inside, cortex, affine, 1.0)
+    found = cortical_thickness(pial, inside, cortex, affine)
     # a cap of a quarter of the sphere's area is bare
     assert found.report["measured_area_share"] == pytest.approx(0.75, abs=0.03)
     bare = pial.vertices[:, 0] > 12
@@ -115,4 +115,4 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     larger = np.ones_like(inside)
     larger[:3] = False
     with pytest.raises(InputError, match="nowhere at the surface"):
-        cortical_thickness(pial, larger, larger & (depth < 3.0), affine, 1.0)
+        cortical_thickness(pial, larger, larger & (depth < 3.0), affine)
