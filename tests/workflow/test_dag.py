@@ -23,6 +23,15 @@ def test_a_stage_plans_no_later_stage(workflow):
     assert not {"tetrahedralise", "simulate", "html_report"} & set(jobs)
 
 
+def test_a_registration_waits_for_the_images_that_it_reads(workflow):
+    week = "spina-bifida-unoperated-{}".format
+    atlas = {"name": "spina-bifida", "series": "unoperated", "images": True}
+    study = {"atlas": atlas, "start": week(21), "folding": {"end_week": 22}}
+    registered = f"results/study/registration/{week(21)}/{week(22)}.h5"
+    jobs = workflow.jobs(registered, "--configfile", workflow.write("study.yaml", study))
+    assert jobs == {"atlas_file": 2, "register": 1}
+
+
 EXPECTED = {
     # a brain a week, of which eight are of an output week after the start
     "spina-bifida-atlas": ("all", {"pial_from_labels": 5, "simulate": 2, "measure": 15, "register": 4}),

@@ -22,6 +22,7 @@ rule register:
     input:
         earlier=lambda w: study.brains[w.earlier].registered_volume,
         later=lambda w: study.brains[w.later].registered_volume,
+        images=lambda w: [image for name in (w.earlier, w.later) if (image := study.brains[name].given.image)],
     output:
         REGISTERED,
     params:
