@@ -27,6 +27,33 @@ rule study_resources:
         "../scripts/study_resources.py"
 
 
+# the report's own too: they are there where its page cannot be made
+rule provenance:
+    input:
+        rules.figures.input,
+        rules.metrics.input,
+        rules.quality_table.output,
+        run_params=study.files(PARAMETERS),
+        summaries=study.files(FOLDING["summary"]),
+        template=f"{PAGE}/methods.rst",
+    output:
+        study=f"{STUDY}/provenance.json",
+        brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
+        runs=study.files(f"{RUN}/provenance.json"),
+        report="results/report/provenance.json",
+        methods="results/report/methods.rst",
+        # the configuration with its paths, for those who have the files
+        config="results/report/config.yaml",
+    params:
+        config=study.used_settings,
+        brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
+        files=study.input_files,
+        folded=study.pairs,
+        method=study.method,
+    script:
+        "../scripts/provenance.py"
+
+
 rule html_report:
     input:
         rules.figures.input,
@@ -37,11 +64,10 @@ rule html_report:
         quality=rules.quality_table.output[0],
         warnings=rules.study_resources.output.warnings,
         validation=f"{STUDY}/validation.csv" if study.validated else [],
-        run_params=study.files(PARAMETERS),
-        summaries=study.files(FOLDING["summary"]),
         view=asked_for(FIGURES, "view")[0],
         words=f"{workflow.basedir}/workflow/report/figures.yaml",
-        template=f"{PAGE}/methods.rst",
+        provenance=rules.provenance.output.report,
+        methods=rules.provenance.output.methods,
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
@@ -49,37 +75,13 @@ rule html_report:
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:
-        page="results/report/report.html",
-        methods="results/report/methods.rst",
-        provenance="results/report/provenance.json",
-        # the configuration with its paths, for those who have the files
-        config="results/report/config.yaml",
+        "results/report/report.html",
     params:
         figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
         brains=study.described_brains,
-        files=study.input_files,
-        folded=study.pairs,
-        method=study.method,
         config=study.used_settings,
     script:
         "../scripts/html_report.py"
-
-
-rule provenance:
-    input:
-        rules.figures.input,
-        rules.metrics.input,
-        rules.quality_table.output,
-    output:
-        study=f"{STUDY}/provenance.json",
-        brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
-        runs=study.files(f"{RUN}/provenance.json"),
-    params:
-        config=study.used_settings,
-        brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
-        folded=study.pairs,
-    script:
-        "../scripts/provenance.py"
 
 
 rule report:

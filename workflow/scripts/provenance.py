@@ -1,13 +1,15 @@
-"""Where the results come from, beside those of each brain, each run and the study: versions, settings, hashes."""
+"""Where results come from: versions, settings and hashes, beside those of each brain, run, study and the report."""
 
 from pathlib import Path
 
 from gyriflow.cli.provenance import software, texts_in
-from gyriflow.io.files import files_in, fingerprints, write_json
-from gyriflow.io.yaml_files import read_yaml
+from gyriflow.io.downloads import sha256_of
+from gyriflow.io.files import files_in, fingerprints, read_json, read_text, write_json, write_text
+from gyriflow.io.yaml_files import read_yaml, write_yaml
+from gyriflow.report.page import methods_text
 from gyriflow.step import step
 
-output, params = snakemake.output, snakemake.params
+files, output, params = snakemake.input, snakemake.output, snakemake.params
 OF_JOBS = ("logs", "benchmarks", "provenance.json")
 
 with step(snakemake.log[0]):
@@ -22,5 +24,13 @@ with step(snakemake.log[0]):
         results = fingerprints(files_in(folder, *OF_JOBS))
         settings = {"run": run, "start": brain, "parameters": read_yaml(folder / "params.yaml")}
         write_json(path, used | {"configuration": settings, "inputs": start | inputs[brain], "results": results})
+    hashed = [{"brain": brain, "what": what, "sha256": sha256_of(path)} for brain, what, path in params.files]
+    write_json(output.report, used | {"files": hashed})
+    runs = [
+        {"run": run, "start": brain, "parameters": read_yaml(settings), "summary": read_json(summary)}
+        for (run, brain), settings, summary in zip(params.folded, files.run_params, files.summaries, strict=True)
+    ]
+    write_text(output.methods, methods_text(read_text(files.template), runs=runs, software=used, **params.method))
+    write_yaml(output.config, params.config)
     results = fingerprints(files_in(Path(output.study).parent, *OF_JOBS))
     write_json(output.study, used | {"configuration": params.config, "inputs": inputs, "results": results})
