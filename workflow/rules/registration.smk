@@ -2,7 +2,7 @@
 if workflow.is_main_process:
     for series, cause in study.unmatched_starts.items():
         print(
-            f"gyriflow: no local growth from the surfaces of {series}: {cause}",
+            f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
             file=sys.stderr,
         )
 

@@ -1,4 +1,4 @@
-"""A run that foretells a brain and the simplest ways to do so, beside the real brains of the weeks."""
+"""A run that predicts a brain and the simplest ways to do so, beside the real brains of the weeks."""
 
 import numpy as np
 import pandas as pd

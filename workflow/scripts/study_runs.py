@@ -21,7 +21,7 @@ with step(snakemake.log[0]):
         resolved = resolution_over_steps(report["order"], read_table(steps))
         settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
         rows.append({"run": run, "subject": brain, **settings, **found})
-        # the shapes of a closed loop are files
+        # the shapes that a run grows towards are in files
         settings.pop("targets", None)
         runs[name] = settings | {key: value for key, value in found.items() if key in OF_EVERY_RUN}
     write_table(snakemake.output.csv, pd.json_normalize(rows))
