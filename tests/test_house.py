@@ -227,7 +227,8 @@ def test_citation_has_the_version_of_the_package():
 
 
 def test_links_in_the_documentation_lead_somewhere():
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "config" / "README.md", *(ROOT / "docs").glob("*.md")]
+    folders = ROOT / "config", ROOT / "docs"
+    pages = [*ROOT.glob("*.md"), *(page for folder in folders for page in folder.rglob("*.md"))]
     broken = [
         f"{short(page)}: {target}"
         for page in pages
