@@ -15,7 +15,6 @@ BOUNDED = settings(
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
-MANY = settings(BOUNDED, max_examples=40)
 
 # what numbers and words in headers are likely to be mistaken for
 ODD_BYTES = st.one_of(

@@ -6,7 +6,7 @@ from contextlib import suppress
 import pytest
 import yaml
 from configurations import LABELLED
-from fuzzing import BOUNDED, MANY, damaged, outcome
+from fuzzing import BOUNDED, damaged, outcome
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -92,7 +92,7 @@ def test_the_study_is_valid_as_it_is(tmp_path):
     assert loaded(STUDY, tmp_path) is not None
 
 
-@MANY
+@BOUNDED
 @given(raw=changed())
 def test_changed_values(tmp_path, raw):
     config = loaded(raw, tmp_path)

@@ -9,7 +9,7 @@ import nibabel as nib
 import numpy as np
 import pytest
 import pyvista as pv
-from fuzzing import MANY, damaged, outcome
+from fuzzing import BOUNDED, damaged, outcome
 from hypothesis import given
 from hypothesis import strategies as st
 from nibabel.freesurfer.io import write_geometry
@@ -89,7 +89,7 @@ def tried(tmp_path, name, data, read):
         ("study.yaml", read_yaml, None),
     ],
 )  # fmt: skip
-@MANY
+@BOUNDED
 @given(data=st.data())
 def test_damaged_files_give_something_sound_or_are_refused(tmp_path, wholes, name, read, header, data):
     found = tried(tmp_path, name, data.draw(damaged(wholes[name], header)), read)
