@@ -220,7 +220,8 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
             continue
         value: Any = values[column]
         if column in PATHS:
-            places = [beside(folder, part.strip()).resolve() for part in value.split(";")]
+            parts = value.split(";") if column == "white" else [value]
+            places = [beside(folder, part.strip()).resolve() for part in parts]
             if lost := [place for place in places if not place.is_file()]:
                 return {}, f"{column}: no such file: {lost[0]}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))

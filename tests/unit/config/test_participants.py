@@ -45,6 +45,20 @@ def test_rows_are_brains_whatever_their_files_are_of(folder):
     assert brains["sub-3"].label_volume == str(folder / "bids" / "a.nii.gz")
 
 
+def test_only_white_surfaces_may_be_two_with_a_semicolon_between(folder):
+    (folder / "bids" / "a;b.nii.gz").touch()
+    head = ("id", "week", "labels", "scheme", "files", "white")
+    write(
+        folder,
+        head,
+        ("sub-1", "24", "a;b.nii.gz", "feta-7", "n/a", "n/a"),
+        ("sub-2", "24", "n/a", "n/a", "lh.surf.gii; rh.surf.gii", "lh.surf.gii; rh.surf.gii"),
+    )
+    labelled, surfaces = config(folder).brains
+    assert labelled.labels == str(folder / "bids" / "a;b.nii.gz")
+    assert list(surfaces.white) == [str(folder / "bids" / f"{side}.surf.gii") for side in ("lh", "rh")]
+
+
 def test_values_for_all_rows_stand_in_the_configuration(folder):
     write(folder, ("id", "gestational_age"), ("sub-9", "24"))
     section = {
