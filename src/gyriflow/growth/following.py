@@ -28,8 +28,9 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, Fit]]:
         for quantity in (*SIZES, *([THICKNESS] if THICKNESS in brains else [])):
             measured = brains.dropna(subset=quantity)
             if quantity in SIZES or len(measured["week"].unique()) > 1:
-                weeks, values = measured[["week", quantity]].to_numpy().T
-                fits[str(name)][quantity] = fitted(weeks, values, name=quantity, may_shrink=quantity == THICKNESS)
+                fits[str(name)][quantity] = fitted(
+                    *measured[["week", quantity]].to_numpy().T, name=quantity, may_shrink=quantity == THICKNESS
+                )
     return fits
 
 
