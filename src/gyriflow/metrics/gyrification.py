@@ -50,14 +50,15 @@ def cap(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fan]))
 
 
-def envelope(mesh: TriangleMesh, *, radius_mm: float = ENVELOPE_RADIUS_MM) -> TriangleMesh:
-    """Return a closed surface that follows the outer folds and bridges sulci narrower than twice `radius_mm`.
+def envelope(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a closed surface that follows the outer folds and bridges sulci narrower than twice `ENVELOPE_RADIUS_MM`.
 
     It is an alpha wrap (Portaneri et al. 2022, in pymeshlab) of the capped surface, moved back onto it by the offset
     that the wrap needs. The area of a sphere comes out 0.3 % small.
     """
     document = in_meshlab(cap(mesh))
-    document.generate_alpha_wrap(alpha=pymeshlab.PureValue(radius_mm), offset=pymeshlab.PureValue(ENVELOPE_OFFSET_MM))
+    alpha, offset = pymeshlab.PureValue(ENVELOPE_RADIUS_MM), pymeshlab.PureValue(ENVELOPE_OFFSET_MM)
+    document.generate_alpha_wrap(alpha=alpha, offset=offset)
     outside = from_meshlab(document)
     return TriangleMesh(outside.vertices - ENVELOPE_OFFSET_MM * vertex_normals(outside), outside.faces)
 
@@ -106,18 +107,18 @@ def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> floa
     return sum(map(area, meshes)) / sum(float(pieces.areas.sum()) for pieces in around)
 
 
-def local_gyrification_index(mesh: TriangleMesh, around: Pieces, *, radius_mm: float = LOCAL_RADIUS_MM) -> Floats:
+def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
     """Return the (n,) area of the pial surface over that of the envelope, round each vertex.
 
-    As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within `radius_mm`
-    of the point nearest to the vertex, is compared with the pial surface that belongs to it: what is nearest to that
-    patch. Patches of 25 mm, as for adults, would hold half a fetal hemisphere.
+    As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within
+    `LOCAL_RADIUS_MM` of the point nearest to the vertex, is compared with the pial surface that belongs to it: what is
+    nearest to that patch. Patches of 25 mm, as for adults, would hold half a fetal hemisphere.
     """
     tree = cKDTree(around.centres)
     _, home = tree.query(corners(mesh).mean(axis=1))
     pial = np.bincount(home, face_areas(mesh), len(around.centres))
-    _, own = tree.query(mesh.vertices)
-    used, back = np.unique(own, return_inverse=True)
-    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), radius_mm, output_type="ndarray")
+    _, nearest = tree.query(mesh.vertices)
+    used, back = np.unique(nearest, return_inverse=True)
+    near = tree.sparse_distance_matrix(cKDTree(around.centres[used]), LOCAL_RADIUS_MM, output_type="ndarray")
     sums = [np.bincount(near["j"], values[near["i"]], len(used)) for values in (pial, around.areas)]
     return (sums[0] / sums[1])[back]

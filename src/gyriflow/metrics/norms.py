@@ -26,6 +26,9 @@ LEAST_FREEDOM = 3
 WINDOW_GW = 0.5
 """Brains at most this far from a week are of that week."""
 
+CURVE_POINTS = 41
+"""Weeks at which a curve is given, from the reference's first to its last."""
+
 OTHER_SIDES = "other hemispheres"
 """The flag of a brain that has other hemispheres than those it would be compared with."""
 
@@ -204,7 +207,7 @@ def _curve(weeks: Floats, values: Floats, at: Floats) -> _Curve | None:
     return _Curve(here @ factors, leverage, sd, freedom)
 
 
-def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int = 41) -> pd.DataFrame:
+def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
@@ -214,7 +217,7 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, points: int 
     parts = [pd.DataFrame(columns=columns)]
     for (hemisphere, metric), known in _by_metric(metrics, reference):
         weeks, values = known["week"].to_numpy(dtype=float), known["value"].to_numpy(dtype=float)
-        at = np.linspace(weeks.min(), weeks.max(), points if np.ptp(weeks) else 1)
+        at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
         if (curve := _curve(weeks, values, at)) is not None:
             half = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd * np.sqrt(1 + curve.leverage)
             band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}

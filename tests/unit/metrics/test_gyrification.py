@@ -89,7 +89,7 @@ def test_cut_is_left_out_of_the_index() -> None:
 def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:
     mesh = dented(8.0, 5.0)
     around = pieces_over(envelope(mesh), mesh)
-    local = local_gyrification_index(mesh, around, radius_mm=10.0)
+    local = local_gyrification_index(mesh, around)
     bottom = np.linalg.norm(mesh.vertices, axis=1).argmin()
     away = np.linalg.norm(mesh.vertices - [0, 0, 25.0], axis=1)
     # a patch of 10 mm round the dent: its area with and without what the dent adds
