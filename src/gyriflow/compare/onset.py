@@ -60,8 +60,10 @@ def relief(
             continue
         away, _ = cKDTree(mesh.vertices[inside]).query(mesh.vertices, distance_upper_bound=NEIGHBOURHOOD_MM)
         near = np.isfinite(away)
-        bottom = _quantile(depth_mm[inside], areas[inside], BOTTOM)
-        crown = _quantile(depth_mm[near], areas[near], CROWN)
+        bottom, crown = (
+            float(np.quantile(depth_mm[part], share, weights=areas[part], method="inverted_cdf"))
+            for part, share in ((inside, BOTTOM), (near, CROWN))
+        )
         rows.append((name, bottom, crown, bottom - crown))
     return pd.DataFrame(rows, columns=["region", "bottom_mm", "crown_mm", "relief_mm"])
 
@@ -131,7 +133,3 @@ def named(
         # a region may be called by a number too
         named[place] = f"{name} ({place})" if name in named.values() else name
     return numbers, named
-
-
-def _quantile(values: Floats, weights: Floats, share: float) -> float:
-    return float(np.quantile(values, share, weights=weights, method="inverted_cdf"))

@@ -90,11 +90,10 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
     `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
     no gap; at the bottom of a gap the width ends in 0, so that the least one says nothing), `area_mm2` is that area.
     """
-    return {
-        "percentile1": _quantile(walls.width, walls.area, 0.01) if len(walls.width) else None,
-        "median": _quantile(walls.width, walls.area, 0.5) if len(walls.width) else None,
-        "area_mm2": float(walls.area.sum()),
-    }
+    widths: list[float | None] = [None, None]
+    if len(walls.width):
+        widths = [*map(float, np.quantile(walls.width, [0.01, 0.5], weights=walls.area, method="inverted_cdf"))]
+    return {"percentile1": widths[0], "median": widths[1], "area_mm2": float(walls.area.sum())}
 
 
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
@@ -129,10 +128,6 @@ def _distances(mesh: TriangleMesh, other: TriangleMesh) -> tuple[Floats, Floats]
     centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
     distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), other)
     return distance, np.concatenate([np.tile(face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
-
-
-def _quantile(values: Floats, weights: Floats, share: float) -> float:
-    return float(np.quantile(values, share, weights=weights, method="inverted_cdf"))
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
