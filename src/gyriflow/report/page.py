@@ -17,7 +17,7 @@ from ..parameters.terms import ELEMENTS_NEEDED, run_names
 from .labels import plain, week_label
 from .tables import html_table
 
-FILE, COMMAND = "(file)", "(command)"
+FILE = "(file)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
 DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
@@ -276,13 +276,13 @@ def made(provenance: Mapping[str, Any]) -> str:
 
 
 def hide_paths(value: Any) -> Any:
-    """Return a configuration, plain dictionaries and lists, without the paths and commands in it.
+    """Return a configuration, plain dictionaries and lists, without the paths in it.
 
     A file's name may hold a patient's.
     """
     match value:
         case dict():
-            return {key: COMMAND if key == "command" and item else hide_paths(item) for key, item in value.items()}
+            return {key: hide_paths(item) for key, item in value.items()}
         case list() | tuple():
             return [hide_paths(item) for item in value]
         case str() if _FILE_NAME.search(value):

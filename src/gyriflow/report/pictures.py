@@ -122,7 +122,7 @@ def runs_by_week(
     if deviations:
         away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in deviations.items()}
         scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
-        panels["distance"] = {view: [_map_panel(away.get(key), scale, view, DISTANCE) for key in keys] for view in seen}
+        panels["distance"] = {view: [_map_panel(away.get(key), scale, view) for key in keys] for view in seen}
         bar = scale, MAPS[DISTANCE]
     return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
 
@@ -245,9 +245,7 @@ def scalar_maps(
         lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
         shares = {key: vectors / np.quantile(lengths, LONG) for key, vectors in directions.items()}
     panels = {
-        group: {
-            view: [_map_panel(shown.get(key), scale, view, quantity, shares.get(key)) for key in keys] for view in seen
-        }
+        group: {view: [_map_panel(shown.get(key), scale, view, shares.get(key)) for key in keys] for view in seen}
         for group, shown in maps.items()
     }
     legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
@@ -255,7 +253,7 @@ def scalar_maps(
 
 
 def _map_panel(
-    shown: SurfaceMap | None, scale: ScalarMappable, view: View, quantity: str, directions: Floats | None = None
+    shown: SurfaceMap | None, scale: ScalarMappable, view: View, directions: Floats | None = None
 ) -> Panel | None:
     if shown is None:
         return None
@@ -308,7 +306,7 @@ def influence_picture(
         panels = [_plain_panel(shown and shown[0], colours[name], view) for name, shown in maps.items()]
         rows.append(Row(f"{view.name} view", panels, ABSENT))
     for view in seen:
-        panels = [_map_panel(shown, scale, view, quantity) for shown in maps.values()]
+        panels = [_map_panel(shown, scale, view) for shown in maps.values()]
         rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
     return panel_grid(list(brains), rows, colour_bar=(scale, MAPS[quantity]))
 
