@@ -43,14 +43,6 @@ MARGIN_MM, PIXEL_MM = 8.0, 0.25
 # grey values up to this quantile of those above zero are told apart
 _BRIGHTEST = 0.995
 
-COLUMNS = (
-    *("subject", "week", "population", "source", "sides", "verdict", "cause", "warning_count", "warnings"),
-    *("area_cm2", "area_left_cm2", "area_right_cm2", "volume_ml", "share_of_expected_volume"),
-    *("mean_thickness_mm", "thickness_measured_share", "voxels_through_cortex"),
-    *("pose_by", "rotation_deg", "asymmetry_mm", "page"),
-)
-"""The columns; the first three, `source` and `sides` are of the configuration, the others of the surface stage."""
-
 
 @dataclass(frozen=True, eq=False)
 class Brain:
@@ -264,5 +256,6 @@ def quality_table(
     refused : labels and cause of the brains that were refused
     """
     every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
-    table = pd.DataFrame(every, columns=list(COLUMNS)).set_index("subject", drop=False)
-    return table.loc[[name for name in order if name in table.index]].reset_index(drop=True)
+    table = pd.DataFrame(every).set_index("subject", drop=False)
+    shown = [name for name in order if name in table.index]
+    return table.loc[shown, [*table.columns.drop("page"), "page"]].reset_index(drop=True)
