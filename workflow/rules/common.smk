@@ -64,6 +64,9 @@ if REFUSED and workflow.is_main_process:
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not study.brains:
     sys.exit(0)
+# Brains of one hemisphere have fewer files, and rules of their own with the same script: the files of the whole have no
+# wildcard for the side, and Snakemake asks all files of a rule to have the same wildcards.
+PARTS_OF_BRAINS = {"": SIDES, "_left": ("left",), "_right": ("right",)}
 FIGURES = figures_of(study)
 if workflow.is_main_process:
     for cause in study.unreachable.values():

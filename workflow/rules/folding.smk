@@ -148,16 +148,11 @@ def reaches(run, brain, week):
     return week_tag(week) in map(week_tag, read_json(summary)["weeks"])
 
 
-# brains of one hemisphere have fewer files
-for name, sides in {
-    "folded_surface": SIDES,
-    "folded_left": ("left",),
-    "folded_right": ("right",),
-}.items():
+for suffix, sides in PARTS_OF_BRAINS.items():
 
     rule:
         name:
-            name
+            f"folded_surface{suffix}"
         input:
             frames=FOLDING["frames"],
             regions=REGIONS["mesh"],

@@ -1,7 +1,4 @@
 # Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
-#
-# Brains of one hemisphere have fewer files, and rules of their own with the same script.
-PARTS_OF_BRAINS = {"": SIDES, "_left": ("left",), "_right": ("right",)}
 
 
 def from_place(attribute):
