@@ -34,7 +34,7 @@ THICKNESS_LIMITS_MM = (0.0, 4.0)
 SHAPE_VIEWS = ("left", "right", "top", "bottom")
 THICKNESS_VIEWS = ("left", "right", "left medial", "right medial")
 OTHER_VIEWS = ("front", "back", "left medial", "right medial")
-MOST_LINES, LINE_LETTERS = 8, 138
+LINE_LETTERS = 138
 # in inches
 ROWS_IN, HEAD_IN, LINE_IN = (2.4, 1.42, 1.42), 0.9, 0.13
 PIXELS_PER_INCH = 200
@@ -87,8 +87,6 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     row : what `quality_row` returns
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
-    if len(lines) > MOST_LINES:
-        lines = [*lines[: MOST_LINES - 1], "• … more in quality.csv"]
     figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
     heading, colour = VERDICTS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
