@@ -213,8 +213,9 @@ def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: 
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     if _sided(shapes) < 1 / LEAST_SIDED:
-        return [f"the shapes fit the other sides better: are left and right swapped, and the coordinates not "
-                f"{coordinates.upper()}? Check both, or set coordinates: auto"]  # fmt: skip
+        named = coordinates.upper()
+        swapped = f"are left and right swapped, and the coordinates not {named}? Check both, or set coordinates: auto"
+        return [f"the shapes fit the other sides better: {swapped}"]
     turns = [angle_deg(one.rotation) for one in shapes]
     if all(one.is_clear for one in shapes) and min(turns) > LEAST_TURN_DEG:
         return [_against(coordinates, "hemispheres are", float(np.mean(turns)))]

@@ -97,8 +97,8 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
 
 def refuse_bad_configfiles(files: Sequence[Path], directory: Path) -> None:
     """Raise InputError where a configuration file, named or found here, is missing, no YAML, or has a key twice."""
-    own = directory / "config" / "config.yaml"
-    for file in files or ([own] if own.is_file() else []):
+    default = directory / "config" / "config.yaml"
+    for file in files or ([default] if default.is_file() else []):
         try:
             read_keys(file)
         except InputError as error:

@@ -55,11 +55,11 @@ def require_own_results(directory: Path, files: Sequence[Path], config: Config, 
     there = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
     shared = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
     if there and not shared:
-        found = f"{', '.join(there)} of {', '.join(recorded['configuration'])}"
+        results_of = f"{', '.join(there)} of {', '.join(recorded['configuration'])}"
         expected = f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}"
         remedy = f"Choose another --directory; or delete these results, or study/{path.name} to have both here."
         problem, results = "the results here are those of another study", path.parents[1].resolve()
-        raise InputError(problem, path=results, found=found, expected=expected, remedy=remedy)
+        raise InputError(problem, path=results, found=results_of, expected=expected, remedy=remedy)
     if record and (recorded != study or not path.is_file()):
         write_json(path, study)
 

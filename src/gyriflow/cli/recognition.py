@@ -50,8 +50,8 @@ def recognise(folder: Path, pattern: str = "*") -> list[Recognised]:
     Data sets that gyriflow itself has made are left out. InputError where there are none.
     """
     files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
-    own = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
-    files = [file for file in files if fnmatch(str(file), pattern) and not any(map(file.is_relative_to, own))]
+    exports = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
+    files = [file for file in files if fnmatch(str(file), pattern) and not any(map(file.is_relative_to, exports))]
     try:
         scans, no_ages = read_scans(folder / "participants.tsv"), "not told by its name"
     except InputError as error:

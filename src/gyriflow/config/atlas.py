@@ -338,10 +338,10 @@ def atlas_problems(used: UsedAtlas) -> Iterator[Problem]:
         name = ", ".join(filter(None, (licence.name, licence.url)))
         text = f"found false; true accepts the licence of {atlas.name} ({name}): {licence.terms}"
         yield Problem(text, ("accept_licence",))
-    known = set.union(*map(used.known_weeks, used.series))
-    if unknown_weeks := set(settings.weeks or ()) - known:
+    available = set.union(*map(used.known_weeks, used.series))
+    if unknown_weeks := set(settings.weeks or ()) - available:
         of = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
-        text = f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(known)}. A week is never rounded"
+        text = f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(available)}. A week is never rounded"
         yield Problem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:

@@ -178,8 +178,7 @@ class GivenRegions(Settings):
     def problems(self) -> Iterator[Problem]:
         sides = [side for side in SIDES if self.gives(side)]
         if (self.volume is not None) == bool(sides):
-            found = "both" if sides else "neither"
-            yield Problem(f"found {found}; expected volume, or left and right")
+            yield Problem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
         elif len(sides) == 1:
             missing = "right" if sides == ["left"] else "left"
             yield Problem("is missing; both hemispheres need labels", (missing,))

@@ -57,10 +57,10 @@ def names(config: Config) -> Iterator[Problem]:
     for section, taken in reserved.items():
         for name in sorted(set(getattr(config, section)) & set(taken)):
             yield Problem("the name is taken; choose another", (section, name))
-    known = dict.fromkeys([*SCHEMES, *config.schemes])
+    schemes = dict.fromkeys([*SCHEMES, *config.schemes])
     for number, brain in enumerate(config.brains):
-        if brain.scheme not in (None, *known):
-            expected = f"expected one of {', '.join(known)}, or a name of schemes"
+        if brain.scheme not in (None, *schemes):
+            expected = f"expected one of {', '.join(schemes)}, or a name of schemes"
             yield Problem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
 
 
@@ -92,17 +92,17 @@ def _start_problems(start: Start | None, config: Config, key: Key) -> Iterator[P
 
 
 def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[Problem]:
-    known = [brain.id for brain in config.brains]
+    brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
-        if name not in known:
-            yield Problem(f"found {name!r}, which is no brain; {nearest(name, known)}", key)
+        if name not in brains:
+            yield Problem(f"found {name!r}, which is no brain; {nearest(name, brains)}", key)
 
 
 def runs(config: Config) -> Iterator[Problem]:
     """Yield what is wrong between the settings of each run and its start brains."""
-    known = {brain.id: brain for brain in config.brains}
+    by_id = {brain.id: brain for brain in config.brains}
     for name, run in config.runs.items():
-        brains = [known[brain] for brain in starts_of(config.start, run, list(known))]
+        brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
         weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
         # without a start, what holds at the end is checked
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:

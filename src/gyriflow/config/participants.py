@@ -76,11 +76,11 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Sca
         # any other name leads elsewhere
         sessions = _read(file) if SUBJECT.fullmatch(name) and file.is_file() else None
         # sessions without ages say nothing that is asked here
-        own = sessions if sessions is not None and sessions.column else table
-        if not own.column:
-            raise _lacks(own, "gestational ages", (*UNIT_OF_AGE, f"{AGE} with Units in {path.stem}.json"))
-        for session in own.rows if own is sessions else [row]:
-            scans.append(_scan(name, dict(further or {}) | row | session, own, further or {}))
+        ages = sessions if sessions is not None and sessions.column else table
+        if not ages.column:
+            raise _lacks(ages, "gestational ages", (*UNIT_OF_AGE, f"{AGE} with Units in {path.stem}.json"))
+        for session in ages.rows if ages is sessions else [row]:
+            scans.append(_scan(name, dict(further or {}) | row | session, ages, further or {}))
     return scans
 
 
@@ -124,8 +124,8 @@ def _read(path: Path) -> _Table:
 
 
 def _lacks(table: _Table, what: str, names: Sequence[str]) -> InputError:
-    found, expected = ", ".join(table.rows[0]), " or ".join(names)
-    return InputError(f"has no column of {what}", path=table.path, found=found, expected=expected)
+    columns, expected = ", ".join(table.rows[0]), " or ".join(names)
+    return InputError(f"has no column of {what}", path=table.path, found=columns, expected=expected)
 
 
 # as brains of a configuration
@@ -199,8 +199,8 @@ def participants_brains(
 
 def covariates(scan: Scan) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
-    known = {*IDS, SESSION, FILES, SIDE, *COLUMNS, scan.age_column}
-    others = {key: value for key, value in scan.values.items() if key not in known and value not in NOTHING}
+    keys = {*IDS, SESSION, FILES, SIDE, *COLUMNS, scan.age_column}
+    others = {key: value for key, value in scan.values.items() if key not in keys and value not in NOTHING}
     return {"covariates": others} if others else {}
 
 

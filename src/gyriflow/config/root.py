@@ -68,8 +68,8 @@ class Config(Settings):
         """Return the scheme of a brain's labels."""
         name = brain.scheme
         assert name is not None
-        own = self.schemes.get(name)
-        return SCHEMES[name] if own is None else LabelScheme(name=name, **own.model_dump())
+        settings = self.schemes.get(name)
+        return SCHEMES[name] if settings is None else LabelScheme(name=name, **settings.model_dump())
 
     @property
     def atlases(self) -> list[UsedAtlas]:

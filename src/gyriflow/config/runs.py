@@ -140,9 +140,9 @@ def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
     volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
     by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
-    known = {kind: members for kind, members in by_kind.items() if members}
+    given = {kind: members for kind, members in by_kind.items() if members}
     # a kind with a single age can only be compared across kinds
-    return known if len(known) == 1 or all(_ages(members) > 1 for members in known.values()) else {"all": brains}
+    return given if len(given) == 1 or all(_ages(members) > 1 for members in given.values()) else {"all": brains}
 
 
 def _ages(brains: Sequence[Brain]) -> int:
@@ -193,8 +193,8 @@ class Study(Compared):
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return all keys by which the run of some varied values differs from the base."""
-        own = next((self.fixed_at.get(first, {}) for first in values.values()), {})
-        return {**self.fixed, **own, **values, "end_week": self.compare_week}
+        at_first = next((self.fixed_at.get(first, {}) for first in values.values()), {})
+        return {**self.fixed, **at_first, **values, "end_week": self.compare_week}
 
 
 class Calibration(Compared):
@@ -219,8 +219,8 @@ class Calibration(Compared):
         if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
             yield Problem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
         if not self.rounds or self.rounds[0] < LEAST_FIRST_RUNS or sum(self.rounds) > MOST_RUNS:
-            found = f"found {list(self.rounds)}; expected {LEAST_FIRST_RUNS} runs or more in the first round"
-            yield Problem(f"{found} and at most {MOST_RUNS} in all", ("rounds",))
+            text = f"found {list(self.rounds)}; expected {LEAST_FIRST_RUNS} runs or more in the first round"
+            yield Problem(f"{text} and at most {MOST_RUNS} in all", ("rounds",))
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 yield Problem(f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key))

@@ -73,8 +73,8 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     needed = 2 * len(parameters.output_weeks) * frame + checkpoint + 4 * mesh.tets.size
     free = shutil.disk_usage(out).free
     if free < needed:
-        found, expected = (f"{size / 2**20:.0f} MiB" for size in (free, needed))
-        raise StorageError("the disk has no room for this run", path=out, found=f"{found} free", expected=expected)
+        room, expected = (f"{size / 2**20:.0f} MiB" for size in (free, needed))
+        raise StorageError("the disk has no room for this run", path=out, found=f"{room} free", expected=expected)
 
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

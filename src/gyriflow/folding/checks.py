@@ -72,8 +72,8 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
         folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
         if len(folded):
             place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
-            found = f"{len(folded)} of {len(mesh.tets)}, one at {place} mm"
-            raise MeshError("the mesh has curved elements that are folded over", found=found)
+            count = f"{len(folded)} of {len(mesh.tets)}, one at {place} mm"
+            raise MeshError("the mesh has curved elements that are folded over", found=count)
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
     alone = (zones.facet_zone == MEDIAL_WALL).any()
     if not alone and not low < zones.fissure_x_mm < high:
@@ -102,8 +102,8 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     parts = part.max() + 1
     floating = np.setdiff1d(np.arange(parts), part[clamped])
     if len(floating):
-        found = f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices"
-        raise MeshError("parts of the brain have no clamped facet and would float", found=found)
+        detached = f"{len(floating)} of {parts} parts, the largest with {np.bincount(part)[floating].max()} vertices"
+        raise MeshError("parts of the brain have no clamped facet and would float", found=detached)
 
 
 def stiffness_warning(poisson_ratio: float) -> str:

@@ -88,7 +88,7 @@ class GrowthToTargets:
         def laid(shape: Floats, onto: Floats) -> Floats:
             return transform_points(shape, rigid_fit(shape, onto, sizes))
 
-        ahead = sorted(known for known in self.targets if known > week + SOON_GW) or [max(self.targets)]
+        ahead = sorted(target for target in self.targets if target > week + SOON_GW) or [max(self.targets)]
         missing = laid(self.targets[ahead[0]], places) - places
         before, since = places, week
         while len(ahead) > 1 and ahead[0] < end - SOON_GW:

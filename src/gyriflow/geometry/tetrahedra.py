@@ -214,7 +214,7 @@ def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
     between = np.flatnonzero(~at_node)[first]
     rows = np.repeat(np.arange(count, count + len(between)), 6)
     columns = np.maximum(names[between], 0).ravel()
-    own = sparse.coo_array((weights[between].ravel(), (rows - count, columns)), shape=(len(between), count))
-    matrix = sparse.csr_array(sparse.vstack([sparse.eye_array(count), own]))
+    new = sparse.coo_array((weights[between].ravel(), (rows - count, columns)), shape=(len(between), count))
+    matrix = sparse.csr_array(sparse.vstack([sparse.eye_array(count), new]))
     faces = number.reshape(-1, len(LATTICE))[:, LATTICE_TRIANGLES].reshape(-1, 3)
     return matrix, faces

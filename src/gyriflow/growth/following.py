@@ -73,12 +73,12 @@ def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) ->
     of_series = table[table["series"] == series]
     rows = of_series[of_series["quantity"] == quantity]
     if not len(rows):
-        found = (
+        reason = (
             f"its brains have no {quantity} in two weeks or more"
             if len(of_series)
             else "the start brain is in no series of brains of two weeks or more"
         )
         remedy = "List brains of other weeks, or give growth a table such as {area_cm2: {21: 99, 30: 252}}"
-        raise InputError(f"no measured curve of {quantity} can be followed", found=found, remedy=remedy)
+        raise InputError(f"no measured curve of {quantity} can be followed", found=reason, remedy=remedy)
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

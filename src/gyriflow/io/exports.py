@@ -151,9 +151,9 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
         places.append(place)
         if (other := taken.setdefault(place, brain)) is not brain:
-            found = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
+            brains_and_runs = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
             expected = "ids and runs that differ in their letters and digits"
-            raise InputError(f"two brains have the same BIDS name {stem}", found=found, expected=expected)
+            raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
     return places
 
 
@@ -239,8 +239,8 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
     for target, page in (pages | of_all).items():
         if (exported.parent / page).is_file():
             _copy(exported.parent / page, folder / target)
-    own = source / "dataset_description.json"
-    said = read_json(own) if own.is_file() else {}
+    description = source / "dataset_description.json"
+    said = read_json(description) if description.is_file() else {}
     doi = str(said.get("DatasetDOI", ""))
     url = doi if doi.startswith(("doi:", "http")) else f"doi:{doi}" if doi else source.resolve().as_uri()
     described = read_json(exported / "dataset_description.json")
@@ -249,11 +249,11 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
 
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> Names:
     subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
-    own = {brain.brain: match and f"ses-{match[1]}" for brain in brains for match in [SESSION.search(brain.brain)]}
+    sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
     # two subjects whose names differ in other characters only are told by their equal sessions
-    several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(own.values())
+    several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(sessions.values())
     week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
-    return {brain.brain: (subjects[brain.brain], own[brain.brain] or week[brain.brain]) for brain in brains}
+    return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}
 
 
 def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> None:

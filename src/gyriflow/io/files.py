@@ -178,10 +178,10 @@ def sha256_of(path: AnyPath) -> str:
         raise StorageError("cannot be read", path=path, found=error.strerror or error) from error
 
 
-def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, list[Any]]:
+def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
     """Return for each file that can be read its SHA-256, size in bytes, and last writing and last change of any kind.
 
-    A file whose size and times (ns, of the epoch) are those in `known`, an earlier answer, is not read again.
+    A file whose size and times (ns, of the epoch) are those in `earlier`, an answer from before, is not read again.
     """
     by_path: dict[str, list[Any]] = {}
     for path in map(str, files):
@@ -189,7 +189,7 @@ def contents(files: Iterable[AnyPath], known: Mapping[str, Any]) -> dict[str, li
             state = Path(path).stat()
             # one that takes another's place keeps its date, but has been renamed
             now = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
-            by_path[path] = known[path] if known.get(path, [])[1:] == now else [sha256_of(path), *now]
+            by_path[path] = earlier[path] if earlier.get(path, [])[1:] == now else [sha256_of(path), *now]
     return by_path
 
 

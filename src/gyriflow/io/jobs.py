@@ -128,7 +128,7 @@ def gather_messages(
     Columns are subject, run (both empty where there is none), step, level ("warning" or "error"), message. Only logs
     that were written since a time, in s of the epoch, are read.
     """
-    folder, known, folded = Path(folder), set(brains), {tuple(pair) for pair in runs}
+    folder, ids, folded = Path(folder), set(brains), {tuple(pair) for pair in runs}
     rows = []
     for path in sorted(folder.glob("results/**/logs/*.log")):
         place = path.relative_to(folder).as_posix()
@@ -136,7 +136,7 @@ def gather_messages(
         if match is None or path.stat().st_mtime < since_s:
             continue
         of = {"subject": "", "run": "", **match.groupdict()}
-        if (of["run"], of["subject"]) in folded or (not of["run"] and of["subject"] in {"", *known}):
+        if (of["run"], of["subject"]) in folded or (not of["run"] and of["subject"] in {"", *ids}):
             rows += [{**of, "level": level, "message": message} for level, message in read_messages(path)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 

@@ -64,15 +64,15 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
             vertices, faces, space = _read_freesurfer_surface(path)
             structure = FREESURFER_SIDES.get(path.name.split(".")[0])
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
-        found = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
-        raise InputError("holds no surface", path=path, found=found, expected="(n, 3) points and (m, 3) faces")
+        shapes = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
+        raise InputError("holds no surface", path=path, found=shapes, expected="(n, 3) points and (m, 3) faces")
     require_finite(vertices, path, "coordinates", "vertices")
     if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
         np.abs(faces - np.rint(faces)).max() > 1e-3
     ):
-        found = f"indices {faces.min():.6g} to {faces.max():.6g}"
+        indices = f"indices {faces.min():.6g} to {faces.max():.6g}"
         expected = f"whole numbers from 0 to {len(vertices) - 1}"
-        raise InputError("has faces that name vertices which do not exist", path=path, found=found, expected=expected)
+        raise InputError("has faces that name vertices which do not exist", path=path, found=indices, expected=expected)
     return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space, structure
 
 
@@ -172,9 +172,9 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     surface = read_surface(surface_path)
     arrays = load_gifti(path).darrays
     if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
-        found = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
+        kinds = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
         problem, expected = "is not a map of one value per vertex", "one array of numbers (.shape.gii, .func.gii)"
-        raise InputError(problem, path=path, found=", ".join(found) or "none", expected=expected)
+        raise InputError(problem, path=path, found=", ".join(kinds) or "none", expected=expected)
     values = np.asarray(arrays[0].data, dtype=float).ravel()
     if len(values) != len(surface.vertices):
         expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
@@ -203,8 +203,8 @@ def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None, str | 
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
     if len(points) != 1 or len(triangles) != 1 or not len(points[0].data) or not len(triangles[0].data):
-        found = f"{len(points)} arrays of points, {len(triangles)} of triangles"
-        raise InputError("holds no surface", path=path, found=found, expected="one of each (.surf.gii)")
+        arrays = f"{len(points)} arrays of points, {len(triangles)} of triangles"
+        raise InputError("holds no surface", path=path, found=arrays, expected="one of each (.surf.gii)")
     matrix, space = _to_scanner_space(_coordinate_systems(path), path)
     if space is None:
         _warn_of_tkr_ras(points[0].meta, path)
@@ -267,8 +267,8 @@ def read_vertex_labels(path: AnyPath) -> tuple[Ints, dict[int, str]]:
     image = load_gifti(path)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
-        found = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
-        raise InputError("is no label file", path=path, found=found, expected="one label for each vertex (.label.gii)")
+        shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
+        raise InputError("is no label file", path=path, found=shapes, expected="one label for each vertex (.label.gii)")
     values = np.asarray(arrays[0].data)
     labels = np.rint(values).astype(np.int64)
     if not np.isfinite(values).all() or np.abs(values - labels).max(initial=0.0) > 1e-3:
@@ -330,11 +330,11 @@ def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str
     InputError for matrices into scanner space that change sizes.
     """
     moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
-    own = next((data for data, _, _ in systems if data in SUBJECT), None)
-    if own is not None:
+    space = next((data for data, _, _ in systems if data in SUBJECT), None)
+    if space is not None:
         for _, to, _ in moving:
-            log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, own, to)
-        return np.eye(4), own
+            log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, space, to)
+        return np.eye(4), space
     into_subject = (system for system in moving if system[1] in SUBJECT)
     for data, to, matrix in sorted(into_subject, key=lambda system: SUBJECT.index(system[1])):
         rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)

@@ -129,8 +129,8 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     size = data.stat().st_size
     if needed < 0 or needed > size * (MOST_PACKED if packed else 1):
         expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
-        found = f"{size} bytes"
-        raise InputError("is shorter than its header says", path=data, found=found, expected=expected, remedy=AGAIN)
+        problem = "is shorter than its header says"
+        raise InputError(problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN)
 
 
 def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Floats:
@@ -168,8 +168,8 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
         distance = float(np.linalg.norm(difference[:3, :3] @ ends + difference[:3, 3:], axis=0).max())
         if not distance <= AGREEMENT_VOXELS * voxel:
             problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
-            found = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
-            raise InputError(problem, path=path, found=f"{found}\n", remedy=WHICH_MATRIX)
+            both = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
+            raise InputError(problem, path=path, found=f"{both}\n", remedy=WHICH_MATRIX)
     return scale * matrices[given[0]]
 
 
@@ -198,8 +198,8 @@ def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
     shape = values.shape
     kept = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
     if len(kept) != 3 or values.dtype.kind not in "biuf":
-        found, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
-        raise InputError(f"is not a volume of {content}", path=path, found=found, expected=expected)
+        form, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
+        raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
     return values.reshape(kept)
 
 
@@ -208,12 +208,12 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
         require_finite(values.ravel(), path, "values", "voxels")
         broken = np.abs(values - np.rint(values)) > 1e-3
         if broken.any():
-            found = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
+            broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
             remedy = "gyriflow does not segment images: give a tissue label volume."
-            raise InputError("has values that are no whole numbers", path=path, found=found, remedy=remedy)
+            raise InputError("has values that are no whole numbers", path=path, found=broken_values, remedy=remedy)
         values = np.rint(values)
     least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:
-        found, expected = f"{least:.6g} to {largest:.6g}", f"whole numbers up to {bounds.max}"
-        raise InputError("has values that are no tissue labels", path=path, found=found, expected=expected)
+        span, expected = f"{least:.6g} to {largest:.6g}", f"whole numbers up to {bounds.max}"
+        raise InputError("has values that are no tissue labels", path=path, found=span, expected=expected)
     return values.astype(np.int32)

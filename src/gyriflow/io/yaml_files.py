@@ -19,11 +19,11 @@ class _StrictLoader(yaml.SafeLoader):
     """Refuses two equal keys in one mapping, of which YAML would silently keep the last."""
 
 
-def _size(value: Any, known: dict[int, int]) -> int:
-    if id(value) not in known:
+def _size(value: Any, sizes: dict[int, int]) -> int:
+    if id(value) not in sizes:
         inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-        known[id(value)] = 1 + sum(_size(item, known) for item in inner)
-    return known[id(value)]
+        sizes[id(value)] = 1 + sum(_size(item, sizes) for item in inner)
+    return sizes[id(value)]
 
 
 def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
@@ -70,8 +70,8 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
     """Return the keys of a YAML (or JSON) file with their values; InputError where it has none."""
     content = read_yaml(path)
     if not isinstance(content, dict):
-        found = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
-        raise InputError("holds no keys", path=path, found=found, expected="keys with values, such as `week: 21`")
+        kind = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
+        raise InputError("holds no keys", path=path, found=kind, expected="keys with values, such as `week: 21`")
     return content
 
 

@@ -62,13 +62,13 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
 
 
 def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
-    own, outer = boundary_surface(mesh)
-    distance, face, place = nearest_on(own.vertices, surface)
-    ends, _ = edges(own)
-    length = np.linalg.norm(np.diff(own.vertices[ends], axis=1)[:, 0], axis=1)
+    boundary, outer = boundary_surface(mesh)
+    distance, face, place = nearest_on(boundary.vertices, surface)
+    ends, _ = edges(boundary)
+    length = np.linalg.norm(np.diff(boundary.vertices[ends], axis=1)[:, 0], axis=1)
     shortest = np.full(len(outer), np.inf)
     np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
-    alike = np.einsum("ij,ij->i", vertex_normals(own), face_normals(surface)[face]) >= ALIKE
+    alike = np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face]) >= ALIKE
     near = alike & (distance <= FARTHEST * shortest)
     target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)
     target[outer[near]] = place[near]

@@ -209,25 +209,25 @@ def refuse_bad_mesh(
         bad, worst = values < least, values.argmin()
         if bad.any():
             place = np.round(mesh.vertices[mesh.corners[worst]].mean(axis=0), 1).tolist()
-            found = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
-            faults.append((found, f"{name} at least {least:g}"))
+            fault = f"{int(bad.sum())} of {len(bad)} elements with {name} to {values[worst]:.4g} at {place} mm"
+            faults.append((fault, f"{name} at least {least:g}"))
     change, distance = summary["volume_change"], summary["surface_distance_mm"]["hausdorff99"]
     if abs(change) > max_volume_change:
-        found = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
-        faults.append((found, f"at most {100 * max_volume_change:g} %"))
+        fault = f"a volume of {summary['volume_mm3']:.0f} mm3, {100 * change:+.1f} % against the surface's"
+        faults.append((fault, f"at most {100 * max_volume_change:g} %"))
     if distance > max_surface_distance_mm:
-        found = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
-        faults.append((found, f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"))
+        fault = f"a surface {distance:.3f} mm from the one that was filled (99 % of it is nearer)"
+        faults.append((fault, f"at most {max_surface_distance_mm:g} mm (mesh.max_surface_distance_mm)"))
     if summary["gap_kept"] is not None and summary["gap_kept"] < MIN_GAP_KEPT:
-        found = f"narrow gaps, such as the fissure, open along {100 * summary['gap_kept']:.0f} % of their walls"
-        faults.append((found, f"at least {100 * MIN_GAP_KEPT:g} %"))
+        fault = f"narrow gaps, such as the fissure, open along {100 * summary['gap_kept']:.0f} % of their walls"
+        faults.append((fault, f"at least {100 * MIN_GAP_KEPT:g} %"))
     if summary["crossing_faces"]:
         faults.append((f"{summary['crossing_faces']} faces of its surface that cross others", "none that cross"))
     if faults:
         raise MeshError(
             "the mesh is not good enough",
             path=path,
-            found="; ".join(found for found, _ in faults),
+            found="; ".join(fault for fault, _ in faults),
             expected="; ".join(expected for _, expected in faults),
             remedy="Mesh with another mesh.envelope_mm, other edge lengths or another mesh.mesher, or lower the gates "
             "of mesh.",

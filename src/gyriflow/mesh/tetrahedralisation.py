@@ -135,6 +135,5 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
         f"{parts[0]} parts instead of {parts[1]}": parts[0] != parts[1],
         f"Euler number {euler[0]} instead of {euler[1]}": euler[0] != euler[1],
     }
-    found = [text for text, wrong in problems.items() if wrong]
-    if found:
-        raise MeshError("the mesh is not the inside of the surface", found="; ".join(found))
+    if faults := [text for text, wrong in problems.items() if wrong]:
+        raise MeshError("the mesh is not the inside of the surface", found="; ".join(faults))

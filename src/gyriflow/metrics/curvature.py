@@ -91,8 +91,8 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     coefficients, fitted, one_sided = _quadrics(mesh, radii)
     failed = int(np.count_nonzero(~fitted))
     if failed > MAX_FAILED_SHARE * len(mesh.vertices):
-        found = f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood"
-        raise MeshError("no curvature can be fitted", found=found, remedy="Repair or remesh the surface.")
+        failures = f"{failed} of {len(mesh.vertices)} vertices without a regular neighbourhood"
+        raise MeshError("no curvature can be fitted", found=failures, remedy="Repair or remesh the surface.")
     a, b, c, d, e, _ = coefficients.T
     # first and second fundamental form of the height function; outward normals make a cap negative
     stretch = 1.0 + d**2 + e**2

@@ -82,8 +82,8 @@ class Hemisphere(Folds):
 
     def maps(self) -> dict[str, NDArray]:
         """Return the arrays per vertex by name, as in `BrainMetrics.maps`."""
-        known = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
-        return {**super().maps(), **known, "spangy_dominant_band": self.spectrum.dominant_band}
+        thickness = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
+        return {**super().maps(), **thickness, "spangy_dominant_band": self.spectrum.dominant_band}
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
@@ -141,8 +141,8 @@ def folding_rows(sides: Sequence[Folds]) -> list[Row]:
     bend = join([side.bend for side in sides])
     weights = areas * bend.reliable
     if not weights.any():
-        found = "every vertex has the edge of the surface within its radius"
-        raise MeshError("no curvature away from the cut", found=found, remedy="Lower metrics.curvature_radius_mm.")
+        reason = "every vertex has the edge of the surface within its radius"
+        raise MeshError("no curvature away from the cut", found=reason, remedy="Lower metrics.curvature_radius_mm.")
 
     def mean(values: NDArray) -> float:
         return float(np.average(values, weights=weights))
@@ -166,10 +166,10 @@ def folding_rows(sides: Sequence[Folds]) -> list[Row]:
 
 def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
     """Return the rows of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
-    known = np.isfinite(values)
-    if not known.any():
+    measured = np.isfinite(values)
+    if not measured.any():
         return []
-    chosen, weights = values[known], areas[known]
+    chosen, weights = values[measured], areas[measured]
     mean = float(np.average(chosen, weights=weights))
     low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
     return [
@@ -272,8 +272,8 @@ def measure_brain(
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
     rows += [("whole", metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
     for side in sides:
-        own = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
-        rows += [(side.name, *row) for row in own]
+        of_side = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
+        rows += [(side.name, *row) for row in of_side]
     return BrainMetrics(
         table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
         maps={side.name: side.maps() for side in sides},
@@ -285,8 +285,8 @@ def measure_brain(
 def _require_outward(*meshes: TriangleMesh) -> None:
     for mesh in meshes:
         if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
-            found = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
-            raise MeshError("the faces of the surface look inwards", found=found, remedy="Turn the faces round.")
+            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
+            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
 
 
 def _in_processes(jobs: Sequence[tuple], processes: int) -> list[Hemisphere]:
@@ -315,7 +315,7 @@ def measure_white(
     rows = []
     for name, parts in {"whole": list(folds.values()), **{name: [part] for name, part in folds.items()}}.items():
         size = sum(area(part.mesh) for part in parts) * CM2_PER_MM2
-        own = [row for row in folding_rows(parts) if row[0] in OF_WHITE]
-        rows += [(name, f"white_{metric}", value, unit) for metric, value, unit in [("area", size, "cm2"), *own]]
+        indices = [row for row in folding_rows(parts) if row[0] in OF_WHITE]
+        rows += [(name, f"white_{metric}", value, unit) for metric, value, unit in [("area", size, "cm2"), *indices]]
     table = pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
     return table, {name: part.maps() for name, part in folds.items()}

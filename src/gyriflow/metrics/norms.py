@@ -129,12 +129,12 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
     (NaN for one brain), q05, q25, q50, q75, q95 (NaN for fewer than five brains).
     """
     rows = []
-    for names, known in _by_metric(metrics, reference):
-        for week in np.unique(known["week"]):
-            near = known.loc[(known["week"] - week).abs() <= WINDOW_GW, "value"]
+    for names, brains in _by_metric(metrics, reference):
+        for week in np.unique(brains["week"]):
+            near = brains.loc[(brains["week"] - week).abs() <= WINDOW_GW, "value"]
             enough = near if len(near) >= LEAST_BRAINS else near.iloc[:0]
             quantiles = enough.quantile(list(QUANTILES.values()))
-            rows.append((*names, known["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
+            rows.append((*names, brains["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
     columns = ["hemisphere", "metric", "unit", "week", "brains", "mean", "sd", *QUANTILES]
     return pd.DataFrame(rows, columns=columns)
 
@@ -152,12 +152,12 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
     scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the reference's
     weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
     """
-    known = dict(_by_metric(metrics, reference))
+    by_metric = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     table = metrics.assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
     for row, alike in zip(table[names].to_dict("records"), table["alike"], strict=True):
-        others = known.get((row["hemisphere"], row["metric"]))
+        others = by_metric.get((row["hemisphere"], row["metric"]))
         if others is None:
             continue
         # a measured brain is compared with the others
@@ -175,13 +175,13 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
     """
     sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
-    known = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    return sides.isin(sides[known])
+    of_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    return sides.isin(sides[of_reference])
 
 
 def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
-    known = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
-    return list(known[~known["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
+    rows = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    return list(rows[~rows["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
 
 
 class _Curve(NamedTuple):
@@ -215,13 +215,13 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]
-    for (hemisphere, metric), known in _by_metric(metrics, reference):
-        weeks, values = known["week"].to_numpy(dtype=float), known["value"].to_numpy(dtype=float)
+    for (hemisphere, metric), brains in _by_metric(metrics, reference):
+        weeks, values = brains["week"].to_numpy(dtype=float), brains["value"].to_numpy(dtype=float)
         at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
         if (curve := _curve(weeks, values, at)) is not None:
             half = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd * np.sqrt(1 + curve.leverage)
             band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}
-            names = {"hemisphere": hemisphere, "metric": metric, "unit": known["unit"].iloc[0]}
+            names = {"hemisphere": hemisphere, "metric": metric, "unit": brains["unit"].iloc[0]}
             parts.append(pd.DataFrame(band).assign(**names)[columns])
     return pd.concat(parts[1:] or parts, ignore_index=True)
 

@@ -49,9 +49,9 @@ def region_metrics(
         label = np.asarray(labels[side])
         unknown = sorted({int(number) for number in np.unique(label)} - {UNLABELLED, *names})
         if unknown or len(label) != len(mesh.vertices):
-            found = f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}"
+            summary = f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}"
             expected = f"{len(mesh.vertices)} labels, each named"
-            raise InputError(f"regions of the {side} hemisphere do not fit", found=found, expected=expected)
+            raise InputError(f"regions of the {side} hemisphere do not fit", found=summary, expected=expected)
         areas, total = vertex_areas(mesh), area(mesh)
         reliable = np.asarray(maps[side].get("reliable", np.ones(len(label))), dtype=bool)
         for number, name in names.items():

@@ -143,7 +143,8 @@ def spectrum(
 
 
 def _powers(band: Ints, coefficients: Floats) -> Floats:
-    return np.array([np.sum(coefficients[own] ** 2) if (own := band == k).any() else np.nan for k in range(BANDS + 1)])
+    parts = [coefficients[band == k] for k in range(BANDS + 1)]
+    return np.array([np.sum(part**2) if len(part) else np.nan for part in parts])
 
 
 def _relative(power: Floats) -> Floats:
@@ -198,10 +199,10 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     fine = resolved.eq(True).to_numpy()
     whole = powers.reindex(complete.index).where(complete.eq(True)).to_numpy(dtype=float)
     rows = [
-        (*own, other[0], other[2], *row)
-        for i, own in enumerate(hemispheres)
+        (*one, other[0], other[2], *row)
+        for i, one in enumerate(hemispheres)
         for j, other in enumerate(hemispheres)
-        if other[1] == MEASURED and other[3] == own[3] and i != j
+        if other[1] == MEASURED and other[3] == one[3] and i != j
         for row in _distances(whole[i], whole[j], fine[i] & fine[j])
     ]
     table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])

@@ -52,8 +52,8 @@ def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]])
     wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first")
     brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
     wide = wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)
-    known = dict.fromkeys(name for of_brain in covariates.values() for name in of_brain if name not in wide)
-    for place, name in enumerate(known, start=len(BRAIN)):
+    columns = dict.fromkeys(name for of_brain in covariates.values() for name in of_brain if name not in wide)
+    for place, name in enumerate(columns, start=len(BRAIN)):
         wide.insert(place, name, [covariates.get(brain, {}).get(name) for brain in wide["subject"]])
     return wide
 

@@ -42,8 +42,8 @@ def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats
     # cut in its present shape: linear along the edges, so the points are those of the start
     border = grid.contour([1.0], scalars="depth").triangulate()
     if not border.n_cells:
-        found = f"points at most {float(np.max(depth)):.3g} cortical thicknesses deep"
-        raise MeshError("the brain has no core", found=found, expected="more than 1")
+        deepest = f"points at most {float(np.max(depth)):.3g} cortical thicknesses deep"
+        raise MeshError("the brain has no core", found=deepest, expected="more than 1")
     inner = TriangleMesh(np.asarray(border.points, dtype=float), border.faces.reshape(-1, 4)[:, 1:])
     return layer_thickness(pial, inner)
 
@@ -55,6 +55,6 @@ def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray
     """
     away, nearest = cKDTree(whole.vertices).query(part.vertices)
     if len(values) != len(whole.vertices) or away.max() > SAME_POINT_MM:
-        found = f"{len(values)} values; vertices of the part up to {away.max():.3g} mm from those of the whole"
-        raise InputError("values do not belong to the surface", found=found, expected=f"{len(whole.vertices)} values")
+        sizes = f"{len(values)} values; vertices of the part up to {away.max():.3g} mm from those of the whole"
+        raise InputError("values do not belong to the surface", found=sizes, expected=f"{len(whole.vertices)} values")
     return values[nearest]

@@ -114,12 +114,12 @@ def dotted(path: Key) -> str:
     return text.removeprefix(".")
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, names: Iterable[str]) -> str:
     """Return a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
-    known = list(known)
-    longer = [other for other in known if other.endswith(f"_{name}")]
-    near = longer or difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+    names = list(names)
+    longer = [other for other in names if other.endswith(f"_{name}")]
+    near = longer or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:

@@ -91,8 +91,8 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
     start = frames[0][1].vertices
     for week, mesh, maps in frames:
         if mesh.vertices.shape != start.shape:
-            found = f"{len(mesh.vertices)} vertices at {week:g} GW"
-            raise InputError("a run's surfaces differ in their vertices", found=found, expected=f"{len(start)}")
+            count = f"{len(mesh.vertices)} vertices at {week:g} GW"
+            raise InputError("a run's surfaces differ in their vertices", found=count, expected=f"{len(start)}")
         maps[DISPLACEMENT] = np.linalg.norm(mesh.vertices - start, axis=1)
     return list(frames)
 

@@ -144,7 +144,7 @@ def _whole(one: Simulation) -> dict[float, str]:
 
 def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
     """Return the measured brains that runs are shown beside, by week."""
-    return {float(week): brain for one in runs for week, brain in one.beside.items()}
+    return {float(week): brain for one in runs for week, brain in one.measured_by_week.items()}
 
 
 def _of_brains(study: Study) -> Iterator[Figure]:

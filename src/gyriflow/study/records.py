@@ -238,7 +238,7 @@ class Simulation:
         return [float(week) for week in self.real]
 
     @property
-    def beside(self) -> dict[str, Brain]:
+    def measured_by_week(self) -> dict[str, Brain]:
         """The measured brain that it is shown beside, by week, the start at its own week."""
         return {self.week_tags[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
 
@@ -327,10 +327,10 @@ class Simulation:
         expected = self.at(float(week))
         rows = {"start": self.start.measured, "first": self.at(self.start.week), "expected": expected}
         rows["real"] = self.real[week].measured
-        known = all(row.thickness for row in rows.values())
+        complete = all(row.thickness for row in rows.values())
         return {
             **{name: row.parts["whole"] for name, row in rows.items()},
-            "thickness": [str(row.thickness) for row in rows.values()] if known else [],
+            "thickness": [str(row.thickness) for row in rows.values()] if complete else [],
             "sides": expected.hemispheres,
             "regions": list(expected.regions.values()),
         }

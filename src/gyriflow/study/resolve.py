@@ -29,20 +29,20 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     refused and there are such.
     """
     brains = {given.id: _brain(given, config, refused) for given in config.brains if given.id not in refused}
-    known, series = list(brains.values()), series_of(config, brains)
+    accepted, series = list(brains.values()), series_of(config, brains)
     foldings, members = _foldings(config, brains)
-    chains = _chains(foldings, series, known)
+    chains = _chains(foldings, series, accepted)
     unreachable = _unreachable(foldings, series, chains)
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
     if unreachable:
         foldings, members = _foldings(config, brains, unreachable)
-        chains = _chains(foldings, series, known)
-    simulations = {(one.run, one.start.id): _simulation(config, one, series, chains, known) for one in foldings}
+        chains = _chains(foldings, series, accepted)
+    simulations = {(one.run, one.start.id): _simulation(config, one, series, chains, accepted) for one in foldings}
     calibration = None
     if (asked := config.calibrate) is not None:
         base = tuple(one for one in simulations.values() if one.run == asked.base)
-        real = {one.start.id: _compared_with(asked, one.start, known) for one in base}
+        real = {one.start.id: _compared_with(asked, one.start, accepted) for one in base}
         calibration = Calibration(base, asked.runs, real) if base else None
     return Study(
         config=config,
@@ -50,7 +50,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         series=series,
         simulations=simulations,
         chains=chains,
-        comparisons=_comparisons(config, members, simulations.values(), known),
+        comparisons=_comparisons(config, members, simulations.values(), accepted),
         calibration=calibration,
         unreachable=unreachable,
     )
@@ -155,9 +155,9 @@ def _members(config: Config, foldings: Sequence[_Folding]) -> dict[str, list[Mem
     They share one of the `foldings` of `runs` where these have all of their weeks.
     """
     wanted = [
-        (name, own, values, changed(config.runs[study.base], study.changes(values)))
+        (name, member, values, changed(config.runs[study.base], study.changes(values)))
         for name, study in config.studies.items()
-        for own, values in variants(name, study)
+        for member, values in variants(name, study)
     ]
     weeks: dict[str, set[float]] = {}
     for *_, settings in wanted:
@@ -168,8 +168,8 @@ def _members(config: Config, foldings: Sequence[_Folding]) -> dict[str, list[Mem
         if all(weeks.get(_model(run), set()) <= set(one.weeks) for one in foldings if one.run == name)
     }
     members: dict[str, list[Member]] = {name: [] for name in config.studies}
-    for name, own, values, settings in wanted:
-        run = solved.setdefault(_model(settings), own)
+    for name, member, values, settings in wanted:
+        run = solved.setdefault(_model(settings), member)
         complete = config.runs.get(run) or changed(settings, {"end_week": max(weeks[_model(settings)])})
         members[name].append(Member(run, values, complete))
     return members
@@ -239,12 +239,12 @@ def _atlas_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     """
     names = series.of_others(start)
     members = series.brains[names[0]] if len(names) == 1 else ()
-    known = sorted({week_tag(brain.week): brain for brain in members}.values(), key=lambda brain: brain.week)
-    if not known:
+    weekly = sorted({week_tag(brain.week): brain for brain in members}.values(), key=lambda brain: brain.week)
+    if not weekly:
         return [start]
-    first = max((brain.week for brain in known if brain.week <= start.week), default=known[0].week)
-    last = min((brain.week for brain in known if brain.week >= end and brain.week > first), default=end)
-    return [start, *(brain for brain in known if first <= brain.week <= last)]
+    first = max((brain.week for brain in weekly if brain.week <= start.week), default=weekly[0].week)
+    last = min((brain.week for brain in weekly if brain.week >= end and brain.week > first), default=end)
+    return [start, *(brain for brain in weekly if first <= brain.week <= last)]
 
 
 def _unreachable(foldings: Iterable[_Folding], series: Series, chains: Chains) -> dict[str, InputError]:
@@ -255,11 +255,11 @@ def _unreachable(foldings: Iterable[_Folding], series: Series, chains: Chains) -
         if origin is None:
             continue
         chain = chains[start.id, origin]
-        found = ", ".join(f"{brain.id} ({brain.week:g} GW)" for brain in chain.brains)
+        available = ", ".join(f"{brain.id} ({brain.week:g} GW)" for brain in chain.brains)
         if origin == "self":
-            names = [name for name in [series.with_brain(start)] if name]
+            names = [name] if (name := series.with_brain(start)) else []
             near = len(chain.brains) > 1
-            found += "".join(f"; {series.unmatched[name]}" for name in names if name in series.unmatched)
+            available += "".join(f"; {series.unmatched[name]}" for name in names if name in series.unmatched)
             expected = "the start's own growth series with label volumes or matched surfaces"
             remedy = "Add later brains to its series (growth.brains), or grow by sizes or rates."
         else:
@@ -270,12 +270,12 @@ def _unreachable(foldings: Iterable[_Folding], series: Series, chains: Chains) -
         if near and chain.weeks[-1] >= end:
             continue
         if not names:
-            found = f"none; the growth series are {', '.join(series.brains)}"
+            available = f"none; the growth series are {', '.join(series.brains)}"
         elif len(names) > 1:
-            found = f"several series: {', '.join(names)}"
+            available = f"several series: {', '.join(names)}"
         text = f"run {one.run} from {start.id} is to grow towards brains that are not there"
         expected = f"brains of {expected}, from {start.week:g} to {end:g} GW"
-        errors.setdefault(start.id, InputError(text, found=found, expected=expected, remedy=remedy))
+        errors.setdefault(start.id, InputError(text, found=available, expected=expected, remedy=remedy))
     return errors
 
 
@@ -325,8 +325,8 @@ def _compared_with(compared: Compared, start: Brain, brains: Iterable[Brain]) ->
     if compared.compare_with is not None:
         return tuple(brain for brain in brains if brain.id in compared.compare_with)
     of_week = [brain for brain in brains if brain.week == compared.compare_week]
-    own = [brain for brain in of_week if brain.given.population == start.given.population]
-    return tuple(own or of_week)
+    alike = [brain for brain in of_week if brain.given.population == start.given.population]
+    return tuple(alike or of_week)
 
 
 def _comparisons(

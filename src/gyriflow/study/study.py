@@ -232,7 +232,7 @@ class Study:
     def giver_of_regions(self, brain: str) -> Brain:
         """Return the brain with given regions that is nearest in week."""
         week = self.brains[brain].week
-        given = [known for known in self.brains.values() if known.regions_from == "given"]
+        given = [one for one in self.brains.values() if one.regions_from == "given"]
         return min(given, key=lambda other: abs(other.week - week))
 
     def region_inputs(self, brain: str) -> dict[str, str]:

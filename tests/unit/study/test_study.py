@@ -180,7 +180,7 @@ def test_later_scans_of_the_subject_come_first(labels):
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
     found = study([{"id": f"b{week}", "week": week, **SPHERE} for week in (21, 22)])
     (one,) = found.folded
-    assert {week: brain.id for week, brain in one.beside.items()} == {"21.00": "b21", "22.00": "b22"}
+    assert {week: brain.id for week, brain in one.measured_by_week.items()} == {"21.00": "b21", "22.00": "b22"}
     assert one.real == {}
     alone = study([{"id": "b21", "week": 21, **SPHERE}])
     assert alone.growing == alone.validated == []
