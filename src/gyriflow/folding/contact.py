@@ -122,7 +122,7 @@ class SelfContact:
         self._edges = edges(TriangleMesh(start, faces))[0]
         # ranks on different processors may round differently, but each vertex has one owner
         self._owner = domain.comm.bcast(shared_out(start, domain.comm.size), root=0)
-        self._search = ipctk.LBVH()
+        self._broad_phase = ipctk.LBVH()
         self._candidates = ipctk.Candidates()
         self._part_range: SearchRange | None = None
         self._candidates_range: SearchRange | None = None
@@ -176,7 +176,7 @@ class SelfContact:
             way = max(float(np.abs(place - places[0]).max()) for place in places)
             # a single rank's part is the whole surface, wherever it moves
             room = max(ROOM_MM, way) if self.domain.comm.size > 1 else np.inf
-            self._part_range = SearchRange(places[0], self.distance_mm / 2 + room)
+            self._part_range = SearchRange(places[0], places[0], self.distance_mm / 2 + room)
             owned = self._owner == self.domain.comm.rank
             self._part = part_of_surface(places[0], self._faces, owned, 2 * self._part_range.reach)
             self._follow = self._weights[self._part.vertices]
@@ -196,10 +196,9 @@ class SelfContact:
         if self._known is None or not np.array_equal(u, self._known.displacement):
             whole = self._start + u * MM_PER_M
             surface, part = self._surface_at(whole)
+            if not self._searched(whole):
+                surface, part = self._search_on_way(self._start, whole)
             positions = part.at(whole)
-            if self._candidates_range is None or not self._candidates_range.at(self.distance_mm, whole):
-                self._candidates_range = SearchRange(whole, self.distance_mm / 2 + MARGIN_MM)
-                self._candidates.build(surface, positions, self._candidates_range.reach, self._search)
             pairs = ipctk.NormalCollisions()
             pairs.use_area_weighting = True
             pairs.build(self._candidates, surface, positions, self.distance_mm)
@@ -298,12 +297,25 @@ class SelfContact:
         whole = self._start + state.displacement * MM_PER_M
         end = whole + way
         surface, part = self._surface_at(whole, end)
+        if not self._searched(whole, end) and np.abs(way).max() <= ROOM_MM:
+            # a step's first guess leads nearly to its end, so that this search serves the whole step
+            surface, part = self._search_on_way(whole, end)
         ends = part.at(whole), part.at(end)
-        if self._candidates_range is not None and self._candidates_range.at(self.distance_mm, whole, end):
+        if self._searched(whole, end):
             return float(self._candidates.compute_collision_free_stepsize(surface, *ends, narrow_phase_ccd=SWEEP))
         return float(
-            ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._search, narrow_phase_ccd=SWEEP)
+            ipctk.compute_collision_free_stepsize(surface, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=SWEEP)
         )
+
+    def _searched(self, *places: Floats) -> bool:
+        return self._candidates_range is not None and self._candidates_range.at(self.distance_mm, *places)
+
+    def _search_on_way(self, first: Floats, last: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
+        surface, part = self._surface_at(first, last)
+        reach = self.distance_mm / 2 + MARGIN_MM
+        self._candidates_range = SearchRange(first, last, reach)
+        self._candidates.build(surface, part.at(first), part.at(last), reach, self._broad_phase)
+        return surface, part
 
     def smallest_distance_mm(self) -> float:
         """Return the smallest distance between parts of the surface that do not adjoin, infinite if none is near."""

@@ -53,15 +53,19 @@ class SurfacePart:
 
 @dataclass(frozen=True, eq=False)
 class SearchRange:
-    """A search for all pairs within twice a reach, and the positions (s, 3) in mm that the surface had at it."""
+    """A search for all pairs within twice a reach on the way of the surface from (s, 3) positions in mm to others."""
 
-    centre: Floats
+    first: Floats
+    last: Floats
     reach: float
 
     def at(self, distance_mm: float, *places: Floats) -> bool:
         """Return whether the search found all pairs that are within a distance at some other positions."""
         margin = self.reach - distance_mm / 2
-        return all(bool(np.abs(place - self.centre).max() <= margin) for place in places)
+        if np.isinf(margin):
+            return True
+        low, high = np.minimum(self.first, self.last) - margin, np.maximum(self.first, self.last) + margin
+        return all(bool((place >= low).all() and (place <= high).all()) for place in places)
 
 
 def shared_out(positions: Floats, ranks: int) -> NDArray[np.int64]:

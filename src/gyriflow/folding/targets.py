@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
-from ..geometry.diffusion import cell_sizes, diffuse, vertex_sizes
+from ..geometry.diffusion import MovingStiffness, diffuse, vertex_sizes
+from ..geometry.jacobians import chunks
+from ..geometry.tetrahedra import gradients
 from ..parameters.folding import AXES, FoldingParameters
 from .growth import Floats, Growth, GrowthInputs, Size, StepStart
 from .layers import Tissue
@@ -25,7 +28,7 @@ SMALL = 0.12
 """Largest entry of FᵀF − 1 for which the logarithm is taken by its series."""
 SMOOTHING_MM = 1.5
 """Standard deviation that growth is smoothed with in space."""
-SMOOTHED_TO = 1e-5
+SMOOTHED_TO = 1e-3
 """Relative tolerance of smoothing; the next step makes up for what is left."""
 SOON_GW = 1e-6
 """Time before which a target is taken to be reached."""
@@ -56,12 +59,14 @@ class TargetGrowth(Growth):
 class GrowthToTargets:
     """The model of growth towards shapes of the whole mesh at later weeks.
 
-    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose.
+    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose;
+    `stiffness` gives the matrices that growth is smoothed with.
     """
 
     parameters: FoldingParameters
     inputs: GrowthInputs
     targets: Mapping[float, Floats]
+    stiffness: MovingStiffness
 
     @classmethod
     def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
@@ -75,7 +80,7 @@ class GrowthToTargets:
                 found=f"shapes up to {max(targets):g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, targets)
+        return cls(p, inputs, targets, MovingStiffness(inputs.pieces, len(inputs.zones.growth)))
 
     def growth(self, start: StepStart) -> Growth:
         """Return the growth of a step: its part of what is left to the next target.
@@ -96,25 +101,33 @@ class GrowthToTargets:
             before = laid(self.targets[since], places)
         share = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
         aim = before + share * (laid(self.targets[ahead[0]], before) - before)
-        strain = log_growth(places, self.inputs.pieces, aim - places, SMOOTHING_MM)
+        strain = log_growth(places, self.inputs.pieces, aim - places, SMOOTHING_MM, self.stiffness.at(places))
         away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(self.parameters, start, (strain * growing).T, away)
 
 
-def log_growth(positions: Floats, pieces: np.ndarray, displacement: Floats, smoothing_mm: float) -> Floats:
+def log_growth(
+    positions: Floats,
+    pieces: np.ndarray,
+    displacement: Floats,
+    smoothing_mm: float,
+    stiffness: sparse.csr_matrix | None = None,
+) -> Floats:
     """Return the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
-    Positions and displacement are (n, 3) in mm, `pieces` (p, 4) linear tetrahedra.
+    Positions and displacement are (n, 3) in mm, `pieces` (p, 4) linear tetrahedra, `stiffness` as in `diffuse`.
     """
-    after = positions + displacement
-    edges = [np.swapaxes(at[pieces[:, 1:]] - at[pieces[:, :1]], 1, 2) for at in (positions, after)]
-    F = edges[1] @ np.linalg.inv(edges[0])
-    parts = packed(log_stretch(F)) * (cell_sizes(positions, pieces) / 4)[:, None]
+    after, parts = positions + displacement, np.empty((len(pieces), 6))
+    for chunk in chunks(len(pieces)):
+        corners = pieces[chunk]
+        slopes, volumes = gradients(positions, corners)
+        edges = np.swapaxes(after[corners[:, 1:]] - after[corners[:, :1]], 1, 2)
+        parts[chunk] = packed(log_stretch(edges @ slopes)) * (volumes / 4)[:, None]
     sums = [np.bincount(pieces.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
     sizes = vertex_sizes(positions, pieces)
     mean = np.stack(sums, axis=1) / np.where(sizes > 0, sizes, 1.0)[:, None]
-    return diffuse(positions, pieces, mean, smoothing_mm, steps=1, tolerance=SMOOTHED_TO)
+    return diffuse(positions, pieces, mean, smoothing_mm, steps=1, tolerance=SMOOTHED_TO, stiffness=stiffness)
 
 
 def log_stretch(F: Floats) -> Floats:

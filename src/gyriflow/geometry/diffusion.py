@@ -5,8 +5,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .tetrahedra import volumes_between
-from .triangles import Floats, TriangleMesh, face_areas
+from .jacobians import EDGES, chunks
+from .tetrahedra import gradients, volumes_between
+from .triangles import Floats, Ints, TriangleMesh, face_areas
 
 STEPS = 8
 """Implicit steps: their product has the Gaussian's variance, and nearly its shape."""
@@ -33,18 +34,21 @@ def diffuse(
     *,
     steps: int = STEPS,
     tolerance: float = 1e-8,
+    stiffness: sparse.csr_matrix | None = None,
 ) -> Floats:
     """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2, which keep the
     integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. Fewer `steps`
-    make tails longer than a Gaussian's; each is solved to a relative `tolerance`.
+    make tails longer than a Gaussian's; each is solved to a relative `tolerance`. `stiffness` is the stiffness matrix,
+    where it is there already.
     """
     if sigma_mm == 0:
         return values.copy()
     mass = vertex_sizes(vertices, cells)
     mass = np.where(mass > 0, mass, 1.0)
-    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness_matrix(vertices, cells))
+    stiffness = stiffness_matrix(vertices, cells) if stiffness is None else stiffness
+    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness)
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(steps):
         smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
@@ -86,8 +90,8 @@ def conjugate_gradients(matrix: sparse.csr_matrix, right: Floats, start: Floats,
         product = matrix @ direction
         # a column that is solved exactly has no direction any more
         length = slope / np.where(left, np.einsum("ij,ij->j", direction, product), np.inf)
-        solution += length * direction
-        residual -= length * product
+        solution += np.multiply(length, direction, out=preconditioned)
+        residual -= np.multiply(length, product, out=product)
         np.multiply(inverse, residual, out=preconditioned)
         before, slope = slope, np.einsum("ij,ij->j", residual, preconditioned)
         direction *= slope / np.where(left, before, np.inf)
@@ -99,3 +103,34 @@ def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr
     """Return the (n, n) stiffness matrix of linear finite elements, positive semidefinite."""
     cotangents = igl.cotmatrix(np.ascontiguousarray(vertices), np.ascontiguousarray(cells, dtype=np.int64))
     return sparse.csr_matrix(-cotangents)
+
+
+class MovingStiffness:
+    """The stiffness matrices of (m, 4) tetrahedra between n vertices that move.
+
+    Where their entries stand is found once, which takes longer than all else.
+    """
+
+    def __init__(self, tets: Ints, count: int) -> None:
+        self._tets = tets
+        ends = np.stack([np.sort(tets[:, pair], axis=1) for pair in EDGES], axis=1)
+        numbers, self._edge = np.unique(ends[..., 0] * count + ends[..., 1], return_inverse=True)
+        self._ends = np.divmod(numbers, count)
+        vertices = np.arange(count)
+        rows, columns = (np.concatenate([*ends, vertices]) for ends in (self._ends, self._ends[::-1]))
+        self._places = sparse.coo_matrix((np.arange(len(rows)), (rows, columns))).tocsr()
+
+    def at(self, vertices: Floats) -> sparse.csr_matrix:
+        """Return the (n, n) matrix as `stiffness_matrix` does, for (n, 3) positions in mm."""
+        of_pairs = np.empty((len(self._tets), len(EDGES)))
+        for part in chunks(len(self._tets)):
+            slopes, volumes = gradients(vertices, self._tets[part])
+            slopes = np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1)
+            for k, (i, j) in enumerate(EDGES):
+                of_pairs[part, k] = volumes * np.einsum("ij,ij->i", slopes[:, i], slopes[:, j])
+        between = np.bincount(self._edge.ravel(), of_pairs.ravel())
+        count = len(vertices)
+        # rows sum to zero
+        own = -sum(np.bincount(ends, between, minlength=count) for ends in self._ends)
+        entries = np.concatenate([between, between, own])[self._places.data]
+        return sparse.csr_matrix((entries, self._places.indices, self._places.indptr), shape=(count, count))

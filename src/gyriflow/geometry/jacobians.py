@@ -7,6 +7,7 @@ weights that are positive and sum to 1 everywhere, it lies between the least and
 """
 
 import math
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -68,12 +69,17 @@ def determinants(matrices: Floats) -> Floats:
     )
 
 
+def chunks(count: int) -> Iterator[slice]:
+    """Yield the parts of a number of elements that the processor's cache holds."""
+    for first in range(0, count, CHUNK):
+        yield slice(first, first + CHUNK)
+
+
 def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
     """Return the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
     values = np.empty((len(tets), len(slopes)))
     by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
-    for first in range(0, len(tets), CHUNK):
-        chunk = slice(first, first + CHUNK)
+    for chunk in chunks(len(tets)):
         maps = np.matmul(by_node, np.take(vertices, tets[chunk], axis=0))
         values[chunk] = determinants(maps.reshape(len(maps), -1, 3, 3))
     return values
