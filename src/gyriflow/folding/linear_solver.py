@@ -21,7 +21,7 @@ from .tangent import Tangent, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
 PLAIN, SHIFTED = range(2)
-PARTS = 128
+PARTS = 256
 """Parts of the mesh whose rigid motions are the coarse level."""
 LIFETIME = 8
 """Tangents that a coarse level serves."""
