@@ -189,7 +189,7 @@ class RunDisplay:
     def _tell_warnings(self, job: Job) -> None:
         self._follow(job)
         for message in messages_in(read_log(job.log)) if job.log else ():
-            if message.own and message.level == "warning":
+            if message.by_gyriflow and message.level == "warning":
                 self._warn(job, message.text.partition("\n")[0])
 
     def _warn(self, job: Job, text: str) -> None:

@@ -17,9 +17,9 @@ TIMEOUT_S = (15.0, 60.0)
 Say = Callable[[str], None]
 
 
-def require_checksums(known: Mapping[str, tuple[str, str]]) -> None:
-    """Raise InputError where a file is not that of an atlas: by its path `known` has the atlas and the SHA-256."""
-    for path, (atlas, sha256) in known.items():
+def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
+    """Raise InputError where a file is not that of an atlas: by its path `recorded` has the atlas and the SHA-256."""
+    for path, (atlas, sha256) in recorded.items():
         if sha256_of(path) != sha256:
             remedy = "Delete it, and it is fetched; or give a changed file as a brain of your own under brains."
             raise InputError(f"is not the file of {atlas}", path=path, expected=f"the SHA-256 {sha256}", remedy=remedy)

@@ -41,7 +41,7 @@ class Message(NamedTuple):
 
     level: str
     text: str
-    own: bool
+    by_gyriflow: bool
 
 
 def messages_in(text: str) -> Iterator[Message]:
@@ -62,7 +62,7 @@ def cause(text: str) -> str:
     """
     # what the program has said last is what it says on the terminal, before what was logged
     said = [match["error"].strip() for match in MESSAGE.finditer(text) if match["error"]]
-    errors = said or [message.text for message in messages_in(text) if message.own and message.level == "error"]
+    errors = said or [message.text for message in messages_in(text) if message.by_gyriflow and message.level == "error"]
     if errors and not errors[0].startswith("unexpected error"):
         return errors[0]
     raised = [line for line in RAISED.findall(text) if not line.partition(":")[0].endswith(OF_SNAKEMAKE)]

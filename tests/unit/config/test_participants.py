@@ -12,7 +12,7 @@ FOLDING = {"end_week": 26}
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "bids").mkdir()
-    for name in ("a.nii.gz", "lh.surf.gii", "rh.surf.gii", "sub-9_dseg.nii.gz"):
+    for name in ("a.nii.gz", "lh.surf.gii", "rh.surf.gii", "sub-9;T2_dseg.nii.gz"):
         (tmp_path / "bids" / name).touch()
     return tmp_path
 
@@ -30,43 +30,31 @@ def config(folder, participants="bids/participants.tsv", **more):
 def test_rows_are_brains_whatever_their_files_are_of(folder):
     write(
         folder,
-        ("participant_id", "sex", "week", "files", "side", "scheme", "population"),
-        ("sub-1", "F", "24.5", "a.nii.gz", "n/a", "feta-7", "n/a"),
-        ("sub-2", "M", "25", "rh.surf.gii; lh.surf.gii", "n/a", "n/a", "twins"),
-        ("sub-3", "M", "25", "a.nii.gz", "left", "feta-7", "n/a"),
+        ("participant_id", "sex", "week", "files", "side", "scheme", "population", "white"),
+        ("sub-1", "F", "24.5", "a.nii.gz", "n/a", "feta-7", "n/a", "n/a"),
+        ("sub-2", "M", "25", "rh.surf.gii; lh.surf.gii", "n/a", "n/a", "twins", "rh.surf.gii; lh.surf.gii"),
+        ("sub-3", "M", "25", "a.nii.gz", "left", "feta-7", "n/a", "n/a"),
     )
     brains = {brain.id: brain for brain in config(folder).brains}
     assert brains["sub-1"].labels == str(folder / "bids" / "a.nii.gz")
     assert (brains["sub-1"].week, brains["sub-1"].scheme, brains["sub-1"].population) == (24.5, "feta-7", None)
     assert brains["sub-2"].source == "hemispheres"
     assert brains["sub-2"].population == "twins"
+    assert list(brains["sub-2"].white) == [str(folder / "bids" / f"{side}.surf.gii") for side in ("rh", "lh")]
     assert brains["sub-1"].covariates == {"sex": "F"}
     assert brains["sub-3"].sides == ("left",)
     assert brains["sub-3"].label_volume == str(folder / "bids" / "a.nii.gz")
-
-
-def test_only_white_surfaces_may_be_two_with_a_semicolon_between(folder):
-    (folder / "bids" / "a;b.nii.gz").touch()
-    head = ("id", "week", "labels", "scheme", "files", "white")
-    write(
-        folder,
-        head,
-        ("sub-1", "24", "a;b.nii.gz", "feta-7", "n/a", "n/a"),
-        ("sub-2", "24", "n/a", "n/a", "lh.surf.gii; rh.surf.gii", "lh.surf.gii; rh.surf.gii"),
-    )
-    labelled, surfaces = config(folder).brains
-    assert labelled.labels == str(folder / "bids" / "a;b.nii.gz")
-    assert list(surfaces.white) == [str(folder / "bids" / f"{side}.surf.gii") for side in ("lh", "rh")]
 
 
 def test_values_for_all_rows_stand_in_the_configuration(folder):
     write(folder, ("id", "gestational_age"), ("sub-9", "24"))
     section = {
         "file": "bids/participants.tsv",
-        "columns": {"labels": "{id}_dseg.nii.gz", "scheme": "feta-7"},
+        # a semicolon in the name of a file that no other stands beside
+        "columns": {"labels": "{id};T2_dseg.nii.gz", "scheme": "feta-7"},
     }
     (brain,) = load({"participants": section, "start": "sub-9", "folding": FOLDING}, folder).brains
-    assert brain.labels == str(folder / "bids" / "sub-9_dseg.nii.gz")
+    assert brain.labels == str(folder / "bids" / "sub-9;T2_dseg.nii.gz")
 
 
 def test_rows_that_cannot_be_used_are_problems_or_left_out_with_their_cause(folder):
