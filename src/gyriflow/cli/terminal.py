@@ -70,7 +70,7 @@ class RunDisplay:
         self.failed: list[dict[str, Any]] = []
         self.warned: set[tuple[str, str]] = set()
         self.of_failed_jobs: list[str] = []
-        self.problems = self.interrupted = False
+        self.interrupted = False
 
     def watch(self, lock: AbstractContextManager) -> None:
         """Follow the jobs, and keep the state of the run for `gyriflow status`, until the run ends."""
@@ -112,7 +112,6 @@ class RunDisplay:
                 elif record.levelno >= logging.WARNING and text.startswith(OF_FAILED_JOBS):
                     self.of_failed_jobs.append(text)
                 elif record.levelno >= logging.WARNING and text:
-                    self.problems = True
                     self.console.print(text)
 
     def _fail(self, said: Mapping[str, Any]) -> None:
@@ -172,7 +171,7 @@ class RunDisplay:
             self.console.print(f"gyriflow: {failed}, {done}; the same command goes on from here")
         elif self.of_failed_jobs:
             self.console.print("\n".join(self.of_failed_jobs))
-        elif self.total and self.done == self.total and not self.problems:
+        elif self.total and self.done == self.total:
             report = f"; report: {REPORT.absolute()}" if REPORT.is_file() else ""
             self.console.print(f"gyriflow: done in {took}{report}")
 

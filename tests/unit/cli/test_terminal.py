@@ -60,12 +60,14 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
         run.display.tick()
         run.now += 2.0
         run.end(number, number + 1, 100)
+    run.tell(text="a warning of Snakemake's", level=logging.WARNING)
     run.display.end()
     assert run.lines[0].startswith("gyriflow: 100 steps to do; all details: ")
     assert run.lines[1] == "  0 %  measure b0"
     assert run.lines[11] == " 50 %  2 min left  measure b50"
+    assert run.lines[-2] == "a warning of Snakemake's"
     assert run.lines[-1].startswith("gyriflow: done in ")
-    assert len(run.lines) == 22
+    assert len(run.lines) == 23
     assert "\x1b" not in "".join(run.lines)
     assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
 
