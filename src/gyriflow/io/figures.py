@@ -16,7 +16,7 @@ WIDTHS = (1800, 1400, 1100, 800)
 """Widths in pixels that pictures are tried with, until all of them together fit."""
 QUALITY = 82
 
-DPI = 300
+DPI = 200
 """Resolution of pictures as PNG, in dots per inch."""
 
 TABLE_LOOK = (

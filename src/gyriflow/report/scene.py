@@ -58,7 +58,7 @@ VIEWS = {
 """The views by name. In the top view the brain's left is on the picture's left."""
 
 PIXELS_PER_INCH = 600
-"""Resolution of pictures of surfaces: that of the PDF files, and twice that of PNG files at 300 dots per inch."""
+"""Resolution of pictures of surfaces: that of the PDF files, and three times that of PNG files."""
 
 PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
 """Parts of colour maps that are used: their darkest ends could be taken for shade."""
