@@ -259,7 +259,10 @@ def measure_brain(
     curvature_radius_mm, spangy_modes
         See `curvature.curvature` and `spangy.modes_of`.
 
-    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
+    Raises
+    ------
+    MeshError
+        Where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _require_outward(whole, *meshes.values())
