@@ -7,7 +7,7 @@ from gyriflow.parameters.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
-settings = dict(params.settings, threads=snakemake.threads)
+settings = dict(params.settings)
 with step(snakemake.log[0]):
     if files.get("thickness"):
         (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()

@@ -4,12 +4,8 @@ A metric is a row (name, value, unit) of `size_rows` (of any surface), `folding_
 `thickness_rows` or `spectrum_rows` (of a hemisphere); a map is an entry of `Hemisphere.maps`.
 """
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -233,7 +229,6 @@ def measure_brain(
     *,
     thickness_mm: Floats | None = None,
     label_volumes_ml: Mapping[str, float] | None = None,
-    threads: int = 1,
     curvature_radius_mm: float = CURVATURE_RADIUS_MM,
     spangy_modes: SpangyModes = SPANGY_MODES,
 ) -> BrainMetrics:
@@ -254,8 +249,6 @@ def measure_brain(
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
     label_volumes_ml
         Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
-    threads
-        With two or more, the hemispheres are measured at the same time, each in a process of its own.
     curvature_radius_mm, spangy_modes
         See `curvature.curvature` and `spangy.modes_of`.
 
@@ -266,11 +259,10 @@ def measure_brain(
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _require_outward(whole, *meshes.values())
-    jobs = []
+    sides = []
     for name, mesh in meshes.items():
         thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
-        jobs.append((name, mesh, thickness, curvature_radius_mm, spangy_modes))
-    sides = _in_processes(jobs, threads) if threads > 1 else [measure_hemisphere(*job) for job in jobs]
+        sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
     rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
     rows += [("whole", metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
@@ -290,15 +282,6 @@ def _require_outward(*meshes: TriangleMesh) -> None:
         if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
             volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
             raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
-
-
-def _in_processes(jobs: Sequence[tuple], processes: int) -> list[Hemisphere]:
-    # PETSc cannot be used by threads; forked, since a new interpreter would run the calling script again; what MPI
-    # leaves behind goes with the folder
-    with TemporaryDirectory(prefix="gyriflow-") as folder:
-        before = os.environ.update, ({"TMPDIR": folder},)
-        with ProcessPoolExecutor(min(processes, len(jobs)), get_context("fork"), *before) as pool:
-            return list(pool.map(measure_hemisphere, *zip(*jobs, strict=True)))
 
 
 def _stacked(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
