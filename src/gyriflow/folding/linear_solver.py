@@ -59,6 +59,8 @@ class TwoLevelPreconditioner:
         self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
         self._part = shared_out(domain.positions, count)[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
+        # the motions of parts that have nodes of this rank: it needs no other rows of the coarse inverse
+        self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
         self._made_at = -LIFETIME
 
     def renew(self) -> None:
@@ -72,7 +74,8 @@ class TwoLevelPreconditioner:
         """Set y to the preconditioned x."""
         coarse = self._restriction @ x.array_r
         self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
-        y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ (self._inverse_coarse @ coarse)
+        coarse[self._moved] = self._inverse_coarse @ coarse
+        y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ coarse
 
     def _set_diagonal(self) -> None:
         inverse = positive_inverses(self._tangent.diagonal())
@@ -104,7 +107,7 @@ class TwoLevelPreconditioner:
             held = self._restriction @ motions.modes
             self._domain.comm.Allreduce(MPI.IN_PLACE, held)
             coarse += 10 * scale / np.linalg.norm(held, 2) ** 2 * held @ held.T
-        self._inverse_coarse = positive_inverses((coarse + coarse.T) / 2)
+        self._inverse_coarse = positive_inverses((coarse + coarse.T) / 2)[self._moved]
 
 
 def positive_inverses(matrices: Floats) -> Floats:
