@@ -9,12 +9,13 @@ from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blo
 from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.folding.checkpoint import State
+from gyriflow.folding.domain import Domain
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.targets import inverse_exponential, log_growth
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
+from gyriflow.geometry.diffusion import MovingStiffness, Share, cell_sizes, vertex_sizes
 from gyriflow.geometry.tetrahedra import linear_pieces
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
@@ -106,14 +107,25 @@ def test_growth_of_an_even_stretch_is_that_stretch(stretches):
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     U = axes @ np.diag(stretches) @ axes.T
     turn = rigid(30, 40, 50)[:3, :3]
-    pieces = linear_pieces(BODY)
-    logs = log_growth(BODY.vertices, pieces, BODY.vertices @ (turn @ U).T - BODY.vertices, 3.0)
+    stiffness = MovingStiffness(linear_pieces(BODY), len(BODY.vertices))
+    logs = log_growth(BODY.vertices, stiffness, BODY.vertices @ (turn @ U).T - BODY.vertices, 3.0)
     expected = axes @ np.diag(np.log(stretches)) @ axes.T
     at = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
     assert logs == pytest.approx(np.tile(expected[at], (len(logs), 1)), abs=1e-6)
     assert inverse_exponential(expected) == pytest.approx(np.linalg.inv(U), abs=1e-6)
     # what a rigid motion alone leaves is none
-    assert log_growth(BODY.vertices, pieces, BODY.vertices @ turn.T - BODY.vertices, 3.0) == pytest.approx(0, abs=1e-9)
+    assert log_growth(BODY.vertices, stiffness, BODY.vertices @ turn.T - BODY.vertices, 3.0) == pytest.approx(
+        0, abs=1e-9
+    )
+
+
+def test_shared_growth_is_that_of_one_rank():
+    count, pieces = len(BODY.vertices), linear_pieces(BODY)
+    domain = Domain(COMM, BODY)
+    shares = MovingStiffness(pieces, count), MovingStiffness(pieces, count, Share(COMM.rank, COMM.size, domain.summed))
+    alone, shared = (log_growth(BODY.vertices, stiffness, bent(1) - BODY.vertices, 3.0) for stiffness in shares)
+    assert shared == pytest.approx(alone, rel=1e-12, abs=1e-12 * np.abs(alone).max())
+    assert (COMM.bcast(shared) == shared).all()
 
 
 def test_a_way_of_contact_that_is_far_too_long_is_shortened():

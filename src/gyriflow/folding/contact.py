@@ -231,18 +231,13 @@ class SelfContact:
     def forces(self) -> Floats:
         """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
         state = self._state()
-        return self._summed(self._follow.T @ self._own_forces(state))
+        return self.domain.summed(self._follow.T @ self._own_forces(state))
 
     def _own_forces(self, state: ContactCache) -> Floats:
         if not len(state.pairs):
             return np.zeros_like(state.positions)
         gradient = self._barrier.gradient(state.pairs, state.surface, state.positions)
         return gradient.reshape(-1, 3) * N_PER_PA_MM2
-
-    def _summed(self, values: Floats) -> Floats:
-        total = np.empty_like(values, order="C")
-        self.domain.comm.Allreduce(np.ascontiguousarray(values), total)
-        return total
 
     def add_residual(self, out: PETSc.Vec) -> None:
         """Add the forces in N to the owned components of a vector."""
@@ -335,6 +330,6 @@ class SelfContact:
         areas[state.part.vertices[owned]] = np.array(state.surface.vertex_areas)[owned] * M_PER_MM**2
         values = np.zeros(len(self.domain.positions))
         # nodes are the first vertices of the surface of contact
-        pressure = np.linalg.norm(self._summed(forces), axis=1) / self._summed(areas)
+        pressure = np.linalg.norm(self.domain.summed(forces), axis=1) / self.domain.summed(areas)
         values[self._vertices] = pressure[: len(self._vertices)]
         return values

@@ -99,6 +99,12 @@ class Domain:
         values[self._tets] = received
         return values.reshape(-1, *shape)
 
+    def summed(self, values: Floats) -> Floats:
+        """Return on every rank the sum of the arrays of all."""
+        total = np.empty_like(values, order="C")
+        self.comm.Allreduce(np.ascontiguousarray(values), total)
+        return total
+
     def local(self, values: NDArray) -> NDArray:
         """Return the values of the local nodes from those of all vertices."""
         return values[self.vertex_of_node]

@@ -187,10 +187,10 @@ class Tissue:
         """Return (..., c, q) values at the integration points from those at the tissue's own places."""
         return values[..., self.cells] @ self.points.smooth.T if self.points.order == 1 else values
 
-    def from_vertices(self, values: Floats) -> Floats:
-        """Return (..., c, q) values at the integration points, linear between those (..., n) of the whole mesh."""
+    def from_vertices(self, values: Floats, chunk: slice) -> Floats:
+        """Return (..., c, q) values at the points of some elements, linear between those (..., n) of the whole mesh."""
         linear = self.points.smooth if self.points.order == 1 else self.points.bounded
-        return np.asarray(values[..., self.vertices[self.cells]] @ linear.T)
+        return np.asarray(values[..., self.vertices[self.cells[chunk]]] @ linear.T)
 
     def normals(self, wanted: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
         """Return which elements (c,) hold a place where a normal is `wanted`, and their (w, q, 3) unit normals.

@@ -8,7 +8,6 @@ the diagonal, and the rigid motions of some hundred parts of the mesh as the coa
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
@@ -57,7 +56,8 @@ class TwoLevelPreconditioner:
         owned_vertices = domain.vertex_of_node[: domain.owned]
         # by global nodes, as the matrix' columns are
         self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
-        self._part = shared_out(domain.positions, count)[self._vertex]
+        self._part_of_vertex = shared_out(domain.positions, count)
+        self._part = self._part_of_vertex[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
         # the motions of parts that have nodes of this rank: it needs no other rows of the coarse inverse
         self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
@@ -72,8 +72,7 @@ class TwoLevelPreconditioner:
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the preconditioned x."""
-        coarse = self._restriction @ x.array_r
-        self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
+        coarse = self._domain.summed(self._restriction @ x.array_r)
         coarse[self._moved] = self._inverse_coarse @ coarse
         y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ coarse
 
@@ -84,7 +83,7 @@ class TwoLevelPreconditioner:
 
     def _set_coarse_level(self) -> None:
         matrix = self._tangent.elastic.matrix
-        modes = rigid_motions(self._domain.positions[self._vertex], self._part)
+        modes = rigid_motions(self._domain.positions, self._part_of_vertex, self._vertex)
         modes[matrix.fixed] = 0.0
         size = 6 * (int(self._part.max()) + 1)
         all_nodes = np.arange(len(modes) + 1)
@@ -97,15 +96,13 @@ class TwoLevelPreconditioner:
             (modes[self._own], self._part[self._own], own_nodes), shape=(3 * self._domain.owned, size)
         )
         self._restriction = self._prolongation.T.tobsr((6, 3))
-        coarse = (self._restriction @ (rows @ prolongation)).toarray()
-        self._domain.comm.Allreduce(MPI.IN_PLACE, coarse)
+        coarse = self._domain.summed((self._restriction @ (rows @ prolongation)).toarray())
         scale = np.trace(coarse) / size
         coarse[np.diag_indices(size)] += REGULARISED * scale
         motions = self._tangent.motions
         if motions is not None:
             # stiff against what is taken out of all products, and would make it singular
-            held = self._restriction @ motions.modes
-            self._domain.comm.Allreduce(MPI.IN_PLACE, held)
+            held = self._domain.summed(self._restriction @ motions.modes)
             coarse += 10 * scale / np.linalg.norm(held, 2) ** 2 * held @ held.T
         self._inverse_coarse = positive_inverses((coarse + coarse.T) / 2)[self._moved]
 

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
+from ..geometry.diffusion import Share
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
@@ -78,11 +79,12 @@ class Folding:
         floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
         self.solver = NewtonSolver(self.problem, newton, floor)
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
-        self.model = growth_model(p, self.inputs, mesh.vertices)
+        share = Share(comm.rank, comm.size, self.domain.summed)
+        self.model = growth_model(p, self.inputs, mesh.vertices, share)
         self.growth: Growth = self.model(StepStart(mesh.vertices, 0.0, p.step_s))
         self.fields = StepFields(self.domain, self.problem, self.contact, zones, p)
         self._growing = self.domain.local(zones.growth)
-        self._local_maps = {name: self.domain.local(values) for name, values in self.maps.items()}
+        self._local_maps = {name: self.domain.local(self.maps[name]) for name in p.varying_maps}
         self._pial = np.unique(zones.cortex_facets)
 
     def step(self, state: State, step_s: float) -> State:

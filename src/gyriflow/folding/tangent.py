@@ -17,16 +17,16 @@ from ..geometry.triangles import Floats
 from .domain import Domain
 
 
-def rigid_motions(positions: Floats, part: NDArray[np.int64]) -> Floats:
-    """Return the (n, 3, 6) translations and rotations of points at (n, 3) positions.
+def rigid_motions(positions: Floats, part: NDArray[np.int64], chosen: NDArray[np.int64]) -> Floats:
+    """Return the (k, 3, 6) translations and rotations of k `chosen` ones of points at (n, 3) positions.
 
     Rotations are about the centres of the parts that the (n,) numbers name, scaled by the size of the largest one.
     """
     counts = np.bincount(part)
     centres = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1) / np.maximum(counts, 1)[:, None]
     arm = positions - centres[part]
-    arm /= np.abs(arm).max()
-    motions = np.zeros((len(positions), 3, 6))
+    arm = arm[chosen] / np.abs(arm).max()
+    motions = np.zeros((len(chosen), 3, 6))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         motions[:, i, i] = 1.0
@@ -40,13 +40,13 @@ class RigidMotions:
 
     def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
         self.comm = domain.comm
-        motions = rigid_motions(domain.positions, part)
+        vertices = domain.vertex_of_node[: domain.owned]
+        motions, of_part = rigid_motions(domain.positions, part, vertices), part[vertices]
         modes = []
         for number in range(int(part.max()) + 1):
-            whole = np.where((part == number)[:, None, None], motions, 0.0)
-            orthonormal = np.linalg.qr(whole.reshape(-1, 6))[0].reshape(-1, 3, 6)
-            modes.append(orthonormal[domain.vertex_of_node[: domain.owned]])
-        self.modes: Floats = np.concatenate(modes, axis=2).reshape(3 * domain.owned, -1)
+            motion = np.where((of_part == number)[:, None, None], motions, 0.0).reshape(-1, 6)
+            modes.append(np.linalg.solve(np.linalg.cholesky(domain.summed(motion.T @ motion)), motion.T).T)
+        self.modes: Floats = np.concatenate(modes, axis=1)
 
     def remove(self, values: Floats) -> None:
         """Take the rigid motions out of the owned components of a vector, in place."""

@@ -4,7 +4,6 @@ This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is th
 such growth is possible. What smoothing and mechanics leave undone in a step, the next ones make up for.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from scipy import sparse
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
-from ..geometry.diffusion import MovingStiffness, diffuse, vertex_sizes
+from ..geometry.diffusion import MovingStiffness, Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
 from ..geometry.tetrahedra import gradients
 from ..parameters.folding import AXES, FoldingParameters
@@ -46,7 +45,11 @@ class TargetGrowth(Growth):
     away_mm: float
 
     def inverse(self, tissue: Tissue) -> Floats:
-        return inverse_exponential(unpacked(np.moveaxis(tissue.from_vertices(self.strain), 0, -1)))
+        inverse = np.empty((len(tissue.cells), len(tissue.points.weights), 3, 3))
+        for chunk in chunks(len(inverse)):
+            logs = tissue.from_vertices(self.strain, chunk)
+            inverse[chunk] = inverse_exponential(unpacked(np.moveaxis(logs, 0, -1)))
+        return inverse
 
     def logarithm(self) -> Floats:
         return self.strain
@@ -59,28 +62,23 @@ class TargetGrowth(Growth):
 class GrowthToTargets:
     """The model of growth towards shapes of the whole mesh at later weeks.
 
-    `targets` are the (n, 3) positions of all vertices in mm by week, of which only the shape counts, not the pose;
-    `stiffness` gives the matrices that growth is smoothed with.
+    The run's maps hold the shapes, of which the pose does not count; growth is smoothed with `stiffness`.
     """
 
     parameters: FoldingParameters
     inputs: GrowthInputs
-    targets: Mapping[float, Floats]
     stiffness: MovingStiffness
 
     @classmethod
-    def of(cls, p: FoldingParameters, inputs: GrowthInputs) -> "GrowthToTargets":
+    def of(cls, p: FoldingParameters, inputs: GrowthInputs, share: Share) -> "GrowthToTargets":
         """Return the model of a run whose maps hold the targets that its parameters name."""
-        targets = {
-            week: np.stack([inputs.maps[f"{name}_{axis}"] for axis in AXES], axis=1) for week, name in p.targets.items()
-        }
-        if max(targets) < p.end_week - SOON_GW:
+        if (last := max(p.targets)) < p.end_week - SOON_GW:
             raise InputError(
                 "the shapes that the run grows towards end before it does",
-                found=f"shapes up to {max(targets):g} GW and a run to {p.end_week:g} GW",
+                found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, targets, MovingStiffness(inputs.pieces, len(inputs.zones.growth)))
+        return cls(p, inputs, MovingStiffness(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> Growth:
         """Return the growth of a step: its part of what is left to the next target.
@@ -90,44 +88,50 @@ class GrowthToTargets:
         week, end, places = start.week(self.parameters, 0.0), start.week(self.parameters, 1.0), start.positions_mm
         sizes = vertex_sizes(places, self.inputs.pieces)
 
-        def laid(shape: Floats, onto: Floats) -> Floats:
+        targets = self.parameters.targets
+
+        def laid(week: float, onto: Floats) -> Floats:
+            shape = np.stack([self.inputs.maps[f"{targets[week]}_{axis}"] for axis in AXES], axis=1)
             return transform_points(shape, rigid_fit(shape, onto, sizes))
 
-        ahead = sorted(target for target in self.targets if target > week + SOON_GW) or [max(self.targets)]
-        missing = laid(self.targets[ahead[0]], places) - places
+        ahead = sorted(target for target in targets if target > week + SOON_GW) or [max(targets)]
+        missing = laid(ahead[0], places) - places
         before, since = places, week
         while len(ahead) > 1 and ahead[0] < end - SOON_GW:
             since = ahead.pop(0)
-            before = laid(self.targets[since], places)
-        share = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
-        aim = before + share * (laid(self.targets[ahead[0]], before) - before)
-        strain = log_growth(places, self.inputs.pieces, aim - places, SMOOTHING_MM, self.stiffness.at(places))
+            before = laid(since, places)
+        part = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
+        aim = before + part * (laid(ahead[0], before) - before)
+        strain = log_growth(places, self.stiffness, aim - places, SMOOTHING_MM)
         away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(self.parameters, start, (strain * growing).T, away)
 
 
-def log_growth(
-    positions: Floats,
-    pieces: np.ndarray,
-    displacement: Floats,
-    smoothing_mm: float,
-    stiffness: sparse.csr_matrix | None = None,
-) -> Floats:
+def log_growth(positions: Floats, stiffness: MovingStiffness, displacement: Floats, smoothing_mm: float) -> Floats:
     """Return the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
-    Positions and displacement are (n, 3) in mm, `pieces` (p, 4) linear tetrahedra, `stiffness` as in `diffuse`.
+    Positions and displacement are (n, 3) in mm. Ranks share elements, then components, as `stiffness` is shared.
     """
-    after, parts = positions + displacement, np.empty((len(pieces), 6))
-    for chunk in chunks(len(pieces)):
-        corners = pieces[chunk]
+    tets, share = stiffness.tets, stiffness.share
+    # the last of the seven is the size
+    after, parts = positions + displacement, np.empty((len(tets), 7))
+    for chunk in chunks(len(tets)):
+        corners = tets[chunk]
         slopes, volumes = gradients(positions, corners)
         edges = np.swapaxes(after[corners[:, 1:]] - after[corners[:, :1]], 1, 2)
-        parts[chunk] = packed(log_stretch(edges @ slopes)) * (volumes / 4)[:, None]
-    sums = [np.bincount(pieces.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
-    sizes = vertex_sizes(positions, pieces)
-    mean = np.stack(sums, axis=1) / np.where(sizes > 0, sizes, 1.0)[:, None]
-    return diffuse(positions, pieces, mean, smoothing_mm, steps=1, tolerance=SMOOTHED_TO, stiffness=stiffness)
+        parts[chunk, :6], parts[chunk, 6] = packed(log_stretch(edges @ slopes)), 1.0
+        parts[chunk] *= (volumes / 4)[:, None]
+    sums = [np.bincount(tets.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
+    means = share.summed(np.stack(sums, axis=1))
+    means, sizes = means[:, :6], np.where(means[:, 6:] > 0, means[:, 6:], 1.0)
+    if smoothing_mm == 0:
+        return means / sizes
+    # as `diffuse` does, in one step
+    matrix = sparse.csr_matrix(sparse.diags(sizes[:, 0]) + smoothing_mm**2 / 2 * stiffness.at(positions))
+    smooth, columns = np.zeros_like(means), share.of(6)
+    smooth[:, columns] = conjugate_gradients(matrix, means[:, columns], (means / sizes)[:, columns], SMOOTHED_TO)
+    return share.summed(smooth)
 
 
 def log_stretch(F: Floats) -> Floats:

@@ -1,5 +1,8 @@
 """Values smoothed or continued along a surface or inside a solid mesh, not across a sulcus or fissure."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import igl
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +14,22 @@ from .triangles import Floats, Ints, TriangleMesh, face_areas
 
 STEPS = 8
 """Implicit steps: their product has the Gaussian's variance, and nearly its shape."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A process' share of a task: number `rank` of `ranks`; `summed` adds the arrays of all processes up."""
+
+    rank: int = 0
+    ranks: int = 1
+    summed: Callable[[Floats], Floats] = np.asarray
+
+    def of(self, count: int) -> slice:
+        """Return which of a number of things are this process'."""
+        return slice(count * self.rank // self.ranks, count * (self.rank + 1) // self.ranks)
+
+
+ALONE = Share()
 
 
 def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
@@ -33,25 +52,21 @@ def diffuse(
     sigma_mm: float,
     *,
     steps: int = STEPS,
-    tolerance: float = 1e-8,
-    stiffness: sparse.csr_matrix | None = None,
 ) -> Floats:
     """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2, which keep the
     integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. Fewer `steps`
-    make tails longer than a Gaussian's; each is solved to a relative `tolerance`. `stiffness` is the stiffness matrix,
-    where it is there already.
+    make tails longer than a Gaussian's.
     """
     if sigma_mm == 0:
         return values.copy()
     mass = vertex_sizes(vertices, cells)
     mass = np.where(mass > 0, mass, 1.0)
-    stiffness = stiffness_matrix(vertices, cells) if stiffness is None else stiffness
-    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness)
+    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness_matrix(vertices, cells))
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(steps):
-        smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
+        smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, 1e-8)
     return smooth.reshape(values.shape)
 
 
@@ -108,13 +123,14 @@ def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr
 class MovingStiffness:
     """The stiffness matrices of (m, 4) tetrahedra between n vertices that move.
 
-    Where their entries stand is found once, which takes longer than all else.
+    Where their entries stand is found once, which takes longer than all else. Processes that `share` the elements, each
+    with some of the `tets`, all have the whole matrices.
     """
 
-    def __init__(self, tets: Ints, count: int) -> None:
-        self._tets = tets
-        ends = np.stack([np.sort(tets[:, pair], axis=1) for pair in EDGES], axis=1)
-        numbers, self._edge = np.unique(ends[..., 0] * count + ends[..., 1], return_inverse=True)
+    def __init__(self, tets: Ints, count: int, share: Share = ALONE) -> None:
+        self.tets, self.share = tets[share.of(len(tets))], share
+        numbers = np.unique(_edge_numbers(tets, count))
+        self._edge = np.searchsorted(numbers, _edge_numbers(self.tets, count).ravel()).astype(np.int32)
         self._ends = np.divmod(numbers, count)
         vertices = np.arange(count)
         rows, columns = (np.concatenate([*ends, vertices]) for ends in (self._ends, self._ends[::-1]))
@@ -122,15 +138,21 @@ class MovingStiffness:
 
     def at(self, vertices: Floats) -> sparse.csr_matrix:
         """Return the (n, n) matrix as `stiffness_matrix` does, for (n, 3) positions in mm."""
-        of_pairs = np.empty((len(self._tets), len(EDGES)))
-        for part in chunks(len(self._tets)):
-            slopes, volumes = gradients(vertices, self._tets[part])
+        of_pairs = np.empty((len(self.tets), len(EDGES)))
+        for part in chunks(len(self.tets)):
+            slopes, volumes = gradients(vertices, self.tets[part])
             slopes = np.concatenate([-slopes.sum(axis=1, keepdims=True), slopes], axis=1)
             for k, (i, j) in enumerate(EDGES):
                 of_pairs[part, k] = volumes * np.einsum("ij,ij->i", slopes[:, i], slopes[:, j])
-        between = np.bincount(self._edge.ravel(), of_pairs.ravel())
         count = len(vertices)
+        sums = np.bincount(self._edge, of_pairs.ravel(), minlength=len(self._ends[0]))
+        between = self.share.summed(np.asarray(sums, dtype=np.float64))
         # rows sum to zero
         own = -sum(np.bincount(ends, between, minlength=count) for ends in self._ends)
         entries = np.concatenate([between, between, own])[self._places.data]
         return sparse.csr_matrix((entries, self._places.indices, self._places.indptr), shape=(count, count))
+
+
+def _edge_numbers(tets: Ints, count: int) -> Ints:
+    first, second = (tets[:, corners] for corners in np.transpose(EDGES))
+    return np.minimum(first, second) * count + np.maximum(first, second)

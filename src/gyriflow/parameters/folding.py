@@ -181,10 +181,14 @@ class FoldingParameters(FoldingSettings):
     [GW]"""
 
     @property
+    def varying_maps(self) -> set[str]:
+        """The names of the maps of parameters that vary over the brain."""
+        return {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+
+    @property
     def maps(self) -> set[str]:
         """The names of the maps that the parameters need."""
-        varying = {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
-        return varying | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
+        return self.varying_maps | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
 
     def problems(self) -> Iterator[Problem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
