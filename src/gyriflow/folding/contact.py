@@ -21,7 +21,7 @@ from ..errors import MeshError
 from ..geometry.tetrahedra import finer_surface
 from ..geometry.triangles import Floats, TriangleMesh, edges, mean_length
 from ..units import M_PER_MM, MM_PER_M
-from .domain import Domain
+from .domain import Domain, gathered
 from .surface_parts import SearchRange, SurfacePart, part_of_surface, shared_out
 
 DISTANCE_PER_EDGE = 0.2
@@ -116,7 +116,6 @@ class SelfContact:
         self._rows_by_rank = domain.comm.allgather(place[self._owned_nodes])
         self._owned_rows = self._rows_by_rank[domain.comm.rank]
         self._gathered_rows = np.concatenate(self._rows_by_rank)
-        self._counts = [3 * count for count in domain.comm.allgather(len(self._owned_rows))]
         self._columns = domain.node_of_vertex[self._vertices]
         start = self._weights @ domain.positions[self._vertices] * MM_PER_M
         self._edges = edges(TriangleMesh(start, faces))[0]
@@ -165,11 +164,7 @@ class SelfContact:
         self.stiffness_pa = last
 
     def _on_surface(self, local: Floats) -> Floats:
-        received = np.empty((len(self._vertices), 3))
-        self.domain.comm.Allgatherv(np.ascontiguousarray(local[self._owned_nodes]), (received, self._counts))
-        values = np.empty_like(received)
-        values[self._gathered_rows] = received
-        return self._weights @ values
+        return self._weights @ gathered(self.domain.comm, local[self._owned_nodes], self._gathered_rows)
 
     def _surface_at(self, *places: Floats) -> tuple[ipctk.CollisionMesh, SurfacePart]:
         if self._part_range is None or not self._part_range.at(self.distance_mm, *places):

@@ -37,6 +37,15 @@ FROM_DOLFINX = {order: np.argsort(places) for order, places in TO_DOLFINX.items(
 AT_NODES = shape_slopes(NODE_PLACES)
 
 
+def gathered(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
+    """Return on every rank all (n, ...) values from those of each, which belong, rank by rank, to (n,) places."""
+    shape = values.shape[1:]
+    received, everywhere = np.empty((len(order), *shape)), np.empty((len(order), *shape))
+    comm.Allgatherv(np.ascontiguousarray(values), (received, comm.allgather(values.size)))
+    everywhere[order] = received
+    return everywhere
+
+
 class Domain:
     """A tetrahedral mesh spread over the ranks of a communicator, in metres.
 
@@ -71,10 +80,8 @@ class Domain:
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self.part = connected_parts(mesh)
-        self._counts = [3 * owned for owned in comm.allgather(self.owned)]
         self._measure(self.local(self.positions))
         self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
-        self._cell_counts = comm.allgather(len(self.cells))
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
         self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
         self.node_of_vertex = np.empty_like(self._order)
@@ -82,22 +89,11 @@ class Domain:
 
     def gathered(self, owned_values: Floats) -> Floats:
         """Return on every rank the (n, 3) vectors of all vertices from the owned (owned, 3) ones of each."""
-        received = np.empty((len(self._order), 3))
-        self.comm.Allgatherv(np.ascontiguousarray(owned_values), (received, self._counts))
-        values = np.empty_like(received)
-        values[self._order] = received
-        return values
+        return gathered(self.comm, owned_values, self._order)
 
     def gathered_cells(self, cell_values: Floats) -> Floats:
         """Return on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
-        shape = cell_values.shape[1:]
-        width = int(np.prod(shape))
-        received = np.empty((len(self._tets), width))
-        counts = [width * count for count in self._cell_counts]
-        self.comm.Allgatherv(np.ascontiguousarray(cell_values), (received, counts))
-        values = np.empty_like(received)
-        values[self._tets] = received
-        return values.reshape(-1, *shape)
+        return gathered(self.comm, cell_values, self._tets)
 
     def summed(self, values: Floats) -> Floats:
         """Return on every rank the sum of the arrays of all."""
