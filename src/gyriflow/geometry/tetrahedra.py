@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .jacobians import EDGES, coefficients, shape_values
+from .jacobians import EDGES, chunks, coefficients, shape_values
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
@@ -86,10 +86,13 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
     if tets.shape[1] == NODES_OF_ORDER[2]:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
-    a, b, c, d = (np.take(vertices, tets[:, i], axis=0) for i in range(4))
-    # the triple product of edges written out: faster than with NumPy's cross product
-    (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
-    return np.asarray(((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0)
+    volumes = np.empty(len(tets))
+    for part in chunks(len(tets)):
+        a, b, c, d = (np.take(vertices, corners, axis=0) for corners in tets[part].T)
+        # the triple product of edges written out: faster than with NumPy's cross product
+        (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
+        volumes[part] = (b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2
+    return volumes / 6.0
 
 
 def gradients(vertices: Floats, tets: Ints) -> tuple[Floats, Floats]:
@@ -111,16 +114,19 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 
     Of quadratic elements they are those of the corners.
     """
-    a, b, c, d = mesh.vertices[mesh.corners].transpose(1, 0, 2)
-    p, q, r = b - a, c - a, d - a
-    volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
-    surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
-    # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V / (sum of twice the face areas)
-    squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
-    numerator = np.linalg.norm(
-        squared[0] * np.cross(q, r) + squared[1] * np.cross(r, p) + squared[2] * np.cross(p, q), axis=1
-    )
-    return 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
+    ratios = np.empty(len(mesh.tets))
+    for part in chunks(len(ratios)):
+        a, b, c, d = mesh.vertices[mesh.corners[part].T]
+        p, q, r = b - a, c - a, d - a
+        volume6 = np.abs(np.einsum("ij,ij->i", np.cross(p, q), r))
+        surface2 = sum(np.linalg.norm(np.cross(x, y), axis=1) for x, y in ((p, q), (q, r), (r, p), (q - p, r - p)))
+        # circumradius = |p|²(q×r) + |q|²(r×p) + |r|²(p×q)| / (2·6V), inradius = 6V / (sum of twice the face areas)
+        squared = [np.einsum("ij,ij->i", x, x)[:, None] for x in (p, q, r)]
+        numerator = np.linalg.norm(
+            squared[0] * np.cross(q, r) + squared[1] * np.cross(r, p) + squared[2] * np.cross(p, q), axis=1
+        )
+        ratios[part] = 6 * volume6**2 / np.maximum(surface2 * numerator, np.finfo(float).tiny)
+    return ratios
 
 
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
