@@ -91,8 +91,8 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
         a, b, c, d = (np.take(vertices, corners, axis=0) for corners in tets[part].T)
         # the triple product of edges written out: faster than with NumPy's cross product
         (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
-        volumes[part] = (b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2
-    return volumes / 6.0
+        volumes[part] = ((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0
+    return volumes
 
 
 def gradients(vertices: Floats, tets: Ints) -> tuple[Floats, Floats]:
