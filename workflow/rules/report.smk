@@ -49,6 +49,7 @@ rule provenance:
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         files=study.input_files,
         folded=study.pairs,
+        growth_of=[study.growth_of(one) for one in study.folded],
         method=study.method,
     script:
         "../scripts/provenance.py"

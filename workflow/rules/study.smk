@@ -78,6 +78,7 @@ rule study_runs:
         table=f"{STUDY}/runs.html",
     params:
         folded=study.pairs,
+        growth_of=[study.growth_of(one) for one in study.folded],
     script:
         "../scripts/study_runs.py"
 

@@ -26,9 +26,16 @@ with step(snakemake.log[0]):
         write_json(path, used | {"configuration": settings, "inputs": start | inputs[brain], "results": results})
     hashed = [{"brain": brain, "what": what, "sha256": sha256_of(path)} for brain, what, path in params.files]
     write_json(output.report, used | {"files": hashed})
+    of_runs = zip(params.folded, params.growth_of, files.run_params, files.summaries, strict=True)
     runs = [
-        {"run": run, "start": brain, "parameters": read_yaml(settings), "summary": read_json(summary)}
-        for (run, brain), settings, summary in zip(params.folded, files.run_params, files.summaries, strict=True)
+        {
+            "run": run,
+            "start": brain,
+            "growth_of": growth_of,
+            "parameters": read_yaml(settings),
+            "summary": read_json(summary),
+        }
+        for (run, brain), growth_of, settings, summary in of_runs
     ]
     write_text(output.methods, methods_text(read_text(files.template), runs=runs, software=used, **params.method))
     write_yaml(output.config, params.config)

@@ -14,12 +14,15 @@ BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through
 files, folded = snakemake.input, snakemake.params.folded
 with step(snakemake.log[0]):
     rows, runs = [], {}
-    of_runs = zip(run_names(folded), folded, files.params, files.summaries, files.zones, files.steps, strict=True)
-    for name, (run, brain), params, summary, zones, steps in of_runs:
+    growth_of = snakemake.params.growth_of
+    of_files = zip(files.params, files.summaries, files.zones, files.steps, strict=True)
+    of_runs = zip(run_names(folded), folded, growth_of, of_files, strict=True)
+    for name, (run, brain), grown, (params, summary, zones, steps) in of_runs:
         report = read_json(zones)
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
         resolved = resolution_over_steps(report["order"], read_table(steps))
         settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
+        settings["growth_of"] = grown
         rows.append({"run": run, "subject": brain, **settings, **found})
         # the shapes that a run grows towards are in files
         settings.pop("targets", None)

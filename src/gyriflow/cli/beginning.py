@@ -14,7 +14,7 @@ from ..io.yaml_files import read_keys
 from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
-from .recognition import SUBJECT_AND_SESSION, UNSET, fitting_scheme, recognise
+from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, fitting_scheme, recognise
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -56,10 +56,12 @@ def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
         entry = brain.entry if inside else _absolute(brain.entry, folder)
         text = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=10_000, allow_unicode=True).strip()
         lines.append(f"  - {text}" + "".join(f"  # {note}" for note in brain.notes) + "\n")
-    weeks = sorted({brain.entry["week"] for brain in brains if brain.entry["week"] != UNSET})
-    end = f"{weeks[-1] if len(weeks) > 1 else weeks[0] + 1:g}" if weeks else UNSET
-    # brains of unknown weeks come last
-    rest = REST.format(start=brains[0].entry["id"], end=end, measured=MEASURED if len(weeks) > 1 else "")
+    # brains of unknown weeks come last; one that is followed by others of its subject, or its atlas, comes first
+    of_subjects = _of_subjects(brains).values()
+    series = next((ids for ids in of_subjects if len(_weeks(ids)) > 1), brains)
+    weeks, several = _weeks(series), series is not brains
+    end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
+    rest = REST.format(start=series[0].entry["id"], end=end, measured=MEASURED if several else "")
     write_text(path, HEAD + "".join(lines) + rest)
     for brain in brains:
         kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
@@ -127,13 +129,10 @@ def write_bids(
     if problems := [f"\n  {brain.entry['id']}: {note}" for brain in brains for note in brain.notes]:
         remedy = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'."
         raise InputError("cannot be run as it is", path=folder, found="".join(problems), remedy=remedy)
-    scans: dict[str, list[str]] = {}
-    for brain in brains:
-        scans.setdefault(brain.entry.get("subject", ""), []).append(brain.entry["id"])
-    starts = [ids[0] for subject, ids in scans.items() if subject and len(ids) > 1]
-    weeks = [brain.entry["week"] for brain in brains]
+    starts = [scans[0].entry["id"] for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
+    weeks = _weeks(brains)
     given = read_keys(settings) if settings else {}
-    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if len(set(weeks)) > 1 else {})
+    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if starts else {})
     text = {
         "brains": [_absolute(brain.entry, folder) for brain in brains],
         "start": starts or brains[0].entry["id"],
@@ -144,6 +143,17 @@ def write_bids(
     }
     write_text(path, yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in brains]
+
+
+def _of_subjects(brains: Sequence[Recognised]) -> dict[str, list[Recognised]]:
+    scans: dict[str, list[Recognised]] = {}
+    for brain in brains:
+        scans.setdefault(brain.entry.get("subject", ""), []).append(brain)
+    return scans
+
+
+def _weeks(brains: Sequence[Recognised]) -> list[float]:
+    return sorted({brain.entry["week"] for brain in brains if brain.entry["week"] != UNSET})
 
 
 def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[str, Any]:

@@ -147,14 +147,15 @@ def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iter
 
 def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Recognised:
     entities = SUBJECT_AND_SESSION.search(file.as_posix())
-    named = [scan for scan in scans if _names(file, scan.subject or scan.id) and _names(file, scan.session)]
+    named = [scan for scan in scans if _names(file, scan.subject) and _names(file, scan.session)]
     # a participant's row holds for its sessions too, but the session's own comes first
     scan = max(named, key=lambda scan: scan.session is not None, default=None)
     weeks = [match[1] for part in reversed(file.parts) if (match := WEEK.search(part))]
     week = float(weeks[0]) if weeks and scan is None else UNSET
     if scan is not None and scan.week is not None:
         week = scan.week
-    entry = {"id": _id(file), "week": week} | ({"subject": entities[1]} if entities and entities[2] else {})
+    subject = entities[1] if entities else scan.subject if scan else None
+    entry = {"id": _id(file), "week": week} | ({"subject": subject} if subject else {})
     further = covariates(scan) if scan else {}
     return Recognised(entry | further | source, [f"week: {scan.cause}"] if scan and scan.cause else [])
 

@@ -128,6 +128,8 @@ def growth(config: Config) -> Iterator[Problem]:
     lists: dict[Key, Sequence[str]] = {("growth", "brains", name): ids for name, ids in named.items()}
     if given is not None and not named:
         lists = {("growth", "brains"): list(given)}
+    every = [brain.id for brain in config.brains]
+    lists = {key: every if named and ALL in ids else ids for key, ids in lists.items()}
     unknown = [problem for key, ids in lists.items() for problem in _unknown(ids, config, key)]
     yield from unknown
     if unknown:

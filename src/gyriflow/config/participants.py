@@ -37,12 +37,12 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?")
 class Scan:
     """A row of a table of participants, or of one of their sessions.
 
-    The subject is the participant, None where the row is of no session. The week is None where the age cannot be
+    The subject is the participant, the session None where the row is of none. The week is None where the age cannot be
     used, and the cause says why. Values are the row's texts by column; `age_column` is the one the age was taken from.
     """
 
     id: str
-    subject: str | None
+    subject: str
     session: str | None
     week: float | None
     cause: str
@@ -93,7 +93,7 @@ def _scan(name: str, values: dict[str, str], table: _Table, further: Mapping[str
             values[key] = text.replace("{id}", own_id).replace("{subject}", name).replace("{session}", session or label)
     week, cause = read_week(values.get(table.column, ""), table.unit)
     cause = cause and f"{table.column}: {cause}"
-    return Scan(own_id, name if session else None, session, week, cause, values, table.column)
+    return Scan(own_id, name, session, week, cause, values, table.column)
 
 
 def read_week(text: str, unit: str = "weeks") -> tuple[float | None, str]:
@@ -148,8 +148,8 @@ class ParticipantsSettings(Settings):
     `24w2d` (or `age_weeks`, `age_days`, or `age` with its unit in the sidecar); and keys of brains, inner ones with a
     dot (`hemispheres.left`), two `white` surfaces with a semicolon between. Instead of keys, `files` may name labels, a
     pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is no value.
-    Other columns are covariates. A participant with a `sub-01/sub-01_sessions.tsv` beside the table has a brain for
-    each of its sessions, with that one's age.
+    Other columns are covariates. Each participant is a subject; one with a `sub-01/sub-01_sessions.tsv` beside the
+    table has a brain for each of its sessions, with that one's age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
@@ -206,9 +206,7 @@ def covariates(scan: Scan) -> dict[str, dict[str, str]]:
 
 def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
     values = {key: value for key, value in scan.values.items() if value not in NOTHING}
-    entry: dict[str, Any] = {"id": scan.id, "week": scan.week} | covariates(scan)
-    if scan.subject is not None:
-        entry["subject"] = scan.subject
+    entry: dict[str, Any] = {"id": scan.id, "week": scan.week, "subject": scan.subject} | covariates(scan)
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)
         most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")

@@ -102,8 +102,9 @@ class GrowthSettings(Settings):
 
     brains: Series | None = None
     """Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name,
-    as `{surface: [...], volume: [...]}`. `null`: all brains. Each population is then a series of its own, as
-    are surfaces (`surface`) and label volumes (`volume`) if both have two weeks."""
+    as `{surface: [...], volume: [...]}`. `null`: all brains. Each subject and each population is then a series of
+    its own, as are surfaces (`surface`) and label volumes (`volume`) if both have two weeks. Only a series by name
+    may chain several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
     """Series that gives measured curves or an atlas' growth, of several; `null`: the start brain's."""
     matched_surfaces: bool = True
@@ -116,22 +117,24 @@ def growth_series(
 ) -> dict[str, list[str]]:
     """Return the ids of the brains of each series of growth rates, without series of fewer than two weeks.
 
-    `given` is the setting `brains`, whose ids must be known. Only a series that it names may mix populations. A
-    hemisphere that is alone shares none with whole brains or with the other one.
+    `given` is the setting `brains`, whose ids must be known. Only a series that it names may have several subjects or
+    mix populations; `all` stands for all brains. A hemisphere that is alone shares none with whole brains or with the
+    other one.
     """
     series: dict[str, Sequence[Brain]] = {}
     if isinstance(given, Mapping):
-        series = {name: [brain for brain in brains if brain.id in ids] for name, ids in given.items()}
+        series = {name: [brain for brain in brains if brain.id in ids or ALL in ids] for name, ids in given.items()}
     else:
-        groups: dict[tuple[str | None, str], list[Brain]] = {}
+        groups: dict[tuple[str | None, str | None, str], list[Brain]] = {}
         for brain in brains:
             if given is None or brain.id in given:
                 side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
-                groups.setdefault((brain.population, side), []).append(brain)
-        for (population, side), members in groups.items():
+                groups.setdefault((brain.subject, brain.population, side), []).append(brain)
+        for (subject, population, side), members in groups.items():
             by_kind = _series_by_kind(members)
             for kind, chosen in by_kind.items():
-                parts = [population or "", side, kind if len(by_kind) > 1 or not population else ""]
+                parts = [subject or "", population or "", side]
+                parts += [kind] if len(by_kind) > 1 or not (subject or population) else []
                 series[", ".join(part for part in parts if part) if len(groups) > 1 else kind] = chosen
     return {name: [brain.id for brain in members] for name, members in series.items() if _ages(members) > 1}
 

@@ -28,7 +28,15 @@ OF_THE_SURFACE = ("crossing_faces", "curvature_radius", "thickness_measured_shar
 """Metrics of how a brain was measured."""
 OF_EVERY_RUN = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
-    *("growth_rate_per_s", "core_growth_rate_per_s", "stress_memory_gw", "support", "contact.kind", "no_growth.kind"),
+    *(
+        "growth_of",
+        "growth_rate_per_s",
+        "core_growth_rate_per_s",
+        "stress_memory_gw",
+        "support",
+        "contact.kind",
+        "no_growth.kind",
+    ),
     *("step_s", "tets", "order", "elements_through_cortex", "steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are told of runs even where all have the same."""

@@ -97,9 +97,18 @@ class Brain:
         return self.given.population or ("synthetic" if self.given.synthetic else "unknown")
 
     def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
-        """Return the brains that it may be compared with: of its hemispheres, and its population if it has one."""
-        population = self.given.population
-        return [one for one in brains if population in (None, one.given.population) and one.sides == self.sides]
+        """Return the brains that it may be compared with: of its hemispheres, its population and subject if it has any.
+
+        A brain without a subject, as of an atlas, may be compared with any.
+        """
+        population, subject = self.given.population, self.given.subject
+        return [
+            one
+            for one in brains
+            if population in (None, one.given.population)
+            and one.sides == self.sides
+            and (None in (subject, one.given.subject) or subject == one.given.subject)
+        ]
 
     @property
     def registered_volume(self) -> str:

@@ -15,7 +15,7 @@ from ..parameters.terms import SIDES
 from ..units import week_tag
 from .paths import CURVES
 from .records import Brain, Calibration, Chain, Comparison, Origin, Simulation
-from .series import Series, series_of
+from .series import Series, series_of, several_subjects
 from .study import Study
 
 Chains = Mapping[tuple[str, Origin], Chain]
@@ -30,13 +30,13 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     """
     brains = {given.id: _brain(given, config, refused) for given in config.brains if given.id not in refused}
     accepted, series = list(brains.values()), series_of(config, brains)
-    foldings, members = _foldings(config, brains)
+    foldings, members = _foldings(config, brains, series)
     chains = _chains(foldings, series, accepted)
     unreachable = _unreachable(foldings, series, chains)
     if unreachable and not refused:
         raise next(iter(unreachable.values()))
     if unreachable:
-        foldings, members = _foldings(config, brains, unreachable)
+        foldings, members = _foldings(config, brains, series, unreachable)
         chains = _chains(foldings, series, accepted)
     simulations = {(one.run, one.start.id): _simulation(config, one, series, chains, accepted) for one in foldings}
     calibration = None
@@ -112,7 +112,7 @@ class Member:
 
 
 def _foldings(
-    config: Config, brains: Mapping[str, Brain], left_out: Collection[str] = ()
+    config: Config, brains: Mapping[str, Brain], series: Series, left_out: Collection[str] = ()
 ) -> tuple[list[_Folding], dict[str, list[Member]]]:
     ids = [brain.id for brain in config.brains]
     starts = {
@@ -121,11 +121,11 @@ def _foldings(
     }
     predicted = [start for name, run in config.runs.items() if _shapes(run) == "atlas" for start in starts[name]]
     further = {start: _compared_weeks(start, brains.values()) for start in predicted}
-    foldings = [
-        _Folding(name, start, run, _weeks(run, start, further.get(start, [])))
-        for name, run in config.runs.items()
-        for start in starts[name]
-    ]
+    foldings = []
+    for name, run in config.runs.items():
+        for start in starts[name]:
+            settings = _up_to_last_scan(run, start, series)
+            foldings.append(_Folding(name, start, settings, _weeks(settings, start, further.get(start, []))))
     members = _members(config, foldings)
     varied: dict[str, tuple[Run, list[Brain], set[float]]] = {}
     for name, study in config.studies.items():
@@ -186,6 +186,15 @@ def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]
     return sorted([*weeks, *(week for week in further if week < weeks[-1] and week_tag(week) not in tags)])
 
 
+def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
+    """Return a run that, where it follows the scans of one subject, ends with the last: each has its own."""
+    scans = series.brains.get(series.with_brain(start), ())
+    last = max((brain.week for brain in scans), default=start.week)
+    if _shapes(run) != "self" or start.given.subject is None or several_subjects(scans) or last <= start.week:
+        return run
+    return run.model_copy(update={"end_week": min(run.end_week, last)})
+
+
 def _shapes(settings: Run) -> Origin | None:
     return settings.growth.of if settings.growth.model == "shapes" else None
 
@@ -220,7 +229,8 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
 
     All have label volumes, or surfaces with the same vertices.
     """
-    members = series.brains.get(series.with_brain(start), ())
+    # in a population's, its own scan of a week comes first
+    members = sorted(series.brains.get(series.with_brain(start), ()), key=lambda brain: brain.subject != start.subject)
     # the first brain past the end tells of growth up to it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     chosen = {week_tag(start.week): start}
@@ -288,7 +298,10 @@ def _simulation(
     run, start, growth = folding.run, folding.start, folding.settings.growth
     shapes = _shapes(folding.settings)
     sizes = growth.model == "sizes" and "measured" in [getattr(growth, size) for size in SIZES]
-    alike = sorted(start.comparable(brains), key=lambda brain: brain.subject != start.subject)
+    # those of other subjects are the real ones where a run is led to them
+    led_to = [brain for brain in chains[start.id, "self"].later if brain.sides == start.sides]
+    alike = list(dict.fromkeys([*start.comparable(brains), *led_to]))
+    alike.sort(key=lambda brain: brain.subject != start.subject)
     compared = {
         tag: of_week
         for tag in map(week_tag, folding.weeks[1:])

@@ -1,6 +1,6 @@
 """The growth series of a study: the brains that growth is taken from, and how they correspond."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,22 +31,35 @@ class Series:
         return min(names, key=lambda name: name != self.preferred, default="")
 
     def for_sizes(self, brain: Brain) -> str | None:
-        """Return the series whose curves a start brain follows: the preferred one, the only one, or that with it."""
+        """Return the series whose curves a start brain follows: the preferred one, that with it, or the only one.
+
+        The scans of another subject are none of these but where they are preferred.
+        """
         if self.preferred is not None:
             return self.preferred if self.preferred in self.brains else None
-        return next((name for name, brains in self.brains.items() if len(self.brains) == 1 or brain in brains), None)
+        own = [name for name, brains in self.brains.items() if brain in brains]
+        others = [name for name in self.brains if not self._of_one_subject(name)]
+        return next(iter(own or (others if len(others) == 1 else [])), None)
 
     def of_others(self, start: Brain) -> list[str]:
-        """Return the series of other populations with a brain's hemispheres; of several, the preferred one alone."""
+        """Return the series of other populations with a brain's hemispheres; of several, the preferred one alone.
+
+        The scans of one other subject are a series only where they are preferred.
+        """
         population = start.given.population
         names = [
             name
             for name, brains in self.brains.items()
             if start not in brains
+            and (name == self.preferred or not self._of_one_subject(name))
             and all(brain.sides == start.sides for brain in brains)
             and all(population is None or brain.given.population != population for brain in brains)
         ]
         return [self.preferred] if self.preferred in names else names
+
+    def _of_one_subject(self, name: str) -> bool:
+        brains = self.brains[name]
+        return brains[0].given.subject is not None and not several_subjects(brains)
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
@@ -63,6 +76,11 @@ class Series:
         Others correspond in the world of their files.
         """
         return [not brain.given.has_labels and not self.are_matched(*pair) for brain in pair]
+
+
+def several_subjects(brains: Iterable[Brain]) -> bool:
+    """Return whether brains are not of one subject, or an atlas', which names none."""
+    return len({brain.given.subject for brain in brains}) > 1
 
 
 def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:

@@ -11,7 +11,7 @@ from ..parameters.terms import MEASURED, SIDES, Side
 from ..units import week_tag
 from . import paths
 from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
-from .series import Series
+from .series import Series, several_subjects
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,19 @@ class Study:
         """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
         starts = set(self.starts)
         return {name: why for name, why in self.series.unmatched.items() if starts & set(self.series.brains[name])}
+
+    def growth_of(self, one: Simulation) -> str:
+        """Return in words whose measured growth a simulation follows; "" where it follows none."""
+        if one.shapes:
+            brains, name = self.chains[one.start.id, one.shapes].brains, self.series.with_brain(one.start)
+            if one.shapes == "atlas":
+                brains, name = brains[1:], self.series.with_brain(brains[1])
+        else:
+            name = one.followed_series or ""
+            brains = self.series.brains.get(name, ())
+        if several_subjects(brains):
+            return f"population {name}"
+        return "own" if one.start in brains else f"series {name}" if brains else ""
 
     # what runs are worth
 

@@ -15,6 +15,7 @@ from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.shipped import SHIPPED
+from gyriflow.study import resolve
 
 ATLAS = SHIPPED / "atlases" / "spina-bifida"
 LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
@@ -117,6 +118,21 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     list(write_configuration(tmp_path, path, force=False))
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [brain.subject for brain in config.brains] == ["sub-01", "sub-01"]
+
+
+def test_only_scans_of_one_subject_are_led_to_each_other(tmp_path):
+    bids_folder(tmp_path)
+    place = tmp_path / "derivatives" / "seg" / "sub-01" / "ses-2" / "anat"
+    place.rename(tmp_path / "derivatives" / "seg" / "sub-02")
+    (tmp_path / "derivatives" / "seg" / "sub-02" / "sub-01_ses-2_desc-brain_dseg.nii.gz").rename(
+        tmp_path / "derivatives" / "seg" / "sub-02" / "sub-02_ses-2_desc-brain_dseg.nii.gz"
+    )
+    path = tmp_path / "gyriflow.yaml"
+    list(write_configuration(tmp_path, path, force=False))
+    written = yaml.safe_load(path.read_text())
+    assert [brain["subject"] for brain in written["brains"]] == ["sub-01", "sub-02"]
+    assert list(written["runs"]) == ["reference"]
+    assert not resolve(load(written, tmp_path)).growing
 
 
 @pytest.fixture

@@ -181,13 +181,18 @@ def test_the_methods_say_what_was_run():
         "stress_memory_gw": 0.0, "contact": {"kind": "global"},
     }  # fmt: skip
     summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
+    led = parameters | {"growth": {"model": "shapes", "of": "self"}}
     text = methods_text(
         (PAGE / "methods.rst").read_text(),
         brains=[
             {"week": 21.0, "population": "spina bifida", "source": "labels", "synthetic": False},
             {"week": 24.5, "population": None, "source": "shape", "synthetic": True},
         ],
-        runs=[{"run": "stiff", "start": "young", "parameters": parameters, "summary": summary}],
+        runs=[
+            {"run": "stiff", "start": "young", "growth_of": "", "parameters": parameters, "summary": summary},
+            {"run": "led", "start": "a", "growth_of": "population cohort", "parameters": led, "summary": summary},
+            {"run": "own", "start": "a", "growth_of": "own", "parameters": led, "summary": summary},
+        ],
         software={"gyriflow": "0.1", "packages": packages},
         surface={"edge_length_mm": 0.8},
         mesh={"order": 2, "mesher": "tetgen"},
@@ -199,6 +204,8 @@ def test_the_methods_say_what_was_run():
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
+    assert "led to (population cohort): a population's growth, not the subject's own. Stress" in text
+    assert text.count("its own later one") == 1
     assert "itself [4]" in text
     assert "<li><p>Run <em>stiff</em>" in caption_html(text)
     assert "system-message" not in caption_html(text)

@@ -177,6 +177,55 @@ def test_later_scans_of_the_subject_come_first(labels):
     assert study(brains).scans == {"s": ["b21", "own"]}
 
 
+def cohort(labels):
+    scans = [("a", 22), ("a", 26), ("b", 24), ("b", 27), ("c", 25)]
+    return [labels(week, id=f"{subject}{week}", subject=subject) for subject, week in scans]
+
+
+MEASURED = {"runs": {"m": {"preset": "measured"}}, "folding": {"end_week": 27}, "start": ["a22", "b24"]}
+
+
+def test_growth_is_of_one_subject_whose_scans_alone_it_leads_to(labels):
+    found = study(cohort(labels), **MEASURED)
+    assert {name: ids(brains) for name, brains in found.series.brains.items()} == {
+        "a": ["a22", "a26"],
+        "b": ["b24", "b27"],
+    }
+    # each up to its own last scan
+    assert {one.start.id: (ids(one.real.values()), one.weeks[-1]) for one in found.folded} == {
+        "a22": (["a26"], 26.0),
+        "b24": (["b27"], 27.0),
+    }
+    assert [found.growth_of(one) for one in found.folded] == ["own", "own"]
+    with pytest.raises(InputError, match="none; the growth series are a, b"):
+        study(cohort(labels), **MEASURED | {"start": "c25"})
+    # nor does a brain follow the sizes of another subject
+    sizes = MEASURED | {"runs": {"s": {"growth": "sizes"}}}
+    alone = study(cohort(labels)[2:], **sizes | {"start": "c25"}).folded[0]
+    assert (alone.series, study(cohort(labels)[2:], **sizes | {"start": "b24"}).folded[0].series) == (None, "b")
+
+
+def test_a_chain_of_several_subjects_is_asked_for_by_name_and_called_a_populations(labels):
+    found = study(cohort(labels), growth={"brains": {"cohort": ["all"]}}, **MEASURED)
+    assert ids(found.chains["a22", "self"].brains) == ["a22", "b24", "c25", "a26", "b27"]
+    one = found.folded[0]
+    assert (ids(one.real.values()), one.weeks[-1]) == (["b24", "c25", "a26", "b27"], 27.0)
+    assert found.growth_of(one) == "population cohort"
+    # a list of brains is no chain
+    assert study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "b24"}).growing
+    with pytest.raises(InputError, match="none; the growth series are b"):
+        study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "a22"})
+
+
+def test_the_scans_of_another_subject_are_no_atlas(labels):
+    atlas = [labels(week, id=f"atlas{week}", population="atlas") for week in (24, 25, 26, 27)]
+    expected = {"runs": {"e": {"preset": "expected"}}, "folding": {"end_week": 27}, "start": "c25"}
+    found = study([*cohort(labels), *atlas], **expected)
+    assert ids(found.chains["c25", "atlas"].later) == ["atlas25", "atlas26", "atlas27"]
+    assert [found.growth_of(one) for one in found.folded] == ["series atlas"]
+    assert ids(found.folded[0].compared["26.00"]) == ["atlas26"]
+
+
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
     found = study([{"id": f"b{week}", "week": week, **SPHERE} for week in (21, 22)])
     (one,) = found.folded
@@ -302,7 +351,10 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     assert study(of_two(22, population=None), **EXPECTED).folded[0].kind == "explained"
     # a later scan of the same subject is its own, whatever it is called
     scans = [brain | ({"subject": "s"} if brain["id"] in ("own22", "b24") else {}) for brain in of_two(22)]
-    assert not study(scans, **EXPECTED).folded[0].from_others_only
+    atlas = [brain["id"] for brain in scans[1:]]
+    assert not study(scans, growth={"brains": {"with it": atlas}}, **EXPECTED).folded[0].from_others_only
+    # which is of no other subject's series but by name
+    assert study(scans, **EXPECTED).folded[0].from_others_only
 
 
 def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
