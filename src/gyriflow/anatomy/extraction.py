@@ -1,13 +1,14 @@
 """Masks of voxels, their topology made that of balls, what hangs on them by stalks cut off, and isosurfaces."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import ndtr
-from skimage.measure import euler_number, marching_cubes
+from skimage.measure import marching_cubes
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
@@ -24,12 +25,13 @@ LEAST_SLIT_VOXELS = 20
 # a part of this size of the largest is kept: two hemispheres that do not touch
 COMPARABLE = 0.2
 # voxels inside are joined through faces only, voxels outside through edges and corners as well
-FACES = 1
 INSIDE = ndimage.generate_binary_structure(3, 1)
 OUTSIDE = ndimage.generate_binary_structure(3, 3)
 EDGE_NEIGHBOURS = ndimage.generate_binary_structure(3, 2)
 # radii in voxels of the openings and closings that find what joins or pierces the mask
 REACHES = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
+# how far around a change its effect on parts is looked for, in voxels: at last in the whole volume
+MARGINS = (4, 16, 64, 100_000)
 # distance from the level of one half at which changed voxels are put
 STEP = 0.2
 # stalks are thinner than twice this
@@ -64,8 +66,12 @@ def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
     """
     number, _ = ndimage.label(mask, OUTSIDE)
     for index, tight in enumerate(ndimage.find_objects(number), start=1):
-        box = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in tight)
+        box = _wider(tight, 1)
         yield box, number[box] == index
+
+
+def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
+    return tuple(slice(max(side.start - margin, 0), side.stop + margin) for side in box)
 
 
 def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArray[np.float32]:
@@ -84,12 +90,9 @@ def remove_bridges(mask: Mask, field: NDArray[np.float32], left_shut: Mask) -> t
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~left_shut
-    inside, slits = field > LEVEL, np.zeros_like(mask)
-    for box, slit in parts_in_boxes(closed):
-        opened = inside[box] & ~slit
-        if slit.sum() >= LEAST_SLIT_VOXELS and _euler_gain(inside[box], opened) == 0:
-            inside[box] = opened
-            slits[box] |= slit
+    number, gains = _parts_with_gains(field > LEVEL, closed)
+    opened = (np.bincount(number[closed], minlength=len(gains)) >= LEAST_SLIT_VOXELS) & (gains == 0)
+    slits = closed & opened[number]
     # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
     beside = 1.0 - (ndtr(1.5 / SMOOTHING_VOXELS) - ndtr(0.5 / SMOOTHING_VOXELS))
     return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
@@ -151,7 +154,7 @@ def handles(mask: Mask) -> int:
     """Return the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
     parts = ndimage.label(mask, INSIDE)[1]
     cavities = ndimage.label(~np.pad(mask, 1), OUTSIDE)[1] - 1
-    return parts + cavities - int(euler_number(mask, connectivity=FACES))
+    return parts + cavities - _euler_number(mask)
 
 
 def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
@@ -169,19 +172,13 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
         if left == 0:
             break
         for fills, box, patch in _patches(mask, reach):
-            now = mask[box]
             # an earlier change may have touched this patch
-            patch = patch & (now != fills)
-            changed = np.where(patch, fills, now)
-            if left == 0 or not patch.any() or _euler_gain(now, changed) <= 0:
+            patch = patch & (mask[box] != fills)
+            changed = np.where(patch, fills, mask[box])
+            if left == 0 or not patch.any() or _euler_gain(mask[box], changed) <= 0:
                 continue
-            trial = mask.copy()
-            trial[box] = _least_change(now, changed, field[box])
-            trial = ndimage.binary_fill_holes(trial)
-            remaining = handles(trial)
-            same_parts = ndimage.label(trial, INSIDE)[1] == ndimage.label(mask, INSIDE)[1]
-            if remaining < left and same_parts:
-                mask, left = trial, remaining
+            if removed := _change(mask, box, _least_change(mask[box], changed, field[box])):
+                left -= removed
                 counts[fills] += 1
     added, cut = mask & ~original, original & ~mask
     changed = np.where(added, 0.5 + STEP, np.where(cut, 0.5 - STEP, field)).astype(field.dtype)
@@ -222,17 +219,99 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(doubtful, apart, field).astype(np.float32)
 
 
+def dilated(mask: Mask, radius: float) -> Mask:
+    """Return the voxels of an (i, j, k) volume within a radius, in voxels and at most 10, of those of the mask.
+
+    Squared distances are summed axis by axis, in bytes: a distance transform takes ten times the time and memory.
+    """
+    squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
+    for axis in range(3):
+        nearest = squared.copy()
+        new, old = np.moveaxis(nearest, axis, 0), np.moveaxis(squared, axis, 0)
+        for step in range(1, int(radius) + 1):
+            np.minimum(new[step:], old[:-step] + step**2, out=new[step:])
+            np.minimum(new[:-step], old[step:] + step**2, out=new[:-step])
+        squared = nearest
+    return squared <= radius**2
+
+
 def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
-    far_outside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(~mask) <= reach) > reach
-    far_inside = ndimage.distance_transform_edt(ndimage.distance_transform_edt(mask) > reach) == 0
-    opened = ndimage.distance_transform_edt(far_inside) <= reach
-    changes = (True, far_outside & ~mask), (False, mask & ~opened)
-    patches = [(fills, box, patch) for fills, change in changes for box, patch in parts_in_boxes(change)]
+    closed = ~dilated(~dilated(mask, reach), reach)
+    opened = dilated(~dilated(~mask, reach), reach)
+    patches = []
+    for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
+        number, gains = _parts_with_gains(mask, change)
+        boxes = ndimage.find_objects(number)
+        for index in np.flatnonzero(gains > 0):
+            box = _wider(boxes[index - 1], 1)
+            patches.append((fills, box, number[box] == index))
     return sorted(patches, key=lambda item: item[2].sum())
 
 
+def _change(mask: Mask, box: tuple[slice, ...], changed: Mask) -> int:
+    """Change a mask in a box where this removes handles and leaves its parts as they are; return how many it removes.
+
+    What it joins or parts may be joined elsewhere as well, which is looked for in ever wider boxes.
+    """
+    for margin in MARGINS:
+        wide = _wider(box, margin)
+        inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, wide, strict=True))
+        before, after = mask[wide], mask[wide].copy()
+        after[inner] = changed
+        after = ndimage.binary_fill_holes(after, OUTSIDE)
+        gain = _euler_gain(before, after)
+        # the frame joins all that reaches the box's border
+        framed = [ndimage.label(np.pad(one, 1, constant_values=True), INSIDE)[1] for one in (before, after)]
+        if gain <= 0 or framed[0] < framed[1]:
+            return 0
+        if _pieces(before) == _pieces(after):
+            mask[wide] = after
+            return gain
+    return 0
+
+
+def _pieces(mask: Mask) -> tuple[int, int]:
+    return ndimage.label(mask, INSIDE)[1], ndimage.label(~mask, OUTSIDE)[1]
+
+
+def _euler_cells(mask: Mask) -> NDArray[np.int8]:
+    """Return what each (i, j, k) voxel adds to the Euler number, with the seven next ones along the axes.
+
+    Voxels that are joined by faces have that of a complex of points, edges, squares and cubes.
+    """
+
+    def pairs(one: Mask, axis: int) -> Mask:
+        both = np.zeros_like(one)
+        ends = np.moveaxis(one, axis, 0)
+        np.logical_and(ends[:-1], ends[1:], out=np.moveaxis(both, axis, 0)[:-1])
+        return both
+
+    x, y, z = (pairs(mask, axis) for axis in range(3))
+    xy, xz, yz = pairs(x, 1), pairs(x, 2), pairs(y, 2)
+    return mask.astype(np.int8) - x - y - z + xy + xz + yz - pairs(xy, 2)
+
+
+def _euler_number(mask: Mask) -> int:
+    return int(_euler_cells(mask).sum(dtype=np.int64))
+
+
 def _euler_gain(before: Mask, after: Mask) -> int:
-    return int(euler_number(after, connectivity=FACES) - euler_number(before, connectivity=FACES))
+    return _euler_number(after) - _euler_number(before)
+
+
+def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the numbers of the parts of a `change` of the mask, and by number the Euler number that each one adds.
+
+    The parts touch neither at edges nor at corners, so that one cell of eight voxels sees one of them only.
+    """
+    number, count = ndimage.label(change, OUTSIDE)
+    gain = _euler_cells(mask ^ change) - _euler_cells(mask)
+    places, last = np.argwhere(gain), np.array(mask.shape) - 1
+    part = np.zeros(len(places), dtype=np.int64)
+    for corner in np.ndindex(2, 2, 2):
+        part = np.maximum(part, number[tuple(np.minimum(places + corner, last).T)])
+    gains = np.bincount(part, weights=gain[tuple(places.T)], minlength=count + 1)
+    return number, gains.astype(np.int64)
 
 
 def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
@@ -247,8 +326,7 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
     while given_back and len(places):
         waiting = []
         for i, j, k in places:
-            around = mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2]
-            if _is_simple(around):
+            if _is_simple(mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2].tobytes()):
                 mask[i, j, k] = ~mask[i, j, k]
             else:
                 waiting.append((i, j, k))
@@ -257,8 +335,10 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
     return mask[1:-1, 1:-1, 1:-1]
 
 
-def _is_simple(around: Mask) -> bool:
-    inside, outside = around & EDGE_NEIGHBOURS, ~around
+@lru_cache(maxsize=2**16)
+def _is_simple(around: bytes) -> bool:
+    voxels = np.frombuffer(around, dtype=bool).reshape(3, 3, 3)
+    inside, outside = voxels & EDGE_NEIGHBOURS, ~voxels
     inside[1, 1, 1] = outside[1, 1, 1] = False
     number, _ = ndimage.label(inside, INSIDE)
     touching = np.unique(number[INSIDE & inside])
@@ -280,15 +360,19 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     large = sizes >= MOST_SHARE * sizes.sum()
     main = np.isin(number, np.flatnonzero(large) + 1)
     solid = mask & (ndimage.distance_transform_edt(~main, sampling=size) <= NECK_RADIUS_MM)
-    hanging = np.zeros_like(mask)
-    for part in np.flatnonzero(~large) + 1:
-        ball = number == part
-        near = ndimage.distance_transform_edt(~ball, sampling=size) <= NECK_RADIUS_MM + REACH_MM
-        loose, _ = ndimage.label(mask & ~solid & near, INSIDE)
+    most = MOST_SHARE * mask.sum()
+    hanging, reach = np.zeros_like(mask), NECK_RADIUS_MM + REACH_MM
+    for part, tight in enumerate(ndimage.find_objects(number)):
+        if large[part]:
+            continue
+        box = _wider(tight, int(reach / size.min()) + 2)
+        ball = number[box] == part + 1
+        near = ndimage.distance_transform_edt(~ball, sampling=size) <= reach
+        loose, _ = ndimage.label(mask[box] & ~solid[box] & near, INSIDE)
         cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
-        large_enough = cut.sum() * size.prod() >= LEAST_MM3 and cut.sum() < MOST_SHARE * mask.sum()
-        if large_enough and 0 < _contact_mm2(cut, mask & ~cut, size) <= MOST_NECK_MM2:
-            hanging |= cut
+        large_enough = cut.sum() * size.prod() >= LEAST_MM3 and cut.sum() < most
+        if large_enough and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MOST_NECK_MM2:
+            hanging[box] |= cut
     number, count = ndimage.label(hanging, INSIDE)
     left = mask & ~hanging
     return left, [

@@ -271,12 +271,19 @@ class Fissure:
         # gaps here and there between touching walls show no fissure, but would leave tunnels in one that is opened
         return ~ndimage.binary_opening(shown, iterations=SHOWN_CELLS)
 
-    def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float, where: Mask) -> Mask:
-        """Return which voxels of an (i, j, k) volume are within a distance of the mid-surface, where (a, b) holds."""
-        points = transform_points(np.indices(shape).reshape(3, -1).T, affine)
-        close = np.abs(self.height_above(points)) < reach_mm
-        close[close] = where[self.nearest_cells(points[close])]
-        return np.asarray(close).reshape(shape)
+    def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float) -> tuple[Ints, Floats, Floats]:
+        """Return the voxels of an (i, j, k) volume within a distance of the mid-surface: their indices (n, 3), their
+        places in mm (n, 3) and their distances (n,).
+        """
+        steps = (affine[:3, :3].T @ self.plane.normal).tolist()
+        i, j, k = (step * np.arange(size, dtype=np.float32) for step, size in zip(steps, shape, strict=True))
+        first = float(self.plane.normal @ affine[:3, 3] - self.plane.offset)
+        above_plane = np.abs((i + first)[:, None, None] + j[:, None] + k)
+        voxels = np.argwhere(above_plane < reach_mm + np.abs(self.heights).max() + SPACING_MM)
+        points = transform_points(voxels, affine)
+        distance = np.abs(self.height_above(points))
+        close = distance < reach_mm
+        return voxels[close], points[close], distance[close]
 
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
@@ -329,14 +336,12 @@ def open_fissure(
         return field
     depth = np.where(reached, depth, -ndimage.distance_transform_edt(~reached) * SPACING_MM)
     # voxels near the mid-surface: outside the opening by this distance
-    points = transform_points(np.indices(field.shape).reshape(3, -1).T, affine)
-    height = np.abs(fissure.height_above(points))
-    near = height < FISSURE_MM / 2 + 2.0 * voxel
-    below = -ndimage.map_coordinates(depth, fissure.cells(points[near]), order=1, mode="nearest")
-    outside = np.maximum(height[near] - FISSURE_MM / 2, below)
-    result = field.ravel().copy()
-    result[near] = np.minimum(result[near], np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0))
-    return result.reshape(field.shape)
+    near, points, distance = fissure.near(field.shape, affine, FISSURE_MM / 2 + 2.0 * voxel)
+    below = -ndimage.map_coordinates(depth, fissure.cells(points), order=1, mode="nearest")
+    outside = np.maximum(distance - FISSURE_MM / 2, below)
+    result, at = field.copy(), tuple(near.T)
+    result[at] = np.minimum(result[at], np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0))
+    return result
 
 
 def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:

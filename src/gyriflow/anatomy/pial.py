@@ -174,7 +174,10 @@ def from_labels(
     slit, _ = remove_bridges(mask, field, np.zeros_like(mask))
     hidden = fissure.hidden(slit > LEVEL, affine)
     # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
-    left_shut = fissure.near(mask.shape, affine, FISSURE_REACH_MM, hidden) if scheme.cortex else np.zeros_like(mask)
+    left_shut = np.zeros_like(mask)
+    if scheme.cortex:
+        voxels, points, _ = fissure.near(mask.shape, affine, FISSURE_REACH_MM)
+        left_shut[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
     field, report["slit_voxels_reopened"] = remove_bridges(mask, field, left_shut)
     if scheme.cortex:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)

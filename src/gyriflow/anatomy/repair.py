@@ -325,12 +325,12 @@ def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
             offset = (volume_mm3 - signed_volume(moved)) / share * free
             moved = TriangleMesh(moved.vertices + offset[:, None] * vertex_normals(moved), moved.faces)
         if not (cutting := self_intersecting_faces(moved)).any():
-            break
+            return moved
         near = np.isin(mesh.faces, mesh.faces[cutting]).any(axis=1)
         free[mesh.faces[near]] = False
         if not free.any():
-            return mesh
-    return mesh if faults(moved) else moved
+            break
+    return mesh
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
