@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -168,7 +169,8 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
     mask = original.copy()
     left = handles(mask)
     counts = {False: 0, True: 0}
-    for reach in REACHES:
+    # at last a cut may leave voxels that reach the outside through edges and corners only
+    for closed_by, reach in product((INSIDE, OUTSIDE), REACHES):
         if left == 0:
             break
         for fills, box, patch in _patches(mask, reach):
@@ -177,7 +179,7 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
             changed = np.where(patch, fills, mask[box])
             if left == 0 or not patch.any() or _euler_gain(mask[box], changed) <= 0:
                 continue
-            if removed := _change(mask, box, _least_change(mask[box], changed, field[box])):
+            if removed := _change(mask, box, _least_change(mask[box], changed, field[box]), closed_by):
                 left -= removed
                 counts[fills] += 1
     added, cut = mask & ~original, original & ~mask
@@ -248,17 +250,18 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
     return sorted(patches, key=lambda item: item[2].sum())
 
 
-def _change(mask: Mask, box: tuple[slice, ...], changed: Mask) -> int:
+def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) -> int:
     """Change a mask in a box where this removes handles and leaves its parts as they are; return how many it removes.
 
-    What it joins or parts may be joined elsewhere as well, which is looked for in ever wider boxes.
+    What it joins or parts may be joined elsewhere as well, which is looked for in ever wider boxes. Cavities, out of
+    which no neighbours of `closed_by` lead, are filled.
     """
     for margin in MARGINS:
         wide = _wider(box, margin)
         inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, wide, strict=True))
         before, after = mask[wide], mask[wide].copy()
         after[inner] = changed
-        after = ndimage.binary_fill_holes(after, OUTSIDE)
+        after = ndimage.binary_fill_holes(after, closed_by)
         gain = _euler_gain(before, after)
         # the frame joins all that reaches the box's border
         framed = [ndimage.label(np.pad(one, 1, constant_values=True), INSIDE)[1] for one in (before, after)]

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 from skimage.measure import euler_number as euler_number_of_mask
 
-from gyriflow.anatomy.extraction import handles, isosurface, unambiguous, without_handles
+from gyriflow.anatomy.extraction import dilated, handles, isosurface, unambiguous, without_handles
 from gyriflow.geometry.triangles import euler_number
 
 
@@ -70,3 +70,18 @@ def test_isosurface_has_the_topology_of_voxels_joined_by_faces(seed):
     surface = isosurface(unambiguous(field(mask)), np.eye(4))
     # the boundary of a body has twice the body's Euler number
     assert euler_number(surface) == 2 * euler_number_of_mask(mask, connectivity=1)
+
+
+@pytest.mark.parametrize("radius", [1.0, 1.5, 3.0, 4.5, 6.0])
+def test_dilation_reaches_as_far_as_the_radius(radius):
+    mask = np.pad(ndimage.gaussian_filter(np.random.default_rng(0).normal(size=(12, 16, 20)), 1.0) > 0.15, 5)
+    np.testing.assert_array_equal(dilated(mask, radius), ndimage.distance_transform_edt(~mask) <= radius)
+
+
+def test_a_bridge_is_cut_though_what_it_joins_meets_far_away_only():
+    mask = np.zeros((16, 150, 20), dtype=bool)
+    mask[4:12, 4:146, 4:8] = mask[4:12, 4:146, 12:16] = mask[4:12, 4:8, 4:16] = True
+    # a loop that is longer than the boxes in which its ends are looked for
+    mask[8, 140, 8:12] = True
+    repaired, counts = without_handles(field(mask))
+    assert (counts["handles_left"], counts["bridges_cut"], counts["voxels_cut_from_bridges"]) == (0, 1, 1)
