@@ -153,9 +153,8 @@ def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
 
 def handles(mask: Mask) -> int:
     """Return the number of handles of an (i, j, k) mask: parts plus cavities minus Euler number."""
-    parts = ndimage.label(mask, INSIDE)[1]
-    cavities = ndimage.label(~np.pad(mask, 1), OUTSIDE)[1] - 1
-    return parts + cavities - _euler_number(mask)
+    parts, outside = _pieces(np.pad(mask, 1))
+    return parts + outside - 1 - _euler_number(mask)
 
 
 def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
@@ -243,10 +242,7 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
         number, gains = _parts_with_gains(mask, change)
-        boxes = ndimage.find_objects(number)
-        for index in np.flatnonzero(gains > 0):
-            box = _wider(boxes[index - 1], 1)
-            patches.append((fills, box, number[box] == index))
+        patches += [(fills, box, patch) for box, patch in parts_in_boxes(change & (gains > 0)[number])]
     return sorted(patches, key=lambda item: item[2].sum())
 
 
@@ -282,16 +278,15 @@ def _euler_cells(mask: Mask) -> NDArray[np.int8]:
 
     Voxels that are joined by faces have that of a complex of points, edges, squares and cubes.
     """
+    x, y, z = (_pairs(mask, axis) for axis in range(3))
+    xy, xz, yz = _pairs(x, 1), _pairs(x, 2), _pairs(y, 2)
+    return mask.astype(np.int8) - x - y - z + xy + xz + yz - _pairs(xy, 2)
 
-    def pairs(one: Mask, axis: int) -> Mask:
-        both = np.zeros_like(one)
-        ends = np.moveaxis(one, axis, 0)
-        np.logical_and(ends[:-1], ends[1:], out=np.moveaxis(both, axis, 0)[:-1])
-        return both
 
-    x, y, z = (pairs(mask, axis) for axis in range(3))
-    xy, xz, yz = pairs(x, 1), pairs(x, 2), pairs(y, 2)
-    return mask.astype(np.int8) - x - y - z + xy + xz + yz - pairs(xy, 2)
+def _pairs(mask: Mask, axis: int) -> Mask:
+    ends = np.moveaxis(mask, axis, -1)
+    both = ends & np.concatenate([ends[..., 1:], np.zeros_like(ends[..., :1])], axis=-1)
+    return np.moveaxis(both, -1, axis)
 
 
 def _euler_number(mask: Mask) -> int:
