@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InputError, MeshError
-from ..geometry.jacobians import lower_bounds
+from ..geometry.jacobians import EDGES, lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
@@ -58,8 +58,7 @@ def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float)
     cortex = mesh.corners[depth <= thickness_mm]
     if not len(cortex):
         cortex = mesh.corners
-    pairs = cortex[:, [0, 1, 0, 2, 0, 3, 1, 2, 1, 3, 2, 3]].reshape(-1, 2)
-    return mean_length(mesh.vertices, pairs)
+    return float(np.mean([mean_length(mesh.vertices, cortex[:, pair]) for pair in EDGES]))
 
 
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
