@@ -8,7 +8,7 @@ from gyriflow.parameters.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of
 from gyriflow.study.paths import *
-from gyriflow.cli.launch import GOES_ON, LOOKS, hold_lock, refused_brains
+from gyriflow.cli.launch import GOES_ON, LOOKS, MEASURES_ONLY, hold_lock, refused_brains
 from gyriflow.cli.provenance import input_contents, require_own_results
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
@@ -41,7 +41,7 @@ def validated_study():
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
         found = load(config, base, keep_going=GOES_ON in os.environ)
-        study = resolve(found, refused_brains())
+        study = resolve(found.measured_only if MEASURES_ONLY in os.environ else found, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             require_own_results(Path.cwd(), files, found, record=RUNS)

@@ -61,7 +61,7 @@ rule html_report:
         rules.metrics.input,
         rules.influence_figures.input,
         asked_for(FIGURES, "report", "quality"),
-        runs=rules.study_runs.output.csv,
+        runs=rules.study_runs.output.csv if study.folded else [],
         quality=rules.quality_table.output[0],
         warnings=rules.study_resources.output.warnings,
         validation=f"{STUDY}/validation.csv" if study.validated else [],

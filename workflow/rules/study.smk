@@ -31,6 +31,7 @@ rule derived_tables:
         scans=study.scans,
         covariates={brain.id: brain.given.covariates for brain in study.brains.values()},
         reference=study.norm_reference,
+        subjects={brain.id: brain.subject for brain in study.brains.values()},
     script:
         "../scripts/derived_tables.py"
 
@@ -86,7 +87,7 @@ rule study_runs:
 rule metrics:
     input:
         [f"{brain.measured.folder}/metrics.csv" for brain in study.brains.values()],
-        rules.study_runs.output,
+        rules.study_runs.output if study.folded else [],
         expand(
             rules.study_table.output,
             table=[name for name, files in study.tables.items() if files],

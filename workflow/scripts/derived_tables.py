@@ -19,9 +19,9 @@ with step(snakemake.log[0]):
         "metrics_wide": wide_table(long, params.covariates),
         "change": change_between_scans(long, params.scans),
         "asymmetry": pd.concat(parts, ignore_index=True),
-        "norms": measured_norms(metrics, params.reference),
-        "norm_curves": norm_curves(metrics, params.reference),
-        "centiles": measured_scores(metrics, params.reference),
+        "norms": measured_norms(metrics, params.reference, params.subjects),
+        "norm_curves": norm_curves(metrics, params.reference, params.subjects),
+        "centiles": measured_scores(metrics, params.reference, params.subjects),
         "spectral_distance": spectral_distances(read_table(files.spectra)),
     }
     for name, table in tables.items():

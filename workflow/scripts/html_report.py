@@ -22,7 +22,8 @@ with step(snakemake.log[0]):
         configuration=yaml_text(hide_paths(params.config)),
         shown=shown_figures(words, figures, contents),
         validation=read_table(files.validation) if files.validation else None,
-        **{name: read_table(files[name]) for name in ("quality", "runs", "warnings")},
+        **{name: read_table(files[name]) for name in ("quality", "warnings")},
+        runs=read_table(files.runs) if files.runs else None,
     )
     parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
     write_text(snakemake.output[0], report_page(read_text(files.page), parts, read_json(files.view), **content))

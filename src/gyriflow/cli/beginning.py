@@ -7,8 +7,9 @@ from typing import Any
 import yaml
 
 from ..config.atlas import Atlas, AtlasSettings
+from ..config.loading import OF_FOLDING
 from ..errors import InputError
-from ..io.files import write_text
+from ..io.files import read_json, write_json, write_text
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_keys
 from ..parameters.growth import BEFORE_GW
@@ -42,8 +43,10 @@ SUBJECT = "subject"
 """Id and population of the brain of a prediction."""
 
 
-def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
+def write_configuration(folder: Path, path: Path, force: bool, fold: bool = True) -> Iterator[str]:
     """Write a configuration for the brains of a folder; yield what was recognised, a line a kind.
+
+    With `fold`, one of them is folded.
 
     InputError where nothing was recognised, or a configuration is there and `force` is not set.
     """
@@ -62,7 +65,7 @@ def write_configuration(folder: Path, path: Path, force: bool) -> Iterator[str]:
     weeks, several = _weeks(series), series is not brains
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
     rest = REST.format(start=series[0].entry["id"], end=end, measured=MEASURED if several else "")
-    write_text(path, HEAD + "".join(lines) + rest)
+    write_text(path, HEAD + "".join(lines) + (rest if fold else ""))
     for brain in brains:
         kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
         yield f"{brain.entry['id']}: {kind}, week {brain.entry['week']}"
@@ -106,20 +109,44 @@ def write_prediction(
     yield f"{SUBJECT}: {labels} ({scheme}), {weeks[0]:g} GW; atlas {section}; written to {path}"
 
 
+def remembered(path: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of a call for all of a BIDS data set: those that it has not are of earlier calls in a file."""
+    earlier = read_json(path) if path.is_file() else {}
+    return {key: value if value not in (None, ()) else earlier.get(key) for key, value in options.items()}
+
+
+def remember(path: Path, options: dict[str, Any]) -> None:
+    """Write the options of a call for some of a BIDS data set, whose participants and sessions join earlier ones."""
+    earlier = read_json(path) if path.is_file() else options
+    kept = dict(options)
+    for key in ("participants", "sessions"):
+        # none stands for all
+        several = bool(options[key] and earlier[key])
+        kept[key] = list(dict.fromkeys([*earlier[key], *options[key]])) if several else []
+    write_json(path, kept)
+
+
 def write_bids(
-    folder: Path, path: Path, participants: Sequence[str], sessions: Sequence[str], files: str, settings: Path | None
+    folder: Path,
+    path: Path,
+    *,
+    participants: Sequence[str] | None = None,
+    sessions: Sequence[str] | None = None,
+    files: str | None = None,
+    settings: str | None = None,
+    fold: bool | None = None,
 ) -> list[str]:
     """Write a configuration for the scans of a BIDS data set, and return their ids.
 
     Of it are taken the participants and sessions with these labels, all where there are none, and those files whose
-    paths match a pattern. `settings` is a configuration without brains; what it does not say is as `init` has it, and
-    the first scan of each subject that has several is folded. InputError where a scan has several files, no age or no
-    scheme, or nothing is found.
+    paths match a pattern. `settings` is a configuration without brains; what it does not say is as `init` has it. They
+    are measured; with `fold` the first scan of each subject that has several is folded, too. InputError where a scan
+    has several files, no age or no scheme, or nothing is found.
     """
-    subjects = {f"sub-{label.removeprefix('sub-')}" for label in participants}
-    own_sessions = {f"ses-{label.removeprefix('ses-')}" for label in sessions}
+    subjects = {f"sub-{label.removeprefix('sub-')}" for label in participants or ()}
+    own_sessions = {f"ses-{label.removeprefix('ses-')}" for label in sessions or ()}
     brains = []
-    for brain in recognise(folder, files):
+    for brain in recognise(folder, files or "*"):
         entities = SUBJECT_AND_SESSION.match(brain.entry["id"])
         if entities and (not subjects or entities[1] in subjects) and (not own_sessions or entities[2] in own_sessions):
             brains.append(brain)
@@ -131,16 +158,15 @@ def write_bids(
         raise InputError("cannot be run as it is", path=folder, found="".join(problems), remedy=remedy)
     starts = [scans[0].entry["id"] for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
     weeks = _weeks(brains)
-    given = read_keys(settings) if settings else {}
+    given = read_keys(Path(settings)) if settings else {}
     runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if starts else {})
-    text = {
-        "brains": [_absolute(brain.entry, folder) for brain in brains],
-        "start": starts or brains[0].entry["id"],
-        "runs": runs,
-        **given,
-        "folding": {"end_week": max(max(weeks), min(weeks) + 1)} | (given.get("folding") or {}),
-        "metrics": {"white_surfaces": "all"} | (given.get("metrics") or {}),
-    }
+    text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
+    if fold:
+        text |= {"start": starts or brains[0].entry["id"], "runs": runs, **given}
+        text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (given.get("folding") or {})
+    else:
+        text |= {key: value for key, value in given.items() if key not in OF_FOLDING}
+    text["metrics"] = {"white_surfaces": "all"} | (given.get("metrics") or {})
     write_text(path, yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in brains]
 

@@ -120,7 +120,7 @@ def _contents(study: Study) -> str:
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
     brains, folded = len(study.brains), len(study.folded)
     parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
-    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})"]
+    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
     parts += [f"{len(compared.members)} of study {name}" for name, compared in study.comparisons.items()]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")

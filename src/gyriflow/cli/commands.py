@@ -94,6 +94,8 @@ def main() -> None:
       gyriflow status               how far it is (from another terminal)
       gyriflow view                 open the report
 
+    Measures alone, of a folder or a configuration: gyriflow measure my-data
+
     A BIDS data set: gyriflow BIDS OUT participant, then gyriflow BIDS OUT group (gyriflow bids --help)
 
     A brain of later weeks from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
@@ -177,6 +179,28 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
 
 
 @main.command()
+@click.argument("data", type=click.Path(exists=True, path_type=Path), metavar="FOLDER|CONFIG")
+@directory_option
+@cores_option
+@dry_run_option
+def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
+    """Measure the brains of a folder or a configuration, up to the report, and fold none.
+
+    A FOLDER without gyriflow.yaml gets one, as by `gyriflow init`. Neither `start` nor `folding` need be there; a brain
+    that fails does not hold up the others.
+    """
+    from .beginning import write_configuration
+    from .launch import MEASURES_ONLY
+
+    config = data / CONFIG if data.is_dir() else data
+    if not config.exists():
+        for line in write_configuration(data, config, force=False, fold=False):
+            click.echo(line)
+    os.environ[MEASURES_ONLY] = "1"
+    sys.exit(_run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all"))
+
+
+@main.command()
 @click.argument("labels", type=FILE)
 @click.option("--week", type=float, required=True, help="Gestational week of the brain.")
 @click.option("--until", type=float, required=True, help="Week to predict it for.")
@@ -208,24 +232,36 @@ def predict(
 @click.argument("level", type=click.Choice(LEVELS))
 @click.option(*LABELS[:2], "participants", multiple=True, help="These participants only.")
 @click.option(*LABELS[2:], "sessions", multiple=True, help="These sessions only.")
-@click.option("--files", default="*", help="Pattern of the paths of files to take, where a scan has several.")
-@click.option("--settings", type=FILE, help="Configuration without brains: what is folded, how, and how finely.")
+@click.option("--files", help="Pattern of the paths of files to take, where a scan has several.")
+@click.option(
+    "--settings",
+    type=click.Path(exists=True, dir_okay=False, resolve_path=True),
+    help="Configuration without brains: how finely all is made; what is folded, and how.",
+)
+@click.option("--fold/--no-fold", default=None, help="Fold the first of several scans of a subject. [default: no]")
 @click.option("-w", "--work-dir", "work", type=FOLDER, help="Folder of results/. [default: OUT/work]")
 @cores_option
 @dry_run_option
 def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_run: bool, **selection: Any) -> None:
     """Run a BIDS data set of tissue labels or surfaces, as a BIDS app: BIDS OUT LEVEL.
 
-    The level participant makes surfaces, maps and simulations of each participant in OUT, group the tables and the
-    report of all as well. What is there and up to date is kept; a participant that fails does not hold up the others.
+    The level participant makes surfaces and maps of each participant in OUT, with --fold simulations too; group the
+    tables and the report of all, with the options that participant had. What is there and up to date is kept; a
+    participant that fails does not hold up the others.
     """
     from ..io.exports import hand_over
-    from .beginning import write_bids
+    from .beginning import remember, remembered, write_bids
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
+    options = work / "bids.json"
+    if level == "group":
+        selection = remembered(options, selection)
     brains = write_bids(data, config, **selection)
-    click.echo(f"{len(brains)} scans: {', '.join(brains)}; {config}")
+    if level == "participant" and not dry_run:
+        remember(options, selection)
+    told = "folded, too" if selection["fold"] else "measured; --fold folds them, too"
+    click.echo(f"{len(brains)} scans, {told}: {', '.join(brains)}; {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
     if not dry_run and (exported / "dataset_description.json").is_file():

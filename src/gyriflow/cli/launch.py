@@ -44,9 +44,9 @@ SAYS_ITSELF = (
     *("list_params_changes", "generate_unit_tests"),
 )
 """Options under which Snakemake's own messages are wanted, or no steps are run."""
-GOES_ON, LOOKS = "GYRIFLOW_KEEP_GOING", "GYRIFLOW_LOOKS_ONLY"
-"""Environment variables that are set where a call goes on after a failed step or row of a table, and where it runs
-nothing."""
+GOES_ON, LOOKS, MEASURES_ONLY = "GYRIFLOW_KEEP_GOING", "GYRIFLOW_LOOKS_ONLY", "GYRIFLOW_MEASURES_ONLY"
+"""Environment variables that are set where a call goes on after a failed step or row of a table, where it runs nothing,
+and where it folds nothing."""
 REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
 FULL_BYTES = 4 * 2**20

@@ -17,6 +17,8 @@ from .root import Config
 from .runs import PRESETS
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
+OF_FOLDING = ("start", "folding", "runs", "studies", "calibrate")
+"""Sections of which a study has none that only measures."""
 
 
 def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
@@ -39,7 +41,9 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
         what was found and what is allowed.
     """
     folder = Path(base_dir)
-    plain = _with_presets({"folding": {}} | _plain(raw))
+    plain = _plain(raw)
+    if any(plain.get(section) is not None for section in OF_FOLDING):
+        plain = _with_presets({"folding": {}} | plain)
     atlases, problems = _atlases(plain.get("atlas"), folder)
     # None tells the checks that not all ids of brains are known
     plain["atlas"] = None if problems else [used.settings for used in atlases]

@@ -35,8 +35,8 @@ class Config(Settings):
     """Tetrahedral mesh."""
     growth: GrowthSettings = GrowthSettings()
     """Growth rates."""
-    folding: FoldingSettings
-    """Folding simulation."""
+    folding: FoldingSettings | None = None
+    """Folding simulation; `null`, and no `start` or other key of folding: brains are measured only."""
     runs: dict[RunName, Run] = Field({})
     """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
     studies: dict[StudyName, Study] = Field({})
@@ -63,6 +63,11 @@ class Config(Settings):
     def left_out(self) -> dict[str, dict[str, Any]]:
         """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
         return self._left_out
+
+    @property
+    def measured_only(self) -> "Config":
+        """This configuration with nothing to fold."""
+        return self.model_copy(update={"start": None, "folding": None, "runs": {}, "studies": {}, "calibrate": None})
 
     def scheme(self, brain: Brain) -> LabelScheme:
         """Return the scheme of a brain's labels."""

@@ -18,7 +18,7 @@ QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
 
 LEAST_BRAINS = 5
-"""Brains of a week, of which quantiles are given."""
+"""Subjects of a week, of which quantiles are given."""
 
 LEAST_FREEDOM = 3
 """Degrees of freedom that the scatter round a curve needs to be known."""
@@ -121,17 +121,24 @@ def published_scores(
     return pd.DataFrame(rows, columns=columns)
 
 
-def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+NO_SUBJECTS: Mapping[str, str] = {}
+"""Of brains that are each a subject of their own."""
+
+
+def measured_norms(
+    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
+) -> pd.DataFrame:
     """Return the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
 
-    Metrics have the columns subject, run, week, hemisphere, metric, value, unit; the reference are subjects whose
-    measured brains are the norm. Columns hemisphere, metric, unit, week, brains (at most half a week away), mean, sd
-    (NaN for one brain), q05, q25, q50, q75, q95 (NaN for fewer than five brains).
+    Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit; the reference are brains
+    that are the norm as measured, `subjects` whose scans they are. Columns hemisphere, metric, unit, week, brains
+    (subjects with a scan at most half a week away; several scans of one are their mean), mean, sd (NaN for one), q05,
+    q25, q50, q75, q95 (NaN for fewer than five).
     """
     rows = []
-    for names, brains in _by_metric(metrics, reference):
+    for names, brains in _by_metric(metrics, reference, subjects):
         for week in np.unique(brains["week"]):
-            near = brains.loc[(brains["week"] - week).abs() <= WINDOW_GW, "value"]
+            near = brains[(brains["week"] - week).abs() <= WINDOW_GW].groupby("person")["value"].mean()
             enough = near if len(near) >= LEAST_BRAINS else near.iloc[:0]
             quantiles = enough.quantile(list(QUANTILES.values()))
             rows.append((*names, brains["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
@@ -139,20 +146,23 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
     return pd.DataFrame(rows, columns=columns)
 
 
-def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+def measured_scores(
+    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
+) -> pd.DataFrame:
     """Return where brains stand among the measured brains of a reference, at their own week.
 
     A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
-    squares. The centile is that of a further brain's value under Student's distribution, which is the wider the fewer
-    brains there are: t = (x − expected)/(s √(1 + h)), with s the scatter round the curve and h the leverage of the
-    week. All brains of the table are scored; one of the reference is compared with the others.
+    squares, in which the scans of a subject count as one together. The centile is that of a further brain's value under
+    Student's distribution, which is the wider the fewer subjects there are: t = (x − expected)/(s √(1 + h)), with s the
+    scatter round the curve and h the leverage of the week. All brains of the table are scored; one of the reference is
+    compared with those of other subjects.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
-    (0 to 100), brains (of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of the
-    scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the reference's
-    weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
+    (0 to 100), brains (subjects of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of
+    the scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
+    reference's weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
     """
-    by_metric = dict(_by_metric(metrics, reference))
+    by_metric = dict(_by_metric(metrics, reference, subjects))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     table = metrics.assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
@@ -160,10 +170,10 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
         others = by_metric.get((row["hemisphere"], row["metric"]))
         if others is None:
             continue
-        # a measured brain is compared with the others
-        others = others[alike & ((row["run"] != MEASURED) | (others["subject"] != row["subject"]))]
-        weeks, values = others["week"].to_numpy(dtype=float), others["value"].to_numpy(dtype=float)
-        *score, flag = _score(row["week"], row["value"], weeks, values)
+        # a measured brain is compared with the others, of whom none is an earlier scan of itself
+        person = subjects.get(row["subject"], row["subject"])
+        others = others[alike & ((row["run"] != MEASURED) | (others["person"] != person))]
+        *score, flag = _score(row["week"], row["value"], others)
         rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
     columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
     return pd.DataFrame(rows, columns=columns)
@@ -179,8 +189,11 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     return sides.isin(sides[of_reference])
 
 
-def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
+def _by_metric(
+    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str]
+) -> list[tuple[Any, pd.DataFrame]]:
     rows = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
+    rows = rows.assign(person=rows["subject"].map(lambda brain: subjects.get(brain, brain)))
     return list(rows[~rows["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
 
 
@@ -193,21 +206,26 @@ class _Curve(NamedTuple):
     freedom: int
 
 
-def _curve(weeks: Floats, values: Floats, at: Floats) -> _Curve | None:
+def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
+    weeks, values = brains["week"].to_numpy(dtype=float), brains["value"].to_numpy(dtype=float)
+    # the scans of a subject are no independent brains
+    weights = 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
     distinct = len(np.unique(weeks))
     degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
-    freedom = len(weeks) - degree - 1
+    freedom = brains["person"].nunique() - degree - 1
     if freedom < LEAST_FREEDOM:
         return None
     centre = float(weeks.mean())
     powers, here = (np.vander(x - centre, degree + 1) for x in (weeks, at))
-    factors, *_ = np.linalg.lstsq(powers, values, rcond=None)
-    sd = float(np.sqrt(np.sum((values - powers @ factors) ** 2) / freedom))
-    leverage = np.einsum("ij,jk,ik->i", here, np.linalg.inv(powers.T @ powers), here)
+    factors, *_ = np.linalg.lstsq(powers * np.sqrt(weights)[:, None], values * np.sqrt(weights), rcond=None)
+    sd = float(np.sqrt(weights @ (values - powers @ factors) ** 2 / freedom))
+    leverage = np.einsum("ij,jk,ik->i", here, np.linalg.inv(powers.T @ (weights[:, None] * powers)), here)
     return _Curve(here @ factors, leverage, sd, freedom)
 
 
-def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+def norm_curves(
+    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
+) -> pd.DataFrame:
     """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
@@ -215,10 +233,10 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]
-    for (hemisphere, metric), brains in _by_metric(metrics, reference):
-        weeks, values = brains["week"].to_numpy(dtype=float), brains["value"].to_numpy(dtype=float)
+    for (hemisphere, metric), brains in _by_metric(metrics, reference, subjects):
+        weeks = brains["week"].to_numpy(dtype=float)
         at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
-        if (curve := _curve(weeks, values, at)) is not None:
+        if (curve := _curve(brains, at)) is not None:
             half = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd * np.sqrt(1 + curve.leverage)
             band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}
             names = {"hemisphere": hemisphere, "metric": metric, "unit": brains["unit"].iloc[0]}
@@ -226,11 +244,10 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def _score(
-    week: float, value: float, weeks: Floats, values: Floats
-) -> tuple[float, float, float, float, int, int, str]:
-    counts = len(weeks), int(np.count_nonzero(np.abs(weeks - week) <= WINDOW_GW))
-    curve = _curve(weeks, values, np.array([week])) if len(weeks) else None
+def _score(week: float, value: float, brains: pd.DataFrame) -> tuple[float, float, float, float, int, int, str]:
+    weeks = brains["week"].to_numpy(dtype=float)
+    counts = brains["person"].nunique(), brains.loc[np.abs(weeks - week) <= WINDOW_GW, "person"].nunique()
+    curve = _curve(brains, np.array([week])) if len(brains) else None
     if curve is None or not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:
         why = "too few brains" if curve is None else "outside the reference's weeks"
         return np.nan, np.nan, np.nan, np.nan, *counts, why

@@ -45,6 +45,9 @@ OVERVIEW = (
 WITH_NORMS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness", "mean_thickness")
 OF_REGIONS = ("area", "mean_sulcal_depth", "mean_curvature", "mean_local_gyrification_index", "mean_thickness")
 """The metrics of each chart, in their order."""
+SUBJECT_MARKERS = ("s", "^", "D", "v", "P", "X", "<", ">")
+"""Of the subjects of a cohort, up to what a legend holds."""
+NO_SUBJECTS: Mapping[str, str] = {}
 NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 _FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
@@ -69,32 +72,68 @@ def _lines(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:
         axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
 
 
-def _stars(axes: Axes, rows: pd.DataFrame, colour: Any = REAL_COLOUR, **look: Any) -> None:
-    if len(rows):
-        axes.plot(rows["week"], rows["value"], "*", **{"color": colour, "markersize": 7, "zorder": 3} | look)
+def _markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
+    """Return the marker of each subject that has measured brains; none where there are more than a legend holds."""
+    brains = rows.loc[rows["run"] == MEASURED, "subject"]
+    shown = list(dict.fromkeys(subjects[brain] for brain in brains if brain in subjects))
+    return dict(zip(shown, SUBJECT_MARKERS, strict=False)) if 1 < len(shown) <= len(SUBJECT_MARKERS) else {}
+
+
+def _subject_keys(markers: Mapping[str, str]) -> list[Artist]:
+    return [star(subject, marker=marker, markersize=5) for subject, marker in markers.items()]
+
+
+def _stars(
+    axes: Axes,
+    rows: pd.DataFrame,
+    colour: Any = REAL_COLOUR,
+    *,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+    markers: Mapping[str, str] = NO_SUBJECTS,
+    column: str = "value",
+    **look: Any,
+) -> None:
+    """Draw measured brains; the scans of a subject are joined by a line and have its marker."""
+    for person, scans in rows.groupby(rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False):
+        ordered, marker = scans.sort_values("week"), markers.get(str(person), "*")
+        if person and len(scans) > 1:
+            axes.plot(ordered["week"], ordered[column], "-", color=MUTED_COLOUR, linewidth=0.8, zorder=2.5)
+        size = 7 if marker == "*" else 4.5
+        shown = {"color": colour, "markersize": size, "zorder": 3} | look
+        axes.plot(ordered["week"], ordered[column], marker, **shown)
 
 
 @styled
-def metrics_chart(metrics: pd.DataFrame, *, runs: Sequence[str] = (), measured: str = REAL_BRAIN) -> Figure:
+def metrics_chart(
+    metrics: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    measured: str = REAL_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+) -> Figure:
     """Draw a panel per metric of whole brains over weeks: runs as lines, measured brains as black stars.
 
-    Metrics that the table lacks are left out.
+    The scans of a subject are joined, with a marker for each as far as a legend holds. Metrics that the table lacks are
+    left out.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; InputError if the table has none of the metrics.
+    subjects : {brain: whose scan it is}, where that is known
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     present, colours = _present(whole, OVERVIEW), run_colours(whole["run"], runs)
+    markers = _markers(whole, subjects)
     figure, panels = panel_figure(len(present))
     for axes, name in zip(panels, present, strict=True):
         rows = whole[whole["metric"] == name]
         _lines(axes, rows, colours)
-        _stars(axes, rows[rows["run"] == MEASURED])
+        _stars(axes, rows[rows["run"] == MEASURED], subjects=subjects, markers=markers)
         _title(axes, rows)
         week_axis(axes, whole["week"])
-    run_legend(figure, colours, measured=measured if (whole["run"] == MEASURED).any() else "")
+    stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(subjects if markers else ()), "run"]
+    run_legend(figure, colours, measured=measured if len(stars) else "", extra=_subject_keys(markers))
     return figure
 
 
@@ -107,6 +146,7 @@ def norms_chart(
     reference: Sequence[str],
     runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
     """Draw a panel per metric of whole brains: reference brains, the curve through them, and the others.
 
@@ -119,12 +159,14 @@ def norms_chart(
     curves : columns hemisphere, metric, week, expected, low, high
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
-        Subjects that the curves go through.
+        Brains that the curves go through.
+    subjects : as for `metrics_chart`
 
     InputError where none of the metrics is there.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     present, colours = _present(whole, WITH_NORMS), run_colours(whole["run"], runs)
+    markers = _markers(whole, subjects)
     figure, panels = panel_figure(len(present), panel_in=2.0, foot_in=0.6)
     others = False
     for axes, name in zip(panels, present, strict=True):
@@ -139,15 +181,15 @@ def norms_chart(
         _lines(axes, rows, colours)
         real = rows[rows["run"] == MEASURED]
         within = real["subject"].isin(reference)
-        _stars(axes, real[within], markersize=6)
-        _stars(axes, real[~within], RUN_COLOURS[-1])
+        _stars(axes, real[within], subjects=subjects, markers=markers)
+        _stars(axes, real[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers)
         others |= bool((~within).any())
         _title(axes, rows)
         week_axis(axes, rows["week"])
     extra: list[Artist] = [star("other measured brains", RUN_COLOURS[-1])] if others else []
     if len(curves):
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
-    run_legend(figure, colours, measured=measured, extra=extra)
+    run_legend(figure, colours, measured=measured, extra=[*_subject_keys(markers), *extra])
     return figure
 
 
@@ -291,11 +333,17 @@ def influence_spectra(
 
 
 @styled
-def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), measured: str = REAL_BRAIN) -> Figure:
+def spectra_weeks_chart(
+    spectra: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    measured: str = REAL_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+) -> Figure:
     """Draw the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
 
-    Runs are lines, measured brains black stars; bands that are cut off, are shares of such, or are not resolved have
-    open markers.
+    Runs are lines, measured brains black stars, those of a subject joined; bands that are cut off, are shares of such,
+    or are not resolved have open markers.
 
     Parameters
     ----------
@@ -315,6 +363,8 @@ def spectra_weeks_chart(spectra: pd.DataFrame, *, runs: Sequence[str] = (), meas
             colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
             if run != MEASURED:
                 axes.plot(series["week"], series["relative_power"], color=colour)
+            else:
+                _stars(axes, series, colour, subjects=subjects, column="relative_power", markersize=0)
             for trusted, part in series.groupby("trusted"):
                 look: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": size}
                 axes.plot(part["week"], part["relative_power"], marker, color=colour, **look)

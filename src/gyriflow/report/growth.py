@@ -26,6 +26,8 @@ from .style import (
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series; the one left out is the folding's."""
+MOST_PANELS = 4
+"""Series whose rates have a panel each, with more they share one."""
 _MARKERS = {"FetalFoldSim": "s", "Wang et al. 2021": "^"}
 PUBLISHED = pd.DataFrame(
     {
@@ -61,13 +63,18 @@ def growth_chart(
     """
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    figure, (of_areas, of_volumes, *of_rates) = panel_figure(2 + len(names), panel_in=2.4, foot_in=0.0)
+    together = len(names) > MOST_PANELS
+    panels = 1 if together else len(names)
+    figure, (of_areas, of_volumes, *of_rates) = panel_figure(2 + panels, panel_in=2.4, foot_in=0.0)
     labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
     for axes, (column, label) in zip((of_areas, of_volumes), labels.items(), strict=True):
         _sizes_panel(axes, areas, column, colours)
         axes.set_ylabel(label)
         if len(names) == 1:
             axes.set_title(wrap(measured, 32))
+    if together:
+        _rates_together(of_rates[0], rates, colours)
+        return figure
     for axes, (name, colour) in zip(of_rates, colours.items(), strict=True):
         _rates_panel(axes, rates[rates["series"] == name], colour, folding_rate_per_s)
         title = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
@@ -88,9 +95,20 @@ def _sizes_panel(axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[
         axes.plot(rows["week"], rows[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **look)
     from_zero(axes)
     week_axis(axes, areas["week"])
-    if len(colours) > 1:
+    if 1 < len(colours) <= len(SERIES_COLOURS):
         # in the place of a title, where no curve can be
         axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0, reverse=True)
+
+
+def _rates_together(axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str]) -> None:
+    """Draw the growth rate of each interval of many series as a line from week to week."""
+    for name, colour in colours.items():
+        for _, row in rates[rates["series"] == name].iterrows():
+            axes.plot([row["from_week"], row["to_week"]], [1e7 * row["rate_per_s"]] * 2, color=colour)
+    axes.axhline(0, color="black", linewidth=0.6)
+    axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
+    axes.set_title("tangential growth rate")
+    week_axis(axes, [*rates["from_week"], *rates["to_week"]])
 
 
 def _rates_panel(

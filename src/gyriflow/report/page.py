@@ -79,7 +79,7 @@ def page_content(
     *,
     brains: Sequence[Mapping[str, Any]],
     quality: pd.DataFrame,
-    runs: pd.DataFrame,
+    runs: pd.DataFrame | None,
     validation: pd.DataFrame | None,
     warnings: pd.DataFrame,
     provenance: Mapping[str, Any],
@@ -92,7 +92,7 @@ def page_content(
     Parameters
     ----------
     brains, quality : as for `brains_table`
-    runs, validation : as for `scores_table`
+    runs, validation : as for `scores_table`; no runs where brains were measured only
     warnings : columns subject, run, step, level, message
     provenance : what `software` returns, and files (brain, what, sha256)
     methods : reStructuredText
@@ -102,11 +102,13 @@ def page_content(
     software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
     versions = [(name, version) for name, version in software.items() if version]
     return {
-        "title": f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
+        "title": "Cortical folding, measured"
+        if runs is None
+        else f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
         "given": brains,
-        "folded": runs.to_dict("records"),
+        "folded": [] if runs is None else runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality)),
-        "runs": html_table(scores_table(runs, validation)),
+        "runs": "" if runs is None else html_table(scores_table(runs, validation)),
         "warnings": "" if warnings.empty else html_table(grouped(warnings)),
         "weeks": next((item for item in shown if item["first"]), None),
         "sections": sections([item for item in shown if not item["first"]]),

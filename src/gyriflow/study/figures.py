@@ -155,6 +155,8 @@ def _of_brains(study: Study) -> Iterator[Figure]:
     options: Given = {"views": THREE_SIDES, "measured": ""}
     path = f"{OF_STUDY}/inputs.png"
     yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target="", paper=True)
+    if not study.starts:
+        return
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}
     limits = study.config.mesh.model_dump()
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
@@ -165,8 +167,8 @@ def _of_brains(study: Study) -> Iterator[Figure]:
 def _of_growth(study: Study) -> Iterator[Figure]:
     if not study.growing:
         return
-    rate: Any = study.config.folding.growth_rate_per_s
-    if not isinstance(rate, float):
+    rate: Any = study.config.folding.growth_rate_per_s if study.config.folding else None
+    if rate is not None and not isinstance(rate, float):
         rate = dict(rate.weeks or {}) if rate.map is None else None
     options = {"measured": measured_name(brain for _, brain in study.growing), "folding_rate_per_s": rate}
     path = f"{STUDY}/growth/growth.png"
@@ -205,6 +207,8 @@ def _of_folding(study: Study) -> Iterator[Figure]:
             inputs = {name: one.file(file) for name, file in {**REGIONS, "params": PARAMETERS}.items()}
             path = f"{OF_RUN}/zones.png"
             yield Figure("zones_figure", path, "pictures.zones_picture", inputs, names=one.names, target="", paper=True)
+    if not study.folded:
+        return
     yield Figure("study_runs", f"{STUDY}/runs.html", target="metrics")
     table, named = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
     path = f"{OF_STUDY}/displacement.png"
@@ -213,15 +217,18 @@ def _of_folding(study: Study) -> Iterator[Figure]:
 
 def _of_metrics(study: Study) -> Iterator[Figure]:
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
-    options = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
+    options: Given = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
+    subjects = {brain.id: brain.subject for brain in study.brains.values() if brain.given.subject is not None}
+    options["subjects"] = subjects
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
     measured = {"measured": options["measured"]}
     yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
     yield Figure("spectra_figure", f"{OF_STUDY}/spectra.png", "charts.spectra_weeks_chart", spectra, options)
-    if len(reference := list(study.norm_reference)) >= FEWEST_FOR_NORMS:
+    reference = list(study.norm_reference)
+    if len({study.brains[brain].subject for brain in reference}) >= FEWEST_FOR_NORMS:
         inputs = {**metrics, "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
         name = measured_name(study.brains[brain] for brain in reference)
-        options = {"runs": options["runs"], "measured": name, "reference": reference}
+        options = {"runs": options["runs"], "measured": name, "reference": reference, "subjects": subjects}
         yield Figure("norms_figure", f"{OF_STUDY}/norms.png", "charts.norms_chart", inputs, options)
         inputs = {"centiles": f"{STUDY}/centiles.csv"}
         yield Figure("centiles_table", f"{STUDY}/centiles.html", "tables.centiles_table", inputs)
@@ -326,7 +333,8 @@ def _of_the_rest(study: Study) -> Iterator[Figure]:
         path, options = f"{CALIBRATION}/calibration.png", {"score": list(calibrate.score)}
         yield Figure("calibration_figure", path, "scores.calibration_chart", tables, options, target="calibrate")
     populations = [start.given.population for start in study.starts[:1]]
-    real = [brain for brain in study.brains.values() if not populations or brain.given.population in populations]
+    # a view of measured brains alone is none over the weeks of one brain
+    real = [brain for brain in study.brains.values() if populations and brain.given.population in populations]
     runs = zip(run_names(study.pairs), study.folded, strict=True)
     inputs = {
         "runs": {name: [[row.week, _halves(row)] for row in one.measured] for name, one in runs},

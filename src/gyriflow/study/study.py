@@ -220,9 +220,11 @@ class Study:
         They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
         and the real ones are of several populations, those of the start's are used.
         """
-        if not self.starts:
+        # where nothing is to be folded, the first brain stands for the start
+        first = self.starts or ([] if self.config.runs else list(self.brains.values()))
+        if not first:
             return []
-        start, given = self.starts[0], self.config.metrics.norm_reference
+        start, given = first[0], self.config.metrics.norm_reference
         alike = [brain for brain in self.brains.values() if brain.sides == start.sides]
         if given is not None:
             return [brain.id for brain in alike if brain.id in given]

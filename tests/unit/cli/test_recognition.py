@@ -1,5 +1,6 @@
 """Which files are recognised as brains: names of atlases, sides, ages, label schemes, participants."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -153,22 +154,50 @@ def app(monkeypatch, tmp_path):
     return call
 
 
-def test_a_bids_app_folds_the_first_of_several_scans(app, tmp_path):
+def test_a_bids_app_measures_and_folds_the_first_of_several_scans_where_told(app, tmp_path):
     arguments, written = app("participant")
     assert arguments[-2:] == ["quality", "export"]
     assert "--keep-going" in arguments
+    assert list(written) == ["brains", "metrics"]
+    assert resolve(load(written, tmp_path)).folded == []
+    _, written = app("participant", "--fold")
     assert (written["start"], written["folding"]["end_week"]) == (["sub-01_ses-1"], 24.43)
     assert list(written["runs"]) == ["reference", "measured"]
     assert [brain.id for brain in load(written, tmp_path).brains] == ["sub-01_ses-1", "sub-01_ses-2"]
-    arguments, _ = app("group")
+    arguments, again = app("group")
     assert arguments[-2:] == ["all", "export"]
+    assert again == written
+    assert "start" not in app("group", "--no-fold")[1]
 
 
 def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     (tmp_path / "own.yaml").write_text("{mesh: {order: 1}, runs: {mine: {}}, folding: {poisson_ratio: 0.4}}")
     options = ("--participant-label", "02", "01", "--session-label", "ses-2", "--settings", str(tmp_path / "own.yaml"))
-    _, written = app("participant", *options)
+    _, written = app("participant", *options, "--fold")
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
     assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
     assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
     assert "no such participants and sessions" in app("participant", "--participant-label", "07", code=2)
+    # all that participants had is known to the group
+    assert app("group")[1] == written
+    app("participant", "--session-label", "1")
+    _, both = app("group")
+    assert [brain["id"] for brain in both["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
+    assert "start" not in both
+    assert not (tmp_path / "out" / "work" / "results").exists()
+
+
+def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
+    bids_folder(tmp_path)
+    told = {}
+    monkeypatch.setattr(launch, "main", lambda asked: told.update(os.environ, asked=asked) or 0)
+    monkeypatch.setenv(launch.MEASURES_ONLY, "")
+    done = CliRunner().invoke(main, ["measure", str(tmp_path), "-d", str(tmp_path)])
+    assert (done.exit_code, told[launch.MEASURES_ONLY], told["asked"][-1]) == (0, "1", "all")
+    written = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
+    assert list(written) == ["brains"]
+    study = resolve(load(written, tmp_path))
+    assert (len(study.brains), study.folded, study.norm_reference) == (2, [], ["sub-01_ses-1", "sub-01_ses-2"])
+    # of a configuration with runs, nothing is folded either
+    folded = load(written | {"start": "first", "folding": {"end_week": 24}}, tmp_path)
+    assert (len(resolve(folded).folded), resolve(folded.measured_only).folded) == (1, [])

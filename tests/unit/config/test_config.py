@@ -71,7 +71,8 @@ def test_an_impossible_value_is_refused_with_its_key_and_the_bound(folding, wron
 
 
 def test_what_is_allowed_by_name_or_missing():
-    assert problems({}) == ["folding.end_week: Field required"]
+    assert keys({}) == ["brains"]
+    assert problems({"start": "a"}) == ["folding.end_week: Field required"]
     assert keys({"folding": {"end_week": 24}}) == ["brains", "start"]
     assert load(study(mesh=None)).mesh == MeshSettings()
 

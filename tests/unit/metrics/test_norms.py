@@ -12,6 +12,7 @@ from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.norms import (
     measured_norms,
     measured_scores,
+    norm_curves,
     published_norms,
     published_scores,
     structure_volumes,
@@ -69,6 +70,25 @@ def test_centiles_of_drawn_brains_are_even() -> None:
     # each against the others: a tenth of the brains in each tenth
     counts, _ = np.histogram(found["centile"], np.linspace(0, 100, 11))
     assert np.abs(counts - 40).max() < 20
+
+
+def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
+    weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 3), np.random.default_rng(1).normal(100, 5, 12)
+    metrics, reference = table(weeks, values)
+    three = {name: f"s{number % 3}" for number, name in enumerate(reference)}
+    # twelve scans of three subjects leave nothing to know a scatter by
+    assert set(measured_scores(metrics, reference, three)["flag"]) == {"too few brains"}
+    assert norm_curves(metrics, reference, three).empty
+    six = {name: f"s{number % 6}" for number, name in enumerate(reference)}
+    assert set(measured_scores(metrics, reference, six)["brains"]) == {5}
+    norms = measured_norms(metrics, reference, dict.fromkeys(reference, "s"))
+    assert set(norms["brains"]) == {1}
+    assert norms["sd"].isna().all()
+    # a scan given twice says no more than once
+    twice = pd.concat([metrics, metrics.assign(subject=metrics["subject"] + "again")])
+    again = {f"{name}again": name for name in reference}
+    both = [norm_curves(metrics, reference), norm_curves(twice, [*reference, *again], again)]
+    np.testing.assert_allclose(both[0][["low", "high"]], both[1][["low", "high"]])
 
 
 def test_few_brains_make_centiles_cautious() -> None:

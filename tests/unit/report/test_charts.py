@@ -56,6 +56,25 @@ def study_of(members: list[pd.DataFrame], real: list[pd.DataFrame]) -> Figure:
     return influence_spectra({"thin": pd.concat(members)}, real, values=values, week=28.0)
 
 
+def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
+    parts = [
+        metric_rows("real", "whole", "area", {week: value}, "cm2").assign(subject=brain)
+        for brain, week, value in (("a2", 26.0, 140.0), ("a1", 22.0, 100.0), ("b1", 24.0, 120.0), ("none", 23.0, 110.0))
+    ]
+    subjects = {"a1": "sub-a", "a2": "sub-a", "b1": "sub-b"}
+    figure = metrics_chart(pd.concat(parts), subjects=subjects)
+    drawn = [(line.get_marker(), line.get_linestyle(), line.get_xdata().tolist()) for line in figure.axes[0].lines]
+    assert ("None", "-", [22, 26]) in drawn
+    assert sum(linestyle == "-" for _, linestyle, _ in drawn) == 1
+    assert {marker: weeks for marker, _, weeks in drawn if marker != "None"} == {"s": [22, 26], "^": [24], "*": [23]}
+    assert {"sub-a", "sub-b", "real brain"} <= words(figure)
+    # more than a legend holds share the star
+    many = pd.concat([parts[0].assign(subject=f"s{number}") for number in range(9)])
+    figure = metrics_chart(many, subjects={f"s{number}": f"sub-{number}" for number in range(9)})
+    assert {line.get_marker() for line in figure.axes[0].lines} == {"*"}
+    assert "sub-1" not in words(figure)
+
+
 def test_metrics_of_runs_are_lines_and_measured_ones_stars():
     metrics = pd.concat(
         [

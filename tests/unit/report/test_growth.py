@@ -33,6 +33,20 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
 
 
+def test_the_rates_of_many_subjects_share_a_panel():
+    names = [f"sub-{number}" for number in range(9)]
+    figure = growth_chart(
+        pd.concat([AREAS.assign(series=name) for name in names]),
+        pd.concat([RATES.assign(series=name) for name in names]),
+    )
+    *_, rates = figure.axes
+    assert len(figure.axes) == 3
+    # two intervals of each, and zero
+    assert len(rates.lines) == 19
+    assert rates.lines[0].get_xydata().tolist() == [[21, pytest.approx(1.2)], [22, pytest.approx(1.2)]]
+    assert "sub-1" not in words(figure)
+
+
 def test_a_folding_rate_that_changes_is_drawn_over_the_intervals_of_the_bars():
     curve = {21.5: 1e-7, 22.5: 2e-7, 25.0: 4.5e-7}
     figure = growth_chart(AREAS, RATES, folding_rate_per_s=curve)

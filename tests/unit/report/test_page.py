@@ -204,6 +204,12 @@ def test_the_methods_say_what_was_run():
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
+    nothing = {"brains": [], "runs": [], "surface": {"edge_length_mm": 1}, "metrics": {"curvature_radius_mm": 3}}
+    nothing["brains"] = [{"week": 21.0, "population": None, "source": "labels", "synthetic": False}]
+    alone = methods_text(
+        (PAGE / "methods.rst").read_text(), software={"gyriflow": "0.1", "packages": packages}, **nothing
+    )
+    assert "simulated" not in alone
     assert "led to (population cohort): a population's growth, not the subject's own. Stress" in text
     assert text.count("its own later one") == 1
     assert "itself [4]" in text
