@@ -8,7 +8,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
+import cffi
 from mpi4py import MPI
 
 # sums may be taken in any order, a fifth faster; all of -ffast-math would break the checks for numbers that are none
@@ -42,6 +45,20 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
         comm.barrier()
         yield options
         comm.barrier()
+
+
+def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, Any]:
+    """Return functions in C, compiled unless the cache has them, and the interface to their arguments."""
+    name = f"gyriflow_{hashlib.sha256(repr((code, COMPILER_ARGUMENTS)).encode()).hexdigest()[:16]}"
+    interface = cffi.FFI()
+    interface.cdef(declarations)
+    with form_compiler(comm) as options:
+        library = Path(options["cache_dir"]) / f"{name}.so"
+        if comm.rank == 0 and not library.exists():
+            interface.set_source(name, code, extra_compile_args=COMPILER_ARGUMENTS)
+            with TemporaryDirectory(dir=library.parent) as folder:
+                Path(interface.compile(tmpdir=folder)).rename(library)
+    return interface, interface.dlopen(str(library))
 
 
 def drop_torn_entries(cache: Path) -> None:

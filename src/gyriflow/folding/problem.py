@@ -10,6 +10,7 @@ import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
+from dolfinx.la import MatrixCSR
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -20,6 +21,7 @@ from ..units import M_PER_MM
 from .compilation import form_compiler
 from .contact import SelfContact
 from .domain import Domain
+from .linear_elements import LinearElements
 from .points import IntegrationPoints
 from .tangent import ElasticMatrix, KeptTangent, RigidMotions, Tangent
 from .zones import Zones
@@ -84,6 +86,10 @@ class Problem:
         else:
             Fe = F * self._G_inverse
             energy = material.energy_density(Fe, *moduli) * dx
+        # in the place of the form compiler's code where there is code of our own
+        self._linear: LinearElements | None = None
+        if domain.order == 1 and len(self.points.weights) == 1 and not remembers_stress:
+            self._linear, energy = LinearElements(domain, material), 0
         self._outcomes = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._evaluated: dict[str, dolfinx.fem.Expression] = {}
         x = ufl.SpatialCoordinate(mesh)[0] + self.u[0]
@@ -91,12 +97,12 @@ class Problem:
             # ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its plane, the right one above
             for beyond, tag in ((x - planes[0], LEFT_CONTACT), (planes[1] - x, RIGHT_CONTACT)):
                 energy += penalty / 2 * ufl.max_value(beyond, 0) ** 2 * ds(tag)
-        residual = ufl.derivative(energy, self.u)
-        tangent = ufl.derivative(residual, self.u)
+        forms = [ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * dx]
+        if energy:
+            residual = ufl.derivative(energy, self.u)
+            forms += [energy, residual, ufl.derivative(residual, self.u)]
         with form_compiler(domain.comm) as options:
-            self._energy, self._residual, stiffness = (
-                dolfinx.fem.form(form, jit_options=options) for form in (energy, residual, tangent)
-            )
+            coupling, *self._forms = (dolfinx.fem.form(form, jit_options=options) for form in forms)
 
         fixed = domain.local(zones.fixed)[: domain.owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
@@ -104,7 +110,7 @@ class Problem:
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
         self.free = zones.free
         self.vector = self.u.x.petsc_vec
-        self._elastic = KeptTangent(ElasticMatrix(stiffness, fixed), self.vector)
+        self._elastic = KeptTangent(ElasticMatrix(coupling, self._add_stiffness, fixed), self.vector)
         self._tangent = Tangent(self._elastic, self.vector)
         self.mesh_moved(domain.part)
 
@@ -135,11 +141,15 @@ class Problem:
         """Set the shear modulus (c, q) in Pa at the integration points."""
         self._elastic.forget()
         set_at_points(self._mu, mu)
+        if self._linear:
+            self._linear.mu = mu
 
     def set_growth(self, G_inverse: Floats) -> None:
         """Set the inverse (c, q, 3, 3) of the step's growth tensor at the integration points."""
         self._elastic.forget()
         set_at_points(self._G_inverse, G_inverse)
+        if self._linear:
+            self._linear.G_inverse = G_inverse
 
     def set_stretch(self, V: Floats) -> None:
         """Set the elastic left stretch (c, q, 3, 3) that the present mesh has kept at the integration points."""
@@ -170,14 +180,19 @@ class Problem:
 
     def energy(self) -> float:
         """Return the total energy in J, contact included."""
-        elastic = self.domain.comm.allreduce(dolfinx.fem.assemble_scalar(self._energy))
-        return float(np.real(elastic)) + sum(part.energy() for part in self.contributions)
+        local = self._linear.assemble(self.displacement) if self._linear else 0.0
+        if self._forms:
+            local += float(np.real(dolfinx.fem.assemble_scalar(self._forms[0])))
+        return self.domain.comm.allreduce(local) + sum(part.energy() for part in self.contributions)
 
     def residual(self, out: PETSc.Vec) -> float:
         """Assemble the residual in N into `out`, zero where the displacement is fixed, and return its norm."""
         with out.localForm() as local:
             local.set(0.0)
-        dolfinx.fem.petsc.assemble_vector(out, self._residual)
+            if self._linear:
+                self._linear.assemble(self.displacement, forces=local.array_w)
+        if self._forms:
+            dolfinx.fem.petsc.assemble_vector(out, self._forms[1])
         out.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         out.array[self._fixed_owned] = 0.0
         self._elastic.note_forces(out)
@@ -187,6 +202,12 @@ class Problem:
         if self._tangent.motions is not None:
             self._tangent.motions.remove(out.array_w)
         return out.norm()
+
+    def _add_stiffness(self, blocks: MatrixCSR) -> None:
+        if self._linear:
+            self._linear.assemble(self.displacement, matrix=blocks)
+        if self._forms:
+            dolfinx.fem.assemble_matrix(blocks, self._forms[2])
 
     def tangent(self, *, within: float = 0.0) -> Tangent:
         """Return the assembled tangent in N/m, that of the unit matrix where the displacement is fixed.

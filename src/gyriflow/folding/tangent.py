@@ -4,11 +4,11 @@ The elastic part has the same places at every iterate. Contact couples other nod
 its own. No solver needs all entries in one matrix. Where nothing holds a body, its rigid motions are taken out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import dolfinx
 import numpy as np
-from dolfinx.la import BlockMode
+from dolfinx.la import BlockMode, MatrixCSR
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -64,20 +64,21 @@ class RigidMotions:
 
 
 class ElasticMatrix:
-    """The elastic tangent as 3 × 3 blocks, which dolfinx fills and PETSc multiplies with.
+    """The elastic tangent as 3 × 3 blocks, which dolfinx holds and PETSc multiplies with.
 
-    dolfinx fills its own block matrices about twice as fast as PETSc's. Products go to the blocks on and above the
+    dolfinx' own block matrices are filled about twice as fast as PETSc's. Products go to the blocks on and above the
     diagonal: half of the memory to read, three fifths of the time.
 
-    `form` is that of the tangent, `fixed` (owned, 3) the components of the owned nodes whose rows and columns are those
-    of the unit matrix; as an attribute it is (all nodes, 3), by global nodes. `products` is the matrix for products. Of
-    the (b,) blocks of the owned rows, row by row, `nodes` are the owned nodes, counted on this rank, and `columns` the
-    global ones; `row_ends` (owned + 1,) says where each row begins and ends.
+    `coupling` is a form with the same places of entries, which `add` adds at the present displacement, `fixed` (owned,
+    3) the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is (all
+    nodes, 3), by global nodes. `products` is the matrix for products. Of the (b,) blocks of the owned rows, row by row,
+    `nodes` are the owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) says where
+    each row begins and ends.
     """
 
-    def __init__(self, form: dolfinx.fem.Form, fixed: NDArray[np.bool_]) -> None:
-        self._form = form
-        self._blocks = dolfinx.fem.create_matrix(form, block_mode=BlockMode.compact)
+    def __init__(self, coupling: dolfinx.fem.Form, add: Callable[[MatrixCSR], None], fixed: NDArray[np.bool_]) -> None:
+        self._add = add
+        self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)
         row_map, column_map = self._blocks.index_map(0), self._blocks.index_map(1)
         owned, (first, end) = row_map.size_local, row_map.local_range
         self.row_ends = self._blocks.indptr[: owned + 1]
@@ -104,7 +105,7 @@ class ElasticMatrix:
     def assemble(self) -> None:
         """Assemble the tangent at the present displacement."""
         self._blocks.set_value(0.0)
-        dolfinx.fem.assemble_matrix(self._blocks, self._form)
+        self._add(self._blocks)
         self._blocks.scatter_reverse()
         values = self.values
         values[self._crossed] = 0.0

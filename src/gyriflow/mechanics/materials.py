@@ -26,8 +26,13 @@ class Material(ABC):
 
     @staticmethod
     @abstractmethod
-    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return ψ in Pa of the elastic deformation Fe; μ and K, in Pa, are the moduli of small strains."""
+    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+        """Return ψ in Pa of I₁ = tr(Feᵀ·Fe) and J = det Fe; μ and K, in Pa, are the moduli of small strains."""
+
+    @classmethod
+    def energy_density(cls, Fe: Expr, mu: Expr, K: Expr) -> Expr:
+        """Return ψ in Pa of the elastic deformation Fe."""
+        return cls.energy_of_invariants(ufl.inner(Fe, Fe), ufl.det(Fe), mu, K)
 
     def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
         """Return Cauchy's stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
@@ -46,14 +51,13 @@ class NeoHookean(Material):
     name = "neo-hookean"
 
     @staticmethod
-    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return ψ = μ/2 (tr(Feᵀ·Fe) Je^(−2/3) − 3) + K/2 (Je − 1)² in Pa."""
-        Je = ufl.det(Fe)
-        return mu / 2 * (ufl.inner(Fe, Fe) * Je ** (-2 / 3) - 3) + K / 2 * (Je - 1) ** 2
+    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+        """Return ψ = μ/2 (I₁ J^(−2/3) − 3) + K/2 (J − 1)² in Pa."""
+        return mu / 2 * (I1 * J ** (-2 / 3) - 3) + K / 2 * (J - 1) ** 2
 
 
 class CompressibleNeoHookean(Material):
-    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (Je − 1)² in the place of (ln Je)².
+    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (J − 1)² in the place of (ln J)².
 
     Its energy is not split into those of shape and volume.
     """
@@ -61,10 +65,9 @@ class CompressibleNeoHookean(Material):
     name = "compressible-neo-hookean"
 
     @staticmethod
-    def energy_density(Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return ψ = μ/2 (tr(Feᵀ·Fe) − 3 − 2 ln Je) + λ/2 (Je − 1)² in Pa, with λ = K − 2μ/3."""
-        Je = ufl.det(Fe)
-        return mu / 2 * (ufl.inner(Fe, Fe) - 3 - 2 * ufl.ln(Je)) + (K - 2 * mu / 3) / 2 * (Je - 1) ** 2
+    def energy_of_invariants(I1: Expr, J: Expr, mu: Expr, K: Expr) -> Expr:
+        """Return ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)² in Pa, with λ = K − 2μ/3."""
+        return mu / 2 * (I1 - 3 - 2 * ufl.ln(J)) + (K - 2 * mu / 3) / 2 * (J - 1) ** 2
 
 
 MATERIALS: dict[str, type[Material]] = {law.name: law for law in (NeoHookean, CompressibleNeoHookean)}

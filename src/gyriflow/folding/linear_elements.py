@@ -1,0 +1,36 @@
+"""Energy, forces and stiffness of linear elements that forget their stress: two to four times as fast as by FFCx."""
+
+import numpy as np
+from dolfinx.la import MatrixCSR
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..geometry.triangles import Floats
+from ..mechanics.elements import DECLARATION, element_code
+from ..mechanics.materials import Material
+from .compilation import compiled
+from .domain import Domain
+
+
+class LinearElements:
+    """The local elements of a domain.
+
+    To be set are their shear modulus `mu` (c, 1) in Pa, and `G_inverse` (c, 1, 3, 3) of the step's growth tensor.
+    """
+
+    def __init__(self, domain: Domain, material: Material) -> None:
+        self._domain, self._bulk_to_shear = domain, material.bulk_to_shear_ratio
+        self._interface, self._code = compiled(domain.comm, DECLARATION, element_code(material))
+        self._places: NDArray[np.int32] | None = None
+        self.mu: Floats = np.ones(len(domain.cells))
+        self.G_inverse: Floats = np.tile(np.eye(3), (len(domain.cells), 1, 1))
+
+    def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
+        """Return the energy in J at displacements (k, 3) in m; add forces in N, stiffness in N/m to what is given."""
+        cells, nodes = self._domain.cells, self._domain.local(self._domain.positions)
+        if matrix is not None and self._places is None:
+            places = sparse.csr_array((np.arange(len(matrix.indices), dtype=np.int32), matrix.indices, matrix.indptr))
+            self._places = places[np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, 4).ravel()]
+        arrays = cells, nodes, u, self.G_inverse, self.mu, forces, self._places, None if matrix is None else matrix.data
+        pointers = [self._interface.NULL if x is None else self._interface.from_buffer(x) for x in arrays]
+        return float(self._code.assemble(len(cells), self._bulk_to_shear, *pointers))

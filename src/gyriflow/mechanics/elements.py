@@ -1,0 +1,116 @@
+"""Energy, forces and stiffness of linear elements as C code, for any energy of I₁ and J, eight elements at a time.
+
+With b = ∇N·Fg⁻¹ of the shape functions N, f = Fe·b and c = C·b, where C = ∂J/∂Fe are the cofactors of Fe, forces are
+2ψ₁f + ψⱼc per volume. Stiffness is their derivative; that of C is (C ⊗ C − the same with two indices exchanged) / J.
+"""
+
+import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.core.expr import Expr
+
+from .materials import Material
+
+DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *G_inverse,
+                                 void *mu, void *forces, void *places, void *blocks);"""
+"""Returns the energy of `count` elements, and adds their forces and stiffness unless these are NULL.
+
+Of the nodes there are (·, 3) positions X, displacements u and forces; of each element the nodes `cells` (·, 4), the
+inverse growth tensor, the shear modulus, and the `places` (·, 4, 4) of its pairs of nodes among the blocks (·, 3, 3).
+"""
+CODE = """
+#include <math.h>
+#include <stdint.h>
+#define W 8
+#define EACH(i, n) for (int i = 0; i < n; i++)
+typedef double v __attribute__((vector_size(8 * W)));
+
+static inline v dot(const v *p, const v *q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; }
+
+static inline v cofactors(v m[3][3], v c[3][3]) {  // returns the determinant
+    EACH(i, 3) EACH(j, 3) {
+        int k = (i + 1) % 3, l = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
+        c[i][j] = m[k][p] * m[l][q] - m[k][q] * m[l][p];
+    }
+    return dot(m[0], c[0]);
+}
+
+double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], const double (*X)[3],
+                const double (*u)[3], const double (*G_inverse)[3][3], const double *mu,
+                double (*forces)[3], const int32_t (*places)[4][4], double (*blocks)[3][3]) {
+    double energy = 0;
+    for (long first = 0; first < count; first += W) {
+        int lanes = count - first < W ? count - first : W;
+        v edge[3][3], move[3][3], normal[3][3], G[3][3], F[3][3], C[3][3];
+        v b[4][3], f[4][3], c[4][3], of_I, of_J, of_II, of_IJ, of_JJ;
+        EACH(l, W) {
+            long e = first + (l < lanes ? l : 0);
+            const int32_t *n = cells[e];
+            EACH(a, 3) EACH(i, 3) {
+                edge[a][i][l] = X[n[a + 1]][i] - X[n[0]][i];
+                move[a][i][l] = u[n[a + 1]][i] - u[n[0]][i];
+                G[a][i][l] = G_inverse[e][a][i];
+            }
+        }
+        v six = cofactors(edge, normal);
+        EACH(a, 3) EACH(j, 3)
+            b[a + 1][j] = (normal[a][0] * G[0][j] + normal[a][1] * G[1][j] + normal[a][2] * G[2][j]) / six;
+        EACH(j, 3) b[0][j] = -(b[1][j] + b[2][j] + b[3][j]);
+        EACH(i, 3) EACH(j, 3) F[i][j] = G[i][j] + move[0][i] * b[1][j] + move[1][i] * b[2][j] + move[2][i] * b[3][j];
+        v J = cofactors(F, C), I1 = dot(F[0], F[0]) + dot(F[1], F[1]) + dot(F[2], F[2]);
+        EACH(l, lanes) {
+            double V = fabs(six[l]) / 6, m = mu[first + l], K = bulk_to_shear * m;
+            energy += V * psi(I1[l], J[l], m, K);
+            of_I[l] = V * psi_I(I1[l], J[l], m, K);
+            of_J[l] = V * psi_J(I1[l], J[l], m, K);
+            if (!blocks) continue;
+            of_II[l] = V * psi_II(I1[l], J[l], m, K);
+            of_IJ[l] = V * psi_IJ(I1[l], J[l], m, K);
+            of_JJ[l] = V * psi_JJ(I1[l], J[l], m, K);
+        }
+        EACH(a, 4) EACH(i, 3) f[a][i] = dot(F[i], b[a]), c[a][i] = dot(C[i], b[a]);
+        if (forces) EACH(a, 4) EACH(i, 3) {
+            v force = 2 * of_I * f[a][i] + of_J * c[a][i];
+            EACH(l, lanes) forces[cells[first + l][a]][i] += force[l];
+        }
+        if (blocks) EACH(a, 4) for (int d = a; d < 4; d++) {
+            v K[3][3], exchanged = of_J / J;
+            EACH(i, 3) EACH(j, 3)
+                K[i][j] = f[a][i] * (4 * of_II * f[d][j] + 2 * of_IJ * c[d][j])
+                    + c[a][i] * (2 * of_IJ * f[d][j] + (of_JJ + exchanged) * c[d][j]) - exchanged * c[d][i] * c[a][j];
+            EACH(i, 3) K[i][i] += 2 * of_I * dot(b[a], b[d]);
+            EACH(l, lanes) EACH(i, 3) EACH(j, 3) {
+                blocks[places[first + l][a][d]][i][j] += K[i][j][l];
+                if (a != d) blocks[places[first + l][d][a]][j][i] += K[i][j][l];
+            }
+        }
+    }
+    return energy;
+}
+"""
+
+
+def element_code(material: Material) -> str:
+    """Return the C code of a material's elements, with a function as in `DECLARATION`."""
+    # the values are never used: the variables stand for names in C
+    variables = {name: ufl.variable(ufl.as_ufl(1.0)) for name in ("I1", "J", "mu", "K")}
+    I1, J = variables["I1"], variables["J"]
+    psi = material.energy_of_invariants(**variables)
+    slopes = ufl.diff(psi, I1), ufl.diff(psi, J)
+    functions = dict(zip(("psi", "psi_I", "psi_J"), (psi, *slopes), strict=True))
+    functions |= {"psi_II": ufl.diff(slopes[0], I1), "psi_IJ": ufl.diff(slopes[0], J), "psi_JJ": ufl.diff(slopes[1], J)}
+    names = {variable: name for name, variable in variables.items()}
+    law = [
+        f"static inline double {name}(double I1, double J, double mu, double K) "
+        f"{{ return {_in_c(expand_derivatives(value), names)}; }}"
+        for name, value in functions.items()
+    ]
+    return "\n".join(["#include <math.h>", *law, CODE])
+
+
+def _in_c(value: Expr, names: dict[Expr, str]) -> str:
+    if value in names:
+        return names[value]
+    if not value.ufl_operands:
+        return repr(float(value))
+    forms = {"Sum": "({}+{})", "Product": "({}*{})", "Division": "({}/{})", "Power": "pow({},{})", "Ln": "log({})"}
+    return forms[type(value).__name__].format(*(_in_c(part, names) for part in value.ufl_operands))

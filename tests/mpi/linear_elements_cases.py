@@ -1,0 +1,58 @@
+"""The C code of linear elements against the forms that UFL derives from the energy."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import boxes
+import dolfinx
+import numpy as np
+import pytest
+import ufl
+from boxes import COMM, distorted_box, problem_on, smooth_displacement, zones_of
+from dolfinx.la import BlockMode
+
+from gyriflow.mechanics.materials import MATERIALS, Material
+
+
+@dataclass(frozen=True)
+class Mixed(Material):
+    """A law whose second derivatives are all other than zero."""
+
+    name: ClassVar[str] = "mixed"
+
+    @staticmethod
+    def energy_of_invariants(I1, J, mu, K):
+        return mu / 7 * I1**2 / J + K * (J - 1) ** 4 - mu * ufl.ln(J) * I1
+
+
+@pytest.mark.parametrize("law", [*MATERIALS.values(), Mixed])
+def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeypatch):
+    monkeypatch.setattr(boxes, "MATERIAL", law(0.45))
+    mesh = distorted_box()
+    layers = {"mu": lambda x: 300 + 2e5 * (x[:, 2] + 3e-3), "dg": lambda x: 0.004 + 0.4 * x[:, 2], "dr": 0.002}
+    problem = problem_on(mesh, zones_of(mesh), **layers)
+    domain = problem.domain
+    problem.set_displacement(smooth_displacement(domain))
+
+    Fe = (ufl.Identity(3) + ufl.grad(problem.u)) * problem._G_inverse
+    ratio = 2 * 1.45 / (3 * 0.1)
+    dx = ufl.dx(metadata={"quadrature_degree": 1})
+    energy = law.energy_density(Fe, problem._mu, ratio * problem._mu) * dx
+    residual = ufl.derivative(energy, problem.u)
+    energy, residual, tangent = map(dolfinx.fem.form, (energy, residual, ufl.derivative(residual, problem.u)))
+
+    expected = COMM.allreduce(dolfinx.fem.assemble_scalar(energy))
+    assert problem.energy() == pytest.approx(expected, rel=1e-12)
+
+    forces, vector = dolfinx.fem.assemble_vector(residual), problem.new_vector()
+    forces.scatter_reverse(dolfinx.la.InsertMode.add)
+    problem.residual(vector)
+    largest = COMM.allreduce(np.abs(forces.array).max(), op=boxes.MPI.MAX)
+    np.testing.assert_allclose(vector.array, forces.array[: 3 * domain.owned], rtol=0, atol=1e-12 * largest)
+
+    matrix = dolfinx.fem.assemble_matrix(tangent, block_mode=BlockMode.compact)
+    matrix.scatter_reverse()
+    problem.tangent()
+    blocks = problem._elastic.matrix.values
+    stiffness = matrix.data[: blocks.size].reshape(blocks.shape)
+    np.testing.assert_allclose(blocks, stiffness, rtol=0, atol=1e-12 * np.abs(stiffness).max())
