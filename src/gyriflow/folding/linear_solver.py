@@ -75,6 +75,8 @@ class TwoLevelPreconditioner:
         coarse = self._domain.summed(self._restriction @ x.array_r)
         coarse[self._moved] = self._inverse_coarse @ coarse
         y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ coarse
+        if self._tangent.motions is not None:
+            self._tangent.motions.remove(y.array_w)
 
     def _set_diagonal(self) -> None:
         inverse = positive_inverses(self._tangent.diagonal())

@@ -126,7 +126,7 @@ class Problem:
         """
         self._elastic.forget()
         if self.free:
-            self._tangent.remove(RigidMotions(self.domain, part))
+            self._tangent.motions = RigidMotions(self.domain, part)
 
     def admissible(self, values: Floats) -> Floats:
         """Return (k, 3) displacements of the local nodes in m without the rigid motions of an unconstrained body."""

@@ -53,15 +53,6 @@ class RigidMotions:
         amounts = self.comm.allreduce(self.modes.T @ values, op=MPI.SUM)
         values -= self.modes @ amounts
 
-    def null_space(self, like: PETSc.Vec) -> PETSc.NullSpace:
-        """Return the motions as PETSc vectors of the layout of `like`."""
-        vectors = []
-        for mode in self.modes.T:
-            vector = like.duplicate()
-            vector.array[:] = mode
-            vectors.append(vector)
-        return PETSc.NullSpace().create(vectors=vectors, comm=self.comm)
-
 
 class ElasticMatrix:
     """The elastic tangent as 3 × 3 blocks, which dolfinx holds and PETSc multiplies with.
@@ -184,17 +175,11 @@ class Tangent:
         self.elastic = elastic
         self.parts: Sequence[PETSc.Mat] = ()
         self.motions: RigidMotions | None = None
-        self._like = like
         self._shift: Floats | None = None
         sizes = like.getSizes()
         self.matrix = PETSc.Mat().createPython((sizes, sizes), context=self, comm=like.comm)
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setUp()
-
-    def remove(self, motions: RigidMotions) -> None:
-        """Have rigid motions taken out of all products from now on; they become the matrix' null space."""
-        self.motions = motions
-        self.matrix.setNullSpace(motions.null_space(self._like))
 
     def raise_diagonal(self, part: float) -> None:
         """Add a part of its absolute diagonal to all products from now on; with 0 nothing."""
