@@ -275,8 +275,8 @@ class Fissure:
         """Return the voxels of an (i, j, k) volume within a distance of the mid-surface: their indices (n, 3), their
         places in mm (n, 3) and their distances (n,).
         """
-        steps = (affine[:3, :3].T @ self.plane.normal).tolist()
-        i, j, k = (step * np.arange(size, dtype=np.float32) for step, size in zip(steps, shape, strict=True))
+        steps = affine[:3, :3].T @ self.plane.normal
+        i, j, k = (float(step) * np.arange(size, dtype=np.float32) for step, size in zip(steps, shape, strict=True))
         first = float(self.plane.normal @ affine[:3, 3] - self.plane.offset)
         above_plane = np.abs((i + first)[:, None, None] + j[:, None] + k)
         voxels = np.argwhere(above_plane < reach_mm + np.abs(self.heights).max() + SPACING_MM)
