@@ -25,6 +25,7 @@ rule validation:
         series=from_simulation("series"),
         weeks=from_simulation("real_weeks"),
         run=lambda w: w.run,
+        real=lambda w: [brain.id for brain in study.simulations[w.run, w.brain].real.values()],
         kind=from_simulation("kind"),
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -92,6 +93,7 @@ rule registration_ceiling:
         start_week=from_brain("week"),
         weeks=lambda w: study.ceiling_weeks(w.brain),
         run="registration",
+        real=lambda w: [study.references[w.brain, week_tag(week)][0].id for week in study.ceiling_weeks(w.brain)],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:

@@ -38,5 +38,6 @@ with step(snakemake.log[0]):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
             shapes[name] = Shape(read_surface(files[name][number]), **maps)
         labels = {"run": params.run, "kind": params.kind, "start_week": params.start_week, "week": week}
+        labels |= {"start": snakemake.wildcards.brain, "real": params.real[number]}
         rows.append(validation_row(labels, simulated=simulated, real_brain=real, aims=aims, **shapes))
     write_table(snakemake.output[0], ordered(rows))

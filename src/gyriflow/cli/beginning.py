@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from ..config.atlas import Atlas, AtlasSettings
+from ..config.brains import Brain
 from ..config.loading import OF_FOLDING
 from ..errors import InputError
 from ..io.files import read_json, write_json, write_text
@@ -15,6 +16,7 @@ from ..io.yaml_files import read_keys
 from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
+from ..study.series import why_unmatched
 from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, fitting_scheme, recognise
 
 HEAD = f"""\
@@ -64,7 +66,8 @@ def write_configuration(folder: Path, path: Path, force: bool, fold: bool = True
     series = next((ids for ids in of_subjects if len(_weeks(ids)) > 1), brains)
     weeks, several = _weeks(series), series is not brains
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    rest = REST.format(start=series[0].entry["id"], end=end, measured=MEASURED if several else "")
+    measured = MEASURED if fold and several and _leads(series, folder) else ""
+    rest = REST.format(start=series[0].entry["id"], end=end, measured=measured)
     write_text(path, HEAD + "".join(lines) + (rest if fold else ""))
     for brain in brains:
         kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
@@ -156,10 +159,12 @@ def write_bids(
     if problems := [f"\n  {brain.entry['id']}: {note}" for brain in brains for note in brain.notes]:
         remedy = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'."
         raise InputError("cannot be run as it is", path=folder, found="".join(problems), remedy=remedy)
-    starts = [scans[0].entry["id"] for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
+    followed = [scans for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
+    starts = [scans[0].entry["id"] for scans in followed]
+    leading = fold and bool(followed) and all(_leads(scans, folder) for scans in followed)
     weeks = _weeks(brains)
     given = read_keys(Path(settings)) if settings else {}
-    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if starts else {})
+    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if leading else {})
     text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
     if fold:
         text |= {"start": starts or brains[0].entry["id"], "runs": runs, **given}
@@ -196,6 +201,14 @@ def _growing(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[s
     problem = f"no series of the atlas {atlas.name} leads from {weeks[0]:g} to {weeks[1]:g} GW"
     remedy = "Choose another --atlas, or another --until, after --week."
     raise InputError(problem, found="; ".join(spans), remedy=remedy)
+
+
+def _leads(scans: Sequence[Recognised], folder: Path) -> bool:
+    """Return whether scans can give a start its later shapes: label volumes, or surfaces matched by their vertices."""
+    if all("labels" in brain.entry for brain in scans):
+        return True
+    dated = [brain.entry for brain in scans if brain.entry["week"] != UNSET and UNSET not in brain.entry.values()]
+    return why_unmatched([validated(Brain, _absolute(entry, folder), entry["id"]) for entry in dated]) is None
 
 
 def _absolute(value: object, folder: Path) -> object:

@@ -15,6 +15,7 @@ from ..errors import GyriflowError, InputError
 from ..shipped import CONFIG, DEMO, SHIPPED
 
 LEVELS = ("participant", "group")
+BIDS_LEVELS = [[level] for level in LEVELS]
 LABELS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
 """Options of BIDS apps with several values after each other."""
 ELSEWHERE = ("--profile", "--executor", "-e")
@@ -38,7 +39,9 @@ class Commands(click.Group):
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
         """Read the arguments; those of a BIDS app, `BIDS OUT participant`, are of the command `bids`."""
-        if args and args[0] not in self.commands and len(args) > 2 and args[2] in LEVELS:
+        # a data set may lie in a folder that is called as a command
+        named = bool(args) and args[0] in self.commands and (args[3:4] in BIDS_LEVELS or not Path(args[0]).is_dir())
+        if not named and args[2:3] in BIDS_LEVELS:
             args = ["bids", *_one_by_one(args)]
         return super().parse_args(context, args)
 
@@ -121,7 +124,7 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
 
 
 @main.command()
-@click.argument("config", type=FILE, required=False)
+@click.argument("config", type=click.Path(path_type=Path), required=False)
 @directory_option
 @cores_option
 @stages_option
@@ -294,8 +297,8 @@ def view(directory: Path, only_print: bool) -> None:
 
 
 def _chosen(config: Path | None, directory: Path) -> Path:
-    chosen = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), None)
-    if chosen is None:
+    chosen = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), Path(CONFIG))
+    if not chosen.is_file():
         remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."
-        raise InputError("there is no configuration", path=Path(CONFIG).absolute(), remedy=remedy)
+        raise InputError("there is no configuration", path=chosen.absolute(), remedy=remedy)
     return chosen

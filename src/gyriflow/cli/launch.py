@@ -7,6 +7,7 @@ failed step. Where steps are run, the terminal shows a bar, warnings and failure
 
 import fcntl
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -22,6 +23,7 @@ from typing import IO
 from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
 from ..io.yaml_files import read_keys
+from ..parameters.settings import nearest
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
@@ -106,6 +108,13 @@ def refuse_bad_configfiles(files: Sequence[Path], directory: Path) -> None:
             raise InputError(f"configuration {error}{remedy}") from error
 
 
+def refuse_unknown_options(unknown: Sequence[str], usage: str) -> None:
+    """Raise InputError where an argument that Snakemake does not know is an option; `usage` names those it knows."""
+    known = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
+    for name in (argument.partition("=")[0] for argument in unknown if argument.startswith("-")):
+        raise InputError(f"unknown option {name}; {nearest(name, known)}")
+
+
 def send_prints_to(log: Path) -> None:
     """Send what this process' libraries and children print to a file; Python's own streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
@@ -168,7 +177,9 @@ def main(arguments: Sequence[str]) -> int:
     sys.argv[0] = "snakemake"
     from snakemake import cli  # takes a second, which the Snakefile's own import of this module need not wait for
 
-    options, _ = cli.get_argument_parser().parse_known_args(arguments)
+    parser = cli.get_argument_parser()
+    options, unknown = parser.parse_known_args(arguments)
+    refuse_unknown_options(unknown, parser.format_usage())
     directory = options.directory or Path()
     refuse_bad_configfiles(options.configfile or [], directory)
     looks = any(getattr(options, name, None) not in (None, False) for name in LOOKS_ONLY)

@@ -44,7 +44,7 @@ def validation_row(
     `placement.placement` and `shapes.against_real`.
 
     The labels are run, kind ("explained" where growth came from the weeks that are compared, "predicted" where from
-    another brain, atlas or only earlier weeks), start_week and week. `simulated` and `real_brain` are closed surfaces
+    another brain, atlas or only earlier weeks), start and real (ids of the brains), start_week and week. `simulated` and `real_brain` are closed surfaces
     in mm as they are; `aims` the area_cm2 and volume_ml that the run was to have in this week, if any; the shapes are
     ready and laid onto the real brain, as for `placement`.
     """
@@ -64,7 +64,8 @@ def validation_row(
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """Make a table of rows of `validation_row`, what is compared first, by run, start and week."""
-    first = ["run", "kind", "start_week", "week", "horizon", "distance_mm", "distance95_mm", "cortex_dice"]
+    first = ["run", "kind", "start", "start_week", "week", "real", "horizon"]
+    first += ["distance_mm", "distance95_mm", "cortex_dice"]
     table = pd.DataFrame(rows).sort_values(["run", "start_week", "week"], ignore_index=True)
     return table[[*first, *table.columns.difference(first, sort=False)]]
 

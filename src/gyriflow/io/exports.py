@@ -21,7 +21,11 @@ from .volumes import LabelVolume, read_label_volume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
 BIDS_MAPS = {
-    "mean_curvature": ("curv", "1/mm", "Mean curvature, positive on gyri"),
+    "mean_curvature": (
+        "curv",
+        "1/mm",
+        "Mean curvature, positive on gyri: FreeSurfer's files named curv have the opposite sign",
+    ),
     "sulcal_depth_mm": ("sulc", "mm", "Sulcal depth: distance to the convex hull of the hemisphere"),
     "thickness_mm": ("thickness", "mm", "Cortical thickness"),
     "gaussian_curvature": ("gaussCurv", "1/mm^2", "Gaussian curvature"),

@@ -7,17 +7,18 @@ from dataclasses import dataclass
 class VertexMeasure:
     """How a map per vertex is drawn: the colour bar's label and the colours.
 
-    The limits are the ends of the colour scale; None: from 0 to where few vertices of all surfaces are above.
+    The limits are the ends of the colour scale; None: from 0 to the `quantile` of all vertices.
     """
 
     label: str
     colours: str = "YlGnBu"
     limits: tuple[float, float] | None = None
+    quantile: float = 0.995
 
 
 SHAPE_MEASURES = {
-    "shape_index": VertexMeasure("shape index (sulci −1, gyri +1)", colours="RdBu_r", limits=(-1.0, 1.0)),
-    "curvedness": VertexMeasure("curvedness (mm⁻¹)"),
+    "shape_index": VertexMeasure("shape index (sulci −½, gyri +½)", colours="RdBu_r", limits=(-1.0, 1.0)),
+    "curvedness": VertexMeasure("curvedness (mm⁻¹)", quantile=0.98),
     "sulcal_depth_mm": VertexMeasure("sulcal depth (mm)"),
     "thickness_mm": VertexMeasure("cortical thickness (mm)"),
 }

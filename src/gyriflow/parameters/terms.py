@@ -48,7 +48,7 @@ CORTEX, CORE = 1, 2
 """Tags of the layers."""
 
 ELEMENTS_NEEDED = {1: 2.0, 2: 0.8}
-"""Elements through the cortex by their order, below which folds are the mesh's: thickness over the mean edge of the
+"""Elements through the cortex by their order, below which folds may be the mesh's: thickness over the mean edge of the
 elements in it. For quadratic ones it comes from the table of docs/verification.md (Convergence on a brain): two
 distances of nodes to the thickness at the surface are enough for sizes and places, and that mesh counts 0.81 at its
 start over the cortex's volume, where elements are longer. As it grows the count falls (0.49 at 28 GW, where the errors

@@ -225,7 +225,7 @@ def _resolution(run: Mapping[str, Any] | pd.Series) -> str:
     needed = ELEMENTS_NEEDED[int(run["order"])]
     at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
     if not at_start >= needed:  # not a number: no element lies in the cortex
-        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds are the mesh's"
+        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds may be the mesh's"
     if pd.isna(week):
         return ""
     return (

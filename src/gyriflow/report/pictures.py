@@ -49,8 +49,6 @@ ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
 SIGNED = "RdBu_r"
 ROUNDING = 1e-9
-_MOST = 0.995
-"""Part of the vertices that a colour scale reaches."""
 LINES_MM, LONG = 4.0, 0.9
 """How far lines that show directions are apart, and the part of the vectors that they show the length of."""
 SEEN_FLAT = 0.3
@@ -181,7 +179,7 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
     shrinks = quantity == AREA_GROWTH and finite.min() < -ROUNDING * np.abs(finite).max()
     signed = quantity in DEVIATIONS or shrinks
     sizes = np.abs(finite) if signed else finite
-    high = float(np.quantile(sizes, _MOST)) if len(sizes) else 1.0
+    high = float(np.quantile(sizes, measure.quantile)) if len(sizes) else 1.0
     end = round_up(high) if high > 0 else 1.0
     low, colours = (-end, SIGNED) if signed else (0.0, measure.colours)
     return colour_scale(colours, low, end, cut=bool((sizes > end).any()))

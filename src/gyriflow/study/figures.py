@@ -167,8 +167,12 @@ def _of_brains(study: Study) -> Iterator[Figure]:
 def _of_growth(study: Study) -> Iterator[Figure]:
     if not study.growing:
         return
-    rate: Any = study.config.folding.growth_rate_per_s if study.config.folding else None
-    if rate is not None and not isinstance(rate, float):
+    # runs that follow sizes or shapes have no rate of their own
+    grown = [one.settings for one in study.simulations.values() if one.settings.growth.model == "rates"]
+    rate: Any = grown[0].growth_rate_per_s if grown else None
+    if any(settings.growth_rate_per_s != rate for settings in grown):
+        rate = None
+    elif grown and not isinstance(rate, float):
         rate = dict(rate.weeks or {}) if rate.map is None else None
     options = {"measured": measured_name(brain for _, brain in study.growing), "folding_rate_per_s": rate}
     path = f"{STUDY}/growth/growth.png"

@@ -7,6 +7,7 @@ from click.testing import CliRunner
 from gyriflow.cli import launch
 from gyriflow.cli.commands import main
 from gyriflow.config import load
+from gyriflow.errors import InputError
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 
@@ -37,6 +38,30 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
     assert "--cores" not in handed_on("--executor=slurm")
     # but a limit that is asked for is one
     assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == ["--cores", "200"]
+
+
+@pytest.mark.parametrize("command", [["run", "no.yaml"], ["check", "no.yaml"]])
+def test_a_configuration_that_is_named_and_missing_is_told_in_one_line(monkeypatch, tmp_path, command):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, command)
+    assert (done.exit_code, done.output.count("\n")) == (2, 1)
+    assert f"{tmp_path / 'no.yaml'}: there is no configuration" in done.output
+
+
+def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
+    with pytest.raises(InputError, match=r"^unknown option --corse; did you mean --cores\?$"):
+        launch.main(["--directory", str(tmp_path), "--corse", "2"])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("folder", ["bids", "run", "data"])
+def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(monkeypatch, tmp_path, folder):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / folder).mkdir()
+    done = CliRunner().invoke(main, [folder, "out", "participant"])
+    assert (done.exit_code, f"{folder}: no brain was recognised" in done.output) == (2, True)
+    # the command by its own name
+    assert CliRunner().invoke(main, ["bids", folder, "out", "group"]).output == done.output
 
 
 @pytest.mark.parametrize("command", ["run", "check"])

@@ -42,12 +42,13 @@ def reference(raw):
 
 @pytest.mark.parametrize(
     ("elements", "steps", "seconds"),
-    # reference and measured of the demo, of a coarse prediction, and of a brain over nine weeks
-    [(156_307, 28, 42.4), (156_307, 28, 83.4), (31_232, 14, 8.1), (506_000, 63, 601), (506_000, 63, 429)],
+    # reference and measured of the demo, and of a brain over nine weeks
+    [(156_307, 28, 53), (156_307, 28, 63), (500_000, 126, 620), (500_000, 63, 470)],
 )
 def test_a_folding_takes_as_long_as_measured_ones_within_the_error(elements, steps, seconds):
     predicted = SECONDS_PER_ELEMENT_AND_STEP[1] * elements * steps
-    assert seconds / ERROR < predicted < ERROR * seconds
+    assert seconds / 1.3 < predicted < 1.3 * seconds
+    assert ERROR > 1.3
 
 
 def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():

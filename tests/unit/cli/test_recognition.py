@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from shapes import sphere
 
 from gyriflow.cli import launch
 from gyriflow.cli.beginning import write_configuration
@@ -14,6 +15,7 @@ from gyriflow.cli.commands import main
 from gyriflow.cli.recognition import UNSET, fitting_scheme, recognise
 from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
@@ -84,6 +86,19 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
     with pytest.raises(InputError, match="is there already"):
         list(write_configuration(tmp_path, path, force=False))
     assert list(write_configuration(tmp_path, path, force=True)) == said
+
+
+@pytest.mark.parametrize(("finer", "runs"), [(0, ["reference", "measured"]), (1, ["reference"])])
+def test_surfaces_lead_a_run_only_where_their_vertices_match(tmp_path, finer, runs):
+    for week, levels in ((21, 2), (22, 2 + finer)):
+        for side, x in (("left", -12.0), ("right", 12.0)):
+            write_surface(tmp_path / f"week{week}.{side}.pial.surf.gii", sphere(week / 2, levels, (x, 0, 0)))
+    path = tmp_path / "gyriflow.yaml"
+    list(write_configuration(tmp_path, path, force=False))
+    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    assert list(config.runs) == runs
+    # what `check` asks for first
+    assert {run for run, _ in resolve(config).simulations} == set(runs)
 
 
 def test_a_folder_without_brains_says_what_is_expected(tmp_path):

@@ -16,7 +16,7 @@ SHAPES = {"real": shaped(REAL), "start": shaped(bumpy(2)), "adjacent": shaped(bu
 def row(week: float, *, grown: float = 1.0, run: str = "measured") -> dict:
     """A row of the real brain `grown`, which was to have the real brain's own area and volume."""
     return validation_row(
-        {"run": run, "kind": "predicted", "start_week": 21.0, "week": week},
+        {"run": run, "kind": "predicted", "start_week": 21.0, "week": week, "start": "a", "real": f"b{week:g}"},
         simulated=transformed(REAL, np.diag([grown] * 3 + [1.0])),
         real_brain=REAL,
         aims={"area_cm2": area(REAL) / 100, "volume_ml": signed_volume(REAL) / 1000},
@@ -33,6 +33,7 @@ def table() -> pd.DataFrame:
 
 def test_a_row_holds_sizes_errors_placement_and_folds(table):
     found = table.iloc[1]
+    assert (found["start"], found["real"]) == ("a", "b23")
     assert found["horizon"] == 2
     # a ball of 20 mm with shallow bumps: 50 cm², 34 mL
     assert found["curve_area_cm2"] == pytest.approx(4 * np.pi * RADIUS**2 / 100, rel=0.1)
