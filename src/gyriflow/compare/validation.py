@@ -43,10 +43,11 @@ def validation_row(
     from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
     `placement.placement` and `shapes.against_real`.
 
-    The labels are run, kind ("explained" where growth came from the weeks that are compared, "predicted" where from
-    another brain, atlas or only earlier weeks), start and real (ids of the brains), start_week and week. `simulated` and `real_brain` are closed surfaces
-    in mm as they are; `aims` the area_cm2 and volume_ml that the run was to have in this week, if any; the shapes are
-    ready and laid onto the real brain, as for `placement`.
+    The labels are run, kind ("explained" where growth came from the weeks that are compared, "predicted" where
+    from another brain, atlas or only earlier weeks), start and real (ids of the brains), start_week and week.
+    `simulated` and `real_brain` are closed surfaces in mm as they are; `aims` the area_cm2 and volume_ml that
+    the run was to have in this week, if any; the shapes are ready and laid onto the real brain, as for
+    `placement`.
     """
     horizon = labels["week"] - labels["start_week"]
     placed = transformed(simulated, fit_onto(simulated, real_brain))
