@@ -93,7 +93,9 @@ rule registration_ceiling:
         start_week=from_brain("week"),
         weeks=lambda w: study.ceiling_weeks(w.brain),
         run="registration",
-        real=lambda w: [study.references[w.brain, week_tag(week)][0].id for week in study.ceiling_weeks(w.brain)],
+        real=lambda w: [
+            study.references[w.brain, week_tag(week)][0].id for week in study.ceiling_weeks(w.brain)
+        ],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
