@@ -105,6 +105,7 @@ def page_content(
         "title": "Cortical folding, measured"
         if runs is None
         else f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
+        "verdict": verdict(runs, validation, warnings),
         "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality)),
@@ -202,6 +203,28 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
             scores = compared.sort_values("week").iloc[-1] if len(compared) else {}
         rows.append({"run": name, "verdict": run_verdict(run), **_scores(scores)})
     return pd.DataFrame(rows)
+
+
+def verdict(runs: pd.DataFrame, validation: pd.DataFrame | None, warnings: pd.DataFrame) -> str:
+    """Return in a sentence how the run nearest to its last real brain compares with no folding, and the worst warning.
+
+    Parameters
+    ----------
+    runs, validation : as for `scores_table`
+    warnings : columns level and message
+    """
+    sentence = "No real brain of the same population and week was there to compare a simulation with."
+    if validation is not None and len(validation):
+        last = validation[validation["week"] == validation["week"].max()]
+        best = last.sort_values("r_shape_index", ascending=False).iloc[0]
+        sentence = (
+            f"At {week_label(best['week'])} run {best['run']} comes nearest to the real brain ({best['kind']}): shape "
+            f"index r {best['r_shape_index']:.2f}, {best['r_start_shape_index']:.2f} by doing nothing but scaling the "
+            f"start; {best['distance_mm']:.2f} mm from it."
+        ).replace("-", "−")
+    doubts = [text for _, run in runs.iterrows() for text in run_verdict(run).split("; ")[1:]]
+    worst = [*warnings.loc[warnings["level"] == "error", "message"], *doubts, *warnings["message"]]
+    return f"{sentence} {f'Worst warning: {worst[0].rstrip(".")}.' if worst else 'No step has warned.'}"
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:

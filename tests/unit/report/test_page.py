@@ -18,6 +18,7 @@ from gyriflow.report.page import (
     scores_table,
     sections,
     shown_figures,
+    verdict,
 )
 from gyriflow.report.tables import html_table, resolution_over_steps
 
@@ -43,6 +44,7 @@ VALIDATION = pd.DataFrame(
 )  # fmt: skip
 
 
+NO_WARNINGS = pd.DataFrame({"level": [], "message": []})
 QUALITY = pd.DataFrame(
     {
         "subject": ["young", "old"], "verdict": ["look", "refused"], "cause": [np.nan, "cropped"],
@@ -71,7 +73,7 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
 
 def page(figures: list[dict], view: dict | None = None) -> str:
     content = page_content(
-        brains=BRAINS, quality=QUALITY, runs=RUNS, validation=VALIDATION, warnings=pd.DataFrame(),
+        brains=BRAINS, quality=QUALITY, runs=RUNS, validation=VALIDATION, warnings=NO_WARNINGS,
         provenance=PROVENANCE, methods="**Brains.** Two.", configuration="start: young\n", shown=figures,
     )  # fmt: skip
     parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
@@ -118,6 +120,19 @@ def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_thr
     found = [(name, [(item["number"], item["technical"]) for item in items]) for name, items in sections(figures)]
     assert found == [("A", [(1, False), (2, True)]), ("B", [(3, False)])]
     assert "<details><summary>2. a</summary>" in page(figures)
+
+
+def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
+    none = pd.DataFrame({"level": [], "message": []})
+    told = verdict(RUNS, VALIDATION, none)
+    assert told.startswith("At 23 GW run thin comes nearest to the real brain (predicted): shape index r 0.57, 0.57 by")
+    assert "0.42 mm from it. Worst warning: cortex not resolved (1.2 elements through it, 2 needed)" in told
+    failed = pd.DataFrame({"level": ["warning", "error"], "message": ["holes closed", "a step died."]})
+    assert verdict(RUNS, VALIDATION, failed).endswith("Worst warning: a step died.")
+    alone = verdict(RUNS.assign(elements_through_cortex=3.0, unresolved_from_week=np.nan), None, none)
+    assert alone.startswith("No real brain of the same population")
+    assert alone.endswith("No step has warned.")
+    assert told in page(shown("growth_figure")).replace("&#39;", "'")
 
 
 def test_paths_are_hidden():

@@ -165,6 +165,29 @@
     find("view-label").textContent = map.label;
   };
 
+  // the ends of the axes that lie in the picture, at the edges of each pane, and a bar of whole millimetres
+  const ENDS = { L: [-1, 0, 0], R: [1, 0, 0], P: [0, -1, 0], A: [0, 1, 0], I: [0, 0, -1], S: [0, 0, 1] };
+  const SEEN = 0.6, TO_EDGE = 0.44;
+  const mark = (each, height, wide) => {
+    const ends = find("view-ends"), bar = find("view-scale").firstElementChild;
+    ends.replaceChildren();
+    const back = camera.quaternion.clone().conjugate();
+    panes.forEach((_, index) => {
+      for (const [letter, axis] of Object.entries(ENDS)) {
+        const seen = new THREE.Vector3(...axis).applyQuaternion(back), size = Math.hypot(seen.x, seen.y);
+        if (size < SEEN) continue;
+        const said = document.createElement("span"), scale = TO_EDGE / Math.max(Math.abs(seen.x), Math.abs(seen.y));
+        said.textContent = letter;
+        said.style.left = `${each * (index + 0.5 + seen.x * scale)}px`;
+        said.style.top = `${height * (0.5 - seen.y * scale)}px`;
+        ends.appendChild(said);
+      }
+    });
+    const perMm = (camera.zoom * each) / (2 * wide), length = [50, 20, 10, 5, 2, 1].find((mm) => mm * perMm < 0.3 * each) || 1;
+    bar.style.width = `${length * perMm}px`;
+    bar.textContent = `${length} mm`;
+  };
+
   const state = { frames: 0 };
   const draw = () => {
     const width = place.clientWidth, height = Math.round(Math.min(0.62 * width / panes.length * 1.15, 560));
@@ -181,6 +204,7 @@
       renderer.setScissor(index * each, 0, each, height);
       renderer.render(pane.scene, camera);
     });
+    mark(each, height, wide);
     state.frames += 1;
   };
   const show = () => {
