@@ -28,6 +28,7 @@ NEAR_VOXELS = 1.0
 FARTHEST_VOXELS = 1.5
 # a layer thinner than this part of a voxel is none
 THINNEST_VOXELS = 1 / 3
+LEAST_VOXELS = 1.5
 QUANTILES = (0.05, 0.95)
 # on the medial wall, where there is no cortex, white and pial surfaces meet
 LEAST_MM = 0.3
@@ -106,6 +107,8 @@ def thickness_from_labels(
     log.info("cortical thickness: %.2f mm on average", mean)
     if not USUAL_MM[0] <= mean <= USUAL_MM[1]:
         log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", mean)
+    if (voxels := thickness.report["voxels_through_cortex"]) < LEAST_VOXELS:
+        log.warning("the labels of the cortex are %.1f voxels thick: they say little of its thickness", voxels)
     return thickness
 
 

@@ -17,7 +17,7 @@ from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
 from ..study.series import why_unmatched
-from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, fitting_scheme, recognise
+from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, choose_schemes, recognise, scheme_fits, scheme_reasons
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -45,7 +45,9 @@ SUBJECT = "subject"
 """Id and population of the brain of a prediction."""
 
 
-def write_configuration(folder: Path, path: Path, force: bool, fold: bool = True) -> Iterator[str]:
+def write_configuration(
+    folder: Path, path: Path, force: bool, fold: bool = True, scheme: str | None = None
+) -> Iterator[str]:
     """Write a configuration for the brains of a folder; yield what was recognised, a line a kind.
 
     With `fold`, one of them is folded.
@@ -54,7 +56,7 @@ def write_configuration(folder: Path, path: Path, force: bool, fold: bool = True
     """
     if path.exists() and not force:
         raise InputError("is there already", path=path, remedy="Choose another file with --output, or add --force.")
-    brains = recognise(folder)
+    brains = recognise(folder, scheme=scheme)
     inside = path.resolve().parent == folder.resolve()
     lines = []
     for brain in brains:
@@ -73,6 +75,7 @@ def write_configuration(folder: Path, path: Path, force: bool, fold: bool = True
         kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
         yield f"{brain.entry['id']}: {kind}, week {brain.entry['week']}"
         yield from (f"  to be filled in: {note}" for note in brain.notes)
+    yield from scheme_reasons(brains)
 
 
 def write_prediction(
@@ -95,9 +98,11 @@ def write_prediction(
             f"warning: no --atlas is named, so that of {SHIPPED_ATLAS} is taken. Its brains are of spina bifida "
             "aperta, not normal ones, and end at 25 GW unoperated"
         )
-    scheme = scheme or fitting_scheme(read_label_volume(labels).labels)
-    if scheme is None:
-        raise InputError("has labels that fit no scheme, or several", path=labels, remedy="Name it: --scheme")
+    brain = Recognised({"scheme": scheme or UNSET}, fits=scheme_fits(read_label_volume(labels).labels))
+    choose_schemes([brain], scheme)
+    if brain.notes:
+        raise InputError("has labels of an unknown scheme", path=labels, found=brain.notes[0], remedy="Name --scheme")
+    scheme = brain.entry["scheme"]
     entry = {"id": SUBJECT, "week": weeks[0], "population": SUBJECT, "labels": str(labels.resolve()), "scheme": scheme}
     settings = validated(AtlasSettings, atlas or SHIPPED_ATLAS, "--atlas")
     series = _growing(Atlas(**read_keys(settings.description)), weeks, accepted)
@@ -138,8 +143,9 @@ def write_bids(
     files: str | None = None,
     settings: str | None = None,
     fold: bool | None = None,
-) -> list[str]:
-    """Write a configuration for the scans of a BIDS data set, and return their ids.
+    scheme: str | None = None,
+) -> tuple[list[str], list[str]]:
+    """Write a configuration for the scans of a BIDS data set, and return their ids and why labels have their schemes.
 
     Of it are taken the participants and sessions with these labels, all where there are none, and those files whose
     paths match a pattern. `settings` is a configuration without brains; what it does not say is as `init` has it. They
@@ -149,7 +155,7 @@ def write_bids(
     subjects = {f"sub-{label.removeprefix('sub-')}" for label in participants or ()}
     own_sessions = {f"ses-{label.removeprefix('ses-')}" for label in sessions or ()}
     brains = []
-    for brain in recognise(folder, files or "*"):
+    for brain in recognise(folder, files or "*", scheme):
         entities = SUBJECT_AND_SESSION.match(brain.entry["id"])
         if entities and (not subjects or entities[1] in subjects) and (not own_sessions or entities[2] in own_sessions):
             brains.append(brain)
@@ -157,7 +163,9 @@ def write_bids(
         asked = " ".join(sorted(subjects | own_sessions)) or "files named sub-…"
         raise InputError("has no such participants and sessions", path=folder, expected=asked)
     if problems := [f"\n  {brain.entry['id']}: {note}" for brain in brains for note in brain.notes]:
-        remedy = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'."
+        remedy = (
+            "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'; --scheme names labels."
+        )
         raise InputError("cannot be run as it is", path=folder, found="".join(problems), remedy=remedy)
     followed = [scans for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
     starts = [scans[0].entry["id"] for scans in followed]
@@ -173,7 +181,7 @@ def write_bids(
         text |= {key: value for key, value in given.items() if key not in OF_FOLDING}
     text["metrics"] = {"white_surfaces": "all"} | (given.get("metrics") or {})
     write_text(path, yaml.safe_dump(text, sort_keys=False))
-    return [brain.entry["id"] for brain in brains]
+    return [brain.entry["id"] for brain in brains], list(scheme_reasons(brains))
 
 
 def _of_subjects(brains: Sequence[Recognised]) -> dict[str, list[Recognised]]:

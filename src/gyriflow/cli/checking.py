@@ -13,13 +13,14 @@ from textwrap import fill
 from typing import NamedTuple
 
 from ..anatomy.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
+from ..anatomy.layout import doubts_of_scheme, layout_of
 from ..anatomy.plausible import require_plausible_size
 from ..config import load
 from ..config.brains import Brain
 from ..config.root import Config
-from ..errors import GyriflowError
+from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
-from ..io.volumes import read_label_volume
+from ..io.volumes import names_unit, read_label_volume
 from ..io.yaml_files import read_keys
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import ELEMENTS_NEEDED
@@ -28,6 +29,7 @@ from ..study import resolve
 from ..study.study import Study
 from .cost import ERROR, LEAST_SURFACE_MIB, SECONDS_PER_JOB, folding_needs, surface_memory_mib
 from .launch import main as launch
+from .recognition import scheme_fits
 from .status import as_duration
 
 NAMED_RUNS = 6
@@ -56,6 +58,9 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     problems = list(input_problems(config))
     yield from ((f"  {line}", bad) for line, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
+    volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
+    if not any(bad for _, bad in problems) and (unnamed := sum(not names_unit(volume) for volume in volumes)):
+        yield f"  note: {unnamed} of {len(volumes)} label volumes name no unit of length: mm, by their sizes", False
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
         yield f"  {missing} files of atlases are not there yet and will be downloaded", False
     if not any(bad for _, bad in problems):
@@ -185,6 +190,12 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
     whole = brain.hemisphere is None
     cerebrum = read_cerebrum(read.labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
+    if whole and (doubts := list(doubts_of_scheme(layout_of(read.labels), scheme))):
+        fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
+        if fitting:
+            problem = f"has labels that lie as those of {' or '.join(fitting)}, not as those of {scheme.name}"
+            raise InputError(problem, path=volume, found="; ".join(doubts))
+        yield from doubts
     if whole:
         yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 

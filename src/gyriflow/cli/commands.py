@@ -31,6 +31,7 @@ cores_option = click.option(
     "-c", "--cores", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="all", help="Cores to use."
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Up to this target only. May be repeated.")
+scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
 dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
 
 
@@ -109,7 +110,8 @@ def main() -> None:
 @click.argument("folder", type=THERE)
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
-def init(folder: Path, output: Path | None, force: bool) -> None:
+@scheme_option
+def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> None:
     """Write a configuration from the files of a FOLDER.
 
     It knows tissue label volumes (their scheme is found from the labels), hemisphere surfaces, and ages from
@@ -118,7 +120,7 @@ def init(folder: Path, output: Path | None, force: bool) -> None:
     from .beginning import write_configuration
 
     path = output or folder / CONFIG
-    for line in write_configuration(folder, path, force):
+    for line in write_configuration(folder, path, force, scheme):
         click.echo(line)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 
@@ -208,7 +210,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 @click.option("--week", type=float, required=True, help="Gestational week of the brain.")
 @click.option("--until", type=float, required=True, help="Week to predict it for.")
 @click.option("--atlas", help="Whose growth: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
-@click.option("--scheme", help="Label scheme. [default: found from the labels]")
+@scheme_option
 @click.option("--image", type=FILE, help="T2-weighted volume of the same brain.")
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the atlas' licence, where it asks for it.")
 @directory_option
@@ -236,6 +238,7 @@ def predict(
 @click.option(*LABELS[:2], "participants", multiple=True, help="These participants only.")
 @click.option(*LABELS[2:], "sessions", multiple=True, help="These sessions only.")
 @click.option("--files", help="Pattern of the paths of files to take, where a scan has several.")
+@scheme_option
 @click.option(
     "--settings",
     type=click.Path(exists=True, dir_okay=False, resolve_path=True),
@@ -260,10 +263,11 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options = work / "bids.json"
     if level == "group":
         selection = remembered(options, selection)
-    brains = write_bids(data, config, **selection)
+    brains, reasons = write_bids(data, config, **selection)
     if level == "participant" and not dry_run:
         remember(options, selection)
     told = "folded, too" if selection["fold"] else "measured; --fold folds them, too"
+    click.echo("\n".join(reasons))
     click.echo(f"{len(brains)} scans, {told}: {', '.join(brains)}; {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)

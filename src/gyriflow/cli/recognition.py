@@ -1,7 +1,7 @@
 """Which files of a folder are brains, by their names, the labels in them, and the table of participants."""
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
-from ..anatomy.labels import cerebrum_mask, require_cortex_outside
+from ..anatomy.labels import cerebrum_mask
+from ..anatomy.layout import doubts_of_scheme, layout_of
 from ..config.participants import Scan, covariates, read_scans
 from ..errors import InputError
 from ..io.files import files_in, read_json
@@ -42,12 +42,15 @@ class Recognised:
 
     entry: dict[str, Any]
     notes: list[str] = field(default_factory=list)
+    fits: dict[str, str] | None = None
+    """Of labels what `scheme_fits` returns."""
 
 
-def recognise(folder: Path, pattern: str = "*") -> list[Recognised]:
+def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> list[Recognised]:
     """Return the brains of a folder and those in it, the youngest first, from files whose paths match a pattern.
 
-    Data sets that gyriflow itself has made are left out. InputError where there are none.
+    Data sets that gyriflow itself has made are left out. All labels are of the `scheme`, where one is named.
+    InputError where there are none.
     """
     files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
     exports = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
@@ -73,35 +76,59 @@ def recognise(folder: Path, pattern: str = "*") -> list[Recognised]:
             brain.notes.append(f"{counts[name]} files are of {name}: keep one")
         if seen[name] > 1:
             brain.entry["id"] = f"{name}-{seen[name]}"
-        if brain.entry.get("scheme") == UNSET:
-            brain.notes.append("scheme: none of the shipped ones fits, or several do")
+    choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     return sorted(brains, key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
 
 
-def fitting_scheme(labels: np.ndarray) -> str | None:
-    """Return the label scheme that a volume's labels fit, or None where none does or several cannot be told apart.
-
-    A scheme fits where it knows all labels and what it calls cortex lies around what it calls the cerebrum; of several
-    that do, the one with most cortex outside is taken if it stands out, or else the one whose labels are all there.
-    """
-    # the air around the head tells nothing, and is most of the volume
-    for box in ndimage.find_objects((labels != 0).astype(np.int8)):
-        labels = np.ascontiguousarray(labels[box])
-    present = set(np.unique(labels).tolist()) - {0}
-    if present == {1}:
-        return "binary"
-    outside, complete = {}, {}
+def scheme_fits(labels: np.ndarray) -> dict[str, str]:
+    """Return the shipped schemes that know all labels of a volume, each with what speaks against it, or ""."""
+    numbers = set(np.unique(labels).tolist()) - {0}
+    layout, causes = layout_of(labels), {}
     for name, scheme in SCHEMES.items():
-        if scheme.cortex:
+        if numbers and numbers <= set(scheme.labels):
             try:
                 cerebrum_mask(labels, scheme)
-                outside[name] = require_cortex_outside(labels, scheme)
-            except InputError:
-                continue
-            complete[name] = len(present & set(scheme.labels)) / len(scheme.labels)
-    alike = [name for name in outside if outside[name] > max(outside.values()) - 0.02]
-    best = [name for name in alike if complete[name] == max(complete[other] for other in alike)]
-    return best[0] if len(best) == 1 else None
+                causes[name] = next(doubts_of_scheme(layout, scheme), "")
+            except InputError as error:
+                causes[name] = str(error).partition(";")[0]
+    return causes
+
+
+def choose_schemes(brains: Sequence[Recognised], given: str | None = None) -> None:
+    """Set the scheme of brains with labels, of a data set as a whole: that `given`, else the only one that fits all.
+
+    Where none fits all, each has its own. A note asks where several fit or none does, and where the scans of one
+    subject would have several.
+    """
+    each = [[name for name, against in (brain.fits or {}).items() if not against] for brain in brains]
+    fitting = [set(names) for names in each if names]
+    common = set.intersection(*fitting) if fitting else set()
+    of_subject: dict[str, set[str]] = defaultdict(set)
+    for brain, names in zip(brains, each, strict=True):
+        chosen = [given] if given else sorted(common & set(names)) or names
+        if len(chosen) == 1:
+            brain.entry["scheme"] = chosen[0]
+            of_subject[brain.entry.get("subject", "")].add(chosen[0])
+        elif chosen:
+            brain.notes.append(f"scheme: {' or '.join(chosen)}, which the labels fit both")
+        else:
+            against = [f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()]
+            brain.notes.append(f"scheme: no shipped one fits{''.join(against) or ', none knows all labels'}")
+    for brain in brains:
+        schemes = of_subject[brain.entry.get("subject", "")]
+        if brain.entry.get("subject") and len(schemes) > 1:
+            brain.entry["scheme"] = UNSET
+            brain.notes.append(f"scheme: scans of {brain.entry['subject']} fit {' and '.join(sorted(schemes))}")
+
+
+def scheme_reasons(brains: Sequence[Recognised]) -> Iterator[str]:
+    """Yield for each scheme that was chosen how many volumes have it, and what speaks against others, or against it."""
+    for name, number in Counter(brain.entry.get("scheme", UNSET) for brain in brains).items():
+        if name != UNSET:
+            fits = [brain.fits or {} for brain in brains if brain.entry.get("scheme") == name]
+            causes = {other: cause for known in fits for other, cause in known.items() if cause}
+            against = "".join(f"; {'but ' if other == name else f'not {other}: '}{causes[other]}" for other in causes)
+            yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}{against}"
 
 
 def _is_own(description: Path) -> bool:
@@ -142,7 +169,9 @@ def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iter
                 continue
             images = [str(other) for other in volumes if other.parent == file.parent and "_T2w." in other.name]
             image = {"image": images[0]} if len(images) == 1 else {}
-            yield _recognised(file, scans, {"labels": str(file), "scheme": fitting_scheme(labels) or UNSET} | image)
+            brain = _recognised(file, scans, {"labels": str(file), "scheme": UNSET} | image)
+            brain.fits = scheme_fits(labels)
+            yield brain
 
 
 def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Recognised:

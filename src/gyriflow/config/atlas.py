@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from ..io.files import files_below
 from ..parameters.settings import Problem, Settings, located, nearest, refused
 from ..parameters.terms import AffineSource, Coordinates
 from ..parameters.varying import Week
@@ -289,15 +290,18 @@ class UsedAtlas:
         patterns = {pattern for series in self.atlas.series.values() for pattern in series.files.values()}
         return {pattern: self._copies(pattern) for pattern in patterns}
 
+    @cached_property
+    def _files_there(self) -> list[Path]:
+        return files_below(self.folder)
+
     def _copies(self, pattern: str) -> dict[float, list[Path]]:
         parts = pattern.split("/")
         tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
         pieces = list(Formatter().parse(tail))
         name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
         copies: dict[float, list[Path]] = {}
-        for path in sorted(self.folder.rglob("".join(text + ("*" if field else "") for text, field, *_ in pieces))):
-            match = re.fullmatch(f"(?:.*/)?{name}", path.as_posix())
-            if match and path.is_file():
+        for path in self._files_there:
+            if match := re.fullmatch(f"(?:.*/)?{name}", path.as_posix()):
                 copies.setdefault(float(match[1]), []).append(path)
         return copies
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import os
 import shutil
 import uuid
 import warnings
@@ -208,4 +209,17 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
     def wanted(path: Path) -> bool:
         return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
 
-    return [path for path in sorted(Path(folder).rglob("*")) if path.is_file() and wanted(path)]
+    return [path for path in files_below(folder) if wanted(path)]
+
+
+def files_below(folder: AnyPath) -> list[Path]:
+    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice."""
+    entered: set[str] = set()
+    found = []
+    for place, folders, names in os.walk(folder, followlinks=True):
+        here, real = Path(place), os.path.realpath(place)
+        # a folder goes before the links to it
+        folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
+        found += [here / name for name in names if (here / name).is_file() and real not in entered]
+        entered.add(real)
+    return sorted(found)

@@ -79,6 +79,13 @@ def voxels_of(path: AnyPath) -> tuple[int, float]:
     return math.prod(map(int, image.shape[:3])), float(size.prod())
 
 
+def names_unit(path: AnyPath) -> bool:
+    """Return whether a volume's header names its unit of length; MGH has mm always."""
+    with reading(path, "an image"):
+        image = nib.load(path)
+    return not isinstance(image, nib.Nifti1Pair) or _length_unit(image.header, path) != "unknown"
+
+
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
@@ -152,7 +159,7 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
     codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
     unit = _length_unit(header, path)
     if unit == "unknown":
-        log.warning("%s: no unit of length in the header, mm taken", path)
+        log.info("%s: no unit of length in the header, mm taken", path)
     # row by row: a product of matrices would take 0 times infinite entries
     scale = np.array([[MM_PER_NIFTI_UNIT[unit]]] * 3 + [[1.0]])
     if affine_from != "auto":

@@ -292,3 +292,13 @@ def test_real_fissure_hidden_by_cortex_is_opened():
     assert 85 < opened.report["area_cm2"]["whole"] < 98
     wall = opened.left.vertices[np.abs(opened.left.vertices[:, 0] - opened.fissure_x_mm) < 1.5]
     assert np.median(wall[:, 0]) == pytest.approx(-0.75, abs=0.1)
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_a_mask_whose_fissure_is_shut_is_told(deep):
+    x, y, z = np.indices((56, 66, 56)) - np.array([28, 33, 28])[:, None, None, None]
+    mask = (x / 23) ** 2 + (y / 28) ** 2 + (z / 22) ** 2 < 1
+    # a gap between the hemispheres, but for what joins them
+    mask &= ~((abs(x) < 2) & (z > -8)) | (not deep)
+    surface = from_labels(mask.astype(np.int32), np.eye(4), SCHEMES["binary"], week=24.0, edge_length_mm=2.0)
+    assert any("keeps the fissure shut" in said for said in surface.report["warnings"]) != deep

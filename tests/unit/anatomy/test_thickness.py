@@ -109,6 +109,14 @@ def test_a_cortex_of_no_usual_thickness_is_told(ball, caplog, thickness_mm, told
     assert ("is it cortex that the scheme calls so?" in caplog.text) == told
 
 
+@pytest.mark.parametrize(("thickness_mm", "told"), [(0.9, True), (1.7, False)])
+def test_a_cortex_of_about_a_voxel_is_told(ball, caplog, thickness_mm, told):
+    pial, depth, inside, affine = ball
+    labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
+    thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
+    assert ("voxels thick" in caplog.text) == told
+
+
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     pial, depth, inside, affine = ball
     # the voxels go on beyond the surface, as where a fissure was opened

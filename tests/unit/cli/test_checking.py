@@ -1,20 +1,24 @@
 """What `gyriflow check` says of the input files of brains and of the mesh, and what it leaves behind."""
 
+import nibabel as nib
 import numpy as np
 import pytest
+import yaml
 from configurations import LABELLED
 from shapes import hemisphere
 
-from gyriflow.cli.checking import coarse_cortices, input_problems, plan, work_of
+from gyriflow.cli import checking
+from gyriflow.cli.checking import check_study, coarse_cortices, input_problems, plan, work_of
 from gyriflow.config import load
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
+from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 
 
 def problems(folder, **keys):
     brain = {"id": "a", "week": 23} | keys
-    config = load({"brains": [brain], "start": "a", "folding": {"end_week": 26}}, folder)
+    config = load({"brains": [brain], "start": "a", "folding": {"end_week": brain["week"] + 3}}, folder)
     return [line for line, bad in input_problems(config) if bad]
 
 
@@ -54,6 +58,27 @@ def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubted):
     assert [bad for _, bad in said] == [False] * len(said)
     assert bool(said) == bool(doubted)
     assert all(doubted in line for line, _ in said)
+
+
+def test_labels_that_lie_as_those_of_another_scheme_are_refused():
+    labels = "fetal_SB_atlas_GA28_operated/parcellation.nii.gz"
+    said = problems(SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="dhcp-19")
+    assert "has labels that lie as those of spina-bifida-atlas, not as those of dhcp-19; found " in said[0]
+    assert problems(SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="spina-bifida-atlas") == []
+
+
+def test_a_header_without_a_unit_is_told_once_and_is_no_warning(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(checking, "work_of", lambda *_: iter(()))
+    for name, unit in (("a", "unknown"), ("b", "unknown"), ("c", "mm")):
+        image = nib.Nifti1Image(np.ones((45, 45, 40), np.uint8), 1.7 * np.eye(4))
+        image.header.set_xyzt_units(unit)
+        nib.save(image, tmp_path / f"{name}.nii")
+    brains = [{"id": name, "week": 38, "labels": f"{name}.nii", "scheme": "binary"} for name in "abc"]
+    text = yaml.safe_dump({"brains": brains, "start": "a", "folding": {"end_week": 39}})
+    (tmp_path / "gyriflow.yaml").write_text(text)
+    said = [line for line, _ in check_study(tmp_path / "gyriflow.yaml", tmp_path, 1) if "no unit" in line]
+    assert said == ["  note: 2 of 3 label volumes name no unit of length: mm, by their sizes"]
+    assert [record for record in caplog.records if record.levelname == "WARNING"] == []
 
 
 def coarse(mesh, **folding):

@@ -12,11 +12,11 @@ from shapes import sphere
 from gyriflow.cli import launch
 from gyriflow.cli.beginning import write_configuration
 from gyriflow.cli.commands import main
-from gyriflow.cli.recognition import UNSET, fitting_scheme, recognise
+from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
 from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
-from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 
@@ -24,14 +24,74 @@ ATLAS = SHIPPED / "atlases" / "spina-bifida"
 LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
 
 
-def test_the_scheme_is_found_from_the_labels():
-    labels = read_label_volume(LABELS).labels
-    assert fitting_scheme(labels) == "spina-bifida-atlas"
-    # the same brain with the numbers of FeTA
-    feta = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[labels]
-    assert fitting_scheme(feta) == "feta-7"
-    assert fitting_scheme((labels > 0).astype(np.int32)) == "binary"
-    assert fitting_scheme(labels + 200 * (labels > 0)) is None
+def sided(labels):
+    """Return labels of the spina bifida atlas as those of dHCP's, left and right of the middle."""
+    left = np.indices(labels.shape)[0] < np.argwhere(np.isin(labels, (1, 2, 5, 6, 8)))[:, 0].mean()
+    pairs = {1: (5, 6), 2: (7, 8), 3: (11, 12), 4: (1, 2), 5: (3, 4), 6: (14, 15), 7: (10, 10), 8: (9, 9)}
+    return sum(np.where(labels == own, np.where(left, *pair), 0) for own, pair in pairs.items())
+
+
+# the numbers of each scheme for white matter, ventricles, cerebellum, outer CSF, cortex, deep grey, brainstem, callosum
+NUMBERS = {
+    "feta-7": (3, 4, 5, 1, 2, 6, 7, 3),
+    "drawem-9": (3, 5, 6, 1, 2, 7, 8, 9),
+    "freesurfer": (2, 4, 8, 24, 3, 10, 16, 251),
+    "crl": (120, 92, 100, 124, 112, 77, 94, 91),
+    "multi-bounti-43": (13, 39, 28, 37, 1, 35, 27, 25),
+    "spina-bifida-atlas": (1, 2, 3, 4, 5, 6, 7, 8),
+    "binary": (1, 1, 0, 0, 1, 1, 0, 1),
+}
+
+
+def renumbered(labels, scheme):
+    return np.array([0, *NUMBERS[scheme]])[labels]
+
+
+def fitting(labels):
+    return [name for name, against in scheme_fits(labels).items() if not against]
+
+
+def test_the_scheme_is_found_by_where_labels_lie():
+    labels = read_label_volume(LABELS, cropped=True).labels
+    for scheme in NUMBERS:
+        assert fitting(renumbered(labels, scheme)) == [scheme]
+        # a brain without its surroundings
+        assert fitting(renumbered(np.where(np.isin(labels, (3, 4, 7)), 0, labels), scheme)) == [scheme]
+    assert fitting(sided(labels)) == ["dhcp-19"]
+    # operated brains' cerebellum and CSF were taken for two hemispheres of cortex
+    operated = read_label_volume(ATLAS / "fetal_SB_atlas_GA28_operated" / "parcellation.nii.gz").labels
+    assert fitting(operated) == ["spina-bifida-atlas"]
+    assert "outer CSF" in scheme_fits(operated)["dhcp-19"] or "cortex" in scheme_fits(operated)["dhcp-19"]
+    assert scheme_fits(labels + 200 * (labels > 0)) == {}
+    # FeTA and DrawEM call these the same
+    assert fitting(np.array([0, 3, 3, 0, 0, 2, 3, 0, 3])[labels]) == ["drawem-9", "feta-7"]
+
+
+def saved(folder, **volumes):
+    for name, labels in volumes.items():
+        path = folder / f"{name.replace('_', '/', 1)}_week21_dseg.nii.gz"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_label_volume(path, LabelVolume(labels.astype(np.int32), np.diag([0.8, 0.8, 0.8, 1])))
+
+
+def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
+    labels = read_label_volume(LABELS, cropped=True).labels
+    either = np.array([0, 3, 3, 0, 0, 2, 3, 0, 3])[labels]
+    # one volume alone could be of two, with another one it cannot
+    saved(tmp_path / "whole", a=either, b=renumbered(labels, "feta-7"))
+    assert {brain.entry["scheme"] for brain in recognise(tmp_path / "whole")} == {"feta-7"}
+    saved(tmp_path / "two", a=either)
+    (brain,) = recognise(tmp_path / "two")
+    assert brain.entry["scheme"] == UNSET
+    assert brain.notes == ["scheme: drawem-9 or feta-7, which the labels fit both"]
+    (brain,) = recognise(tmp_path / "two", scheme="feta-7")
+    assert (brain.entry["scheme"], brain.notes) == ("feta-7", [])
+    # a folder may hold two data sets, but a subject is of one
+    mixed = {"sub-01_ses-1": labels, "sub-01_ses-2": sided(labels), "sub-02_ses-1": labels}
+    saved(tmp_path / "mixed", **mixed)
+    first, second, other = sorted(recognise(tmp_path / "mixed"), key=lambda brain: brain.entry["id"])
+    assert first.notes == second.notes == ["scheme: scans of sub-01 fit dhcp-19 and spina-bifida-atlas"]
+    assert (first.entry["scheme"], other.entry["scheme"], other.notes) == (UNSET, "spina-bifida-atlas", [])
 
 
 def touched(folder, *names):
@@ -77,7 +137,8 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
         (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
     path = tmp_path / "gyriflow.yaml"
     said = list(write_configuration(tmp_path, path, force=False))
-    assert said == [f"{name}: labels, spina-bifida-atlas, week {name[2:]}.0" for name in ("GA21", "GA22")]
+    assert said[:2] == [f"{name}: labels, spina-bifida-atlas, week {name[2:]}.0" for name in ("GA21", "GA22")]
+    assert said[2].startswith("scheme spina-bifida-atlas: 2 label volumes; not ")
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
     assert config.start == "GA21"
@@ -200,6 +261,8 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert [brain["id"] for brain in both["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
     assert "start" not in both
     assert not (tmp_path / "out" / "work" / "results").exists()
+    app("participant", "--scheme", "feta-7")
+    assert {brain["scheme"] for brain in app("group")[1]["brains"]} == {"feta-7"}
 
 
 def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):

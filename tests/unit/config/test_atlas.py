@@ -137,6 +137,21 @@ def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp
     assert missing.url.endswith("/" + SURFACES.format(22, "right"))
 
 
+def test_an_atlas_folder_and_what_is_in_it_may_be_links(tmp_path):
+    put(tmp_path / "store", *surfaces(21))
+    put(tmp_path / "far", *surfaces(22))
+    (tmp_path / "store" / "more").symlink_to(tmp_path / "far")
+    # a link upwards, by which each file would be found over and over
+    (tmp_path / "far" / "up").symlink_to(tmp_path / "store")
+    (tmp_path / "mine").symlink_to(tmp_path / "store")
+    section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22]}
+    config = load(study(section, "dhcp-surface-21"), tmp_path)
+    assert [brain.hemispheres.left for brain in config.brains] == [
+        f"{tmp_path}/store/{SURFACES.format(21, 'left')}",
+        f"{tmp_path}/far/{SURFACES.format(22, 'left')}",
+    ]
+
+
 def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     known = read_yaml(ATLASES / "crl" / "atlas.yaml")["series"]["normative"]["weeks"]
     section = {"name": "crl", "folder": "mine", "weeks": [21, 22], "accept_licence": True}

@@ -51,6 +51,14 @@ def test_a_file_comes_whole_and_its_checksum_is_said(tmp_path, server, name, con
     assert sha256_of(tmp_path / "new" / name) == sha256(content)
 
 
+def test_a_file_comes_through_a_folder_that_is_a_link(tmp_path, server):
+    (tmp_path / "store").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "store")
+    fetched(tmp_path / "link", server, SHORT, sha256=sha256(SURFACE))
+    assert files_in(tmp_path / "store") == {SHORT: SURFACE}
+    assert (tmp_path / "link").is_symlink()
+
+
 def test_what_is_there_is_checked_and_never_replaced(tmp_path, server):
     (tmp_path / "atlas").mkdir()
     own = gifti(seed=5)
