@@ -120,7 +120,7 @@ def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> 
     from .beginning import write_configuration
 
     path = output or folder / CONFIG
-    for line in write_configuration(folder, path, force, scheme):
+    for line in write_configuration(folder, path, force, scheme=scheme):
         click.echo(line)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
 

@@ -147,6 +147,10 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
     with pytest.raises(InputError, match="is there already"):
         list(write_configuration(tmp_path, path, force=False))
     assert list(write_configuration(tmp_path, path, force=True)) == said
+    done = CliRunner().invoke(main, ["init", str(tmp_path), "--force", "--scheme", "feta-7"])
+    assert "scheme feta-7: 2 label volumes" in done.output
+    written = yaml.safe_load(path.read_text())
+    assert ([brain["scheme"] for brain in written["brains"]], written["start"]) == (["feta-7"] * 2, "GA21")
 
 
 @pytest.mark.parametrize(("finer", "runs"), [(0, ["reference", "measured"]), (1, ["reference"])])
