@@ -105,7 +105,7 @@ def page_content(
         "title": "Cortical folding, measured"
         if runs is None
         else f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
-        "verdict": verdict(runs, validation, warnings),
+        "verdict": "" if runs is None else verdict(runs, validation, warnings),
         "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality)),

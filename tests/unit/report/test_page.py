@@ -230,3 +230,12 @@ def test_the_methods_say_what_was_run():
     assert "itself [4]" in text
     assert "<li><p>Run <em>stiff</em>" in caption_html(text)
     assert "system-message" not in caption_html(text)
+
+
+def test_a_page_without_simulations_has_no_verdict():
+    none = pd.DataFrame({"level": [], "message": []})
+    content = page_content(
+        brains=BRAINS, quality=QUALITY, runs=None, validation=None, warnings=none, provenance=PROVENANCE,
+        methods="", configuration="", shown=[],
+    )  # fmt: skip
+    assert content["verdict"] == ""
