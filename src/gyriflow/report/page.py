@@ -19,6 +19,8 @@ from .tables import html_table
 
 FILE = "(file)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
+_FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
+"""Folders before the name of a file: they may hold names of people, and are nobody else's matter."""
 DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
 FIRST = "weekly_figure"
@@ -100,6 +102,7 @@ def page_content(
     shown : what `shown_figures` returns
     """
     software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
+    warnings, quality = (table.replace(_FOLDERS, "", regex=True) for table in (warnings, quality))
     versions = [(name, version) for name, version in software.items() if version]
     return {
         "title": "Cortical folding, measured"

@@ -232,6 +232,13 @@ def test_the_methods_say_what_was_run():
     assert "system-message" not in caption_html(text)
 
 
+def test_messages_tell_files_without_their_folders(monkeypatch):
+    monkeypatch.setitem(QUALITY, "warnings", ["/data/Smith John/x.nii.gz: cortex of 1 voxel, see https://a.b/c", ""])
+    text = page(shown("growth_figure"))
+    assert "x.nii.gz: cortex of 1 voxel, see https://a.b/c" in text
+    assert "Smith" not in text
+
+
 def test_a_page_without_simulations_has_no_verdict():
     none = pd.DataFrame({"level": [], "message": []})
     content = page_content(
