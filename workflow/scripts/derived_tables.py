@@ -11,6 +11,7 @@ from gyriflow.step import step
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     metrics = read_table(files.metrics)
+    people = metrics.assign(person=metrics["subject"].map(params.subjects))
     regions = [read_table(files.regions)] if files.regions else []
     long = long_table([metrics, *regions])
     parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
@@ -19,9 +20,9 @@ with step(snakemake.log[0]):
         "metrics_wide": wide_table(long, params.covariates),
         "change": change_between_scans(long, params.scans),
         "asymmetry": pd.concat(parts, ignore_index=True),
-        "norms": measured_norms(metrics, params.reference, params.subjects),
-        "norm_curves": norm_curves(metrics, params.reference, params.subjects),
-        "centiles": measured_scores(metrics, params.reference, params.subjects),
+        "norms": measured_norms(people, params.reference),
+        "norm_curves": norm_curves(people, params.reference),
+        "centiles": measured_scores(people, params.reference),
         "spectral_distance": spectral_distances(read_table(files.spectra)),
     }
     for name, table in tables.items():

@@ -266,9 +266,9 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     brains, reasons = write_bids(data, config, **selection)
     if level == "participant" and not dry_run:
         remember(options, selection)
-    told = "folded, too" if selection["fold"] else "measured; --fold folds them, too"
+    told = "measured and folded" if selection["fold"] else "measured (--fold folds, too)"
     click.echo("\n".join(reasons))
-    click.echo(f"{len(brains)} scans, {told}: {', '.join(brains)}; {config}")
+    click.echo(f"{len(brains)} scans to be {told}: {', '.join(brains)}; {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
     if not dry_run and (exported / "dataset_description.json").is_file():

@@ -121,22 +121,16 @@ def published_scores(
     return pd.DataFrame(rows, columns=columns)
 
 
-NO_SUBJECTS: Mapping[str, str] = {}
-"""Of brains that are each a subject of their own."""
-
-
-def measured_norms(
-    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
-) -> pd.DataFrame:
+def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Return the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
 
-    Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit; the reference are brains
-    that are the norm as measured, `subjects` whose scans they are. Columns hemisphere, metric, unit, week, brains
-    (subjects with a scan at most half a week away; several scans of one are their mean), mean, sd (NaN for one), q05,
-    q25, q50, q75, q95 (NaN for fewer than five).
+    Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person, whose scan it
+    is, unless each brain is of another; the reference are the brains that are the norm as measured. Columns hemisphere,
+    metric, unit, week, brains (persons with a scan at most half a week away; several scans of one are their mean),
+    mean, sd (NaN for one), q05, q25, q50, q75, q95 (NaN for fewer than five).
     """
     rows = []
-    for names, brains in _by_metric(metrics, reference, subjects):
+    for names, brains in _by_metric(metrics, reference):
         for week in np.unique(brains["week"]):
             near = brains[(brains["week"] - week).abs() <= WINDOW_GW].groupby("person")["value"].mean()
             enough = near if len(near) >= LEAST_BRAINS else near.iloc[:0]
@@ -146,9 +140,7 @@ def measured_norms(
     return pd.DataFrame(rows, columns=columns)
 
 
-def measured_scores(
-    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
-) -> pd.DataFrame:
+def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Return where brains stand among the measured brains of a reference, at their own week.
 
     A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
@@ -162,16 +154,15 @@ def measured_scores(
     the scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
     reference's weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
     """
-    by_metric = dict(_by_metric(metrics, reference, subjects))
+    by_metric = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
-    table = metrics.assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
+    table = _with_people(metrics).assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
-    for row, alike in zip(table[names].to_dict("records"), table["alike"], strict=True):
+    for row, alike, person in zip(table[names].to_dict("records"), table["alike"], table["person"], strict=True):
         others = by_metric.get((row["hemisphere"], row["metric"]))
         if others is None:
             continue
         # a measured brain is compared with the others, of whom none is an earlier scan of itself
-        person = subjects.get(row["subject"], row["subject"])
         others = others[alike & ((row["run"] != MEASURED) | (others["person"] != person))]
         *score, flag = _score(row["week"], row["value"], others)
         rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
@@ -189,11 +180,13 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     return sides.isin(sides[of_reference])
 
 
-def _by_metric(
-    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str]
-) -> list[tuple[Any, pd.DataFrame]]:
+def _with_people(metrics: pd.DataFrame) -> pd.DataFrame:
+    return metrics if "person" in metrics else metrics.assign(person=metrics["subject"])
+
+
+def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
     rows = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
-    rows = rows.assign(person=rows["subject"].map(lambda brain: subjects.get(brain, brain)))
+    rows = _with_people(rows)
     return list(rows[~rows["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
 
 
@@ -223,9 +216,7 @@ def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
     return _Curve(here @ factors, leverage, sd, freedom)
 
 
-def norm_curves(
-    metrics: pd.DataFrame, reference: Sequence[str], subjects: Mapping[str, str] = NO_SUBJECTS
-) -> pd.DataFrame:
+def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
@@ -233,7 +224,7 @@ def norm_curves(
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]
-    for (hemisphere, metric), brains in _by_metric(metrics, reference, subjects):
+    for (hemisphere, metric), brains in _by_metric(metrics, reference):
         weeks = brains["week"].to_numpy(dtype=float)
         at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
         if (curve := _curve(brains, at)) is not None:

@@ -79,10 +79,6 @@ def _markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
     return dict(zip(shown, SUBJECT_MARKERS, strict=False)) if 1 < len(shown) <= len(SUBJECT_MARKERS) else {}
 
 
-def _subject_keys(markers: Mapping[str, str]) -> list[Artist]:
-    return [star(subject, marker=marker, markersize=5) for subject, marker in markers.items()]
-
-
 def _stars(
     axes: Axes,
     rows: pd.DataFrame,
@@ -133,7 +129,7 @@ def metrics_chart(
         _title(axes, rows)
         week_axis(axes, whole["week"])
     stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(subjects if markers else ()), "run"]
-    run_legend(figure, colours, measured=measured if len(stars) else "", extra=_subject_keys(markers))
+    run_legend(figure, colours, measured=measured if len(stars) else "", markers=markers)
     return figure
 
 
@@ -189,7 +185,7 @@ def norms_chart(
     extra: list[Artist] = [star("other measured brains", RUN_COLOURS[-1])] if others else []
     if len(curves):
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
-    run_legend(figure, colours, measured=measured, extra=[*_subject_keys(markers), *extra])
+    run_legend(figure, colours, measured=measured, markers=markers, extra=extra)
     return figure
 
 

@@ -161,9 +161,10 @@ def run_legend(
     *,
     measured: str = "",
     bars: bool = False,
+    markers: Mapping[str, str] | None = None,
     extra: Sequence[Artist] = (),
 ) -> None:
-    """Draw below the panels a legend of the runs, of the measured brains where they have a name, and of what else.
+    """Draw below the panels a legend of runs, of measured brains where they have a name, of subjects, and what else.
 
     Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows,
     and the figure grows by its lines.
@@ -171,6 +172,7 @@ def run_legend(
     Parameters
     ----------
     colours : {run: colour}
+    markers : {subject: marker}
     """
     handles: list[Artist] = [
         Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)
@@ -178,6 +180,7 @@ def run_legend(
     ]
     if measured:
         handles.append(star(measured))
+    handles += [star(subject, marker=marker, markersize=5) for subject, marker in (markers or {}).items()]
     handles.extend(extra)
     # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in
     longest = 0.5 + 0.065 * max(len(str(handle.get_label())) for handle in handles)

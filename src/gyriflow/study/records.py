@@ -102,13 +102,8 @@ class Brain:
         A brain without a subject, as of an atlas, may be compared with any.
         """
         population, subject = self.given.population, self.given.subject
-        return [
-            one
-            for one in brains
-            if population in (None, one.given.population)
-            and one.sides == self.sides
-            and (None in (subject, one.given.subject) or subject == one.given.subject)
-        ]
+        alike = [one for one in brains if population in (None, one.given.population) and one.sides == self.sides]
+        return [one for one in alike if None in (subject, one.given.subject) or one.given.subject == subject]
 
     @property
     def registered_volume(self) -> str:

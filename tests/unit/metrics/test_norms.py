@@ -75,19 +75,18 @@ def test_centiles_of_drawn_brains_are_even() -> None:
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 3), np.random.default_rng(1).normal(100, 5, 12)
     metrics, reference = table(weeks, values)
-    three = {name: f"s{number % 3}" for number, name in enumerate(reference)}
+    three, six = (metrics.assign(person=[f"s{number % few}" for number in range(12)]) for few in (3, 6))
     # twelve scans of three subjects leave nothing to know a scatter by
-    assert set(measured_scores(metrics, reference, three)["flag"]) == {"too few brains"}
-    assert norm_curves(metrics, reference, three).empty
-    six = {name: f"s{number % 6}" for number, name in enumerate(reference)}
-    assert set(measured_scores(metrics, reference, six)["brains"]) == {5}
-    norms = measured_norms(metrics, reference, dict.fromkeys(reference, "s"))
+    assert set(measured_scores(three, reference)["flag"]) == {"too few brains"}
+    assert norm_curves(three, reference).empty
+    assert set(measured_scores(six, reference)["brains"]) == {5}
+    norms = measured_norms(metrics.assign(person="s"), reference)
     assert set(norms["brains"]) == {1}
     assert norms["sd"].isna().all()
     # a scan given twice says no more than once
-    twice = pd.concat([metrics, metrics.assign(subject=metrics["subject"] + "again")])
-    again = {f"{name}again": name for name in reference}
-    both = [norm_curves(metrics, reference), norm_curves(twice, [*reference, *again], again)]
+    own = metrics.assign(person=metrics["subject"])
+    twice = pd.concat([own, own.assign(subject=own["subject"] + "again")])
+    both = [norm_curves(metrics, reference), norm_curves(twice, list(twice["subject"]))]
     np.testing.assert_allclose(both[0][["low", "high"]], both[1][["low", "high"]])
 
 
