@@ -25,7 +25,7 @@ SUMMARY = "results/runs/reference/a/folding/summary.json"
 LOG = "results/runs/reference/a/logs/simulate.log"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def meshed(checkout_copy, tmp_path_factory):
     """A study whose surface and mesh count as made: an ellipsoid."""
     workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
