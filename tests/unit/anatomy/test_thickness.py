@@ -101,20 +101,20 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
     assert set(np.round(found.values_mm[bare], 6)) <= set(np.round(found.values_mm[edge], 6))
 
 
-@pytest.mark.parametrize(("thickness_mm", "told"), [(1.7, False), (8.0, True)])
-def test_a_cortex_of_no_usual_thickness_is_told(ball, caplog, thickness_mm, told):
+@pytest.mark.parametrize(
+    ("thickness_mm", "message", "told"),
+    [
+        (1.7, "is it cortex that the scheme calls so?", False),
+        (8.0, "is it cortex that the scheme calls so?", True),
+        (0.9, "voxels thick", True),
+        (1.7, "voxels thick", False),
+    ],
+)
+def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog, thickness_mm, message, told):
     pial, depth, inside, affine = ball
     labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
     thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
-    assert ("is it cortex that the scheme calls so?" in caplog.text) == told
-
-
-@pytest.mark.parametrize(("thickness_mm", "told"), [(0.9, True), (1.7, False)])
-def test_a_cortex_of_about_a_voxel_is_told(ball, caplog, thickness_mm, told):
-    pial, depth, inside, affine = ball
-    labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
-    thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
-    assert ("voxels thick" in caplog.text) == told
+    assert (message in caplog.text) == told
 
 
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
