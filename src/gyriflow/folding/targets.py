@@ -127,7 +127,7 @@ def log_growth(positions: Floats, stiffness: MovingStiffness, displacement: Floa
     means, sizes = means[:, :6], np.where(means[:, 6:] > 0, means[:, 6:], 1.0)
     if smoothing_mm == 0:
         return means / sizes
-    # as `diffuse` does, in one step
+    # as `diffuse` does, but in one step, whose tails are longer than a Gaussian's
     matrix = sparse.csr_matrix(sparse.diags(sizes[:, 0]) + smoothing_mm**2 / 2 * stiffness.at(positions))
     smooth, columns = np.zeros_like(means), share.of(6)
     smooth[:, columns] = conjugate_gradients(matrix, means[:, columns], (means / sizes)[:, columns], SMOOTHED_TO)

@@ -45,27 +45,19 @@ def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
-def diffuse(
-    vertices: Floats,
-    cells: NDArray[np.integer],
-    values: Floats,
-    sigma_mm: float,
-    *,
-    steps: int = STEPS,
-) -> Floats:
+def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
     """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
 
     Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2, which keep the
-    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. Fewer `steps`
-    make tails longer than a Gaussian's.
+    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted.
     """
     if sigma_mm == 0:
         return values.copy()
     mass = vertex_sizes(vertices, cells)
     mass = np.where(mass > 0, mass, 1.0)
-    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / steps * stiffness_matrix(vertices, cells))
+    matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / STEPS * stiffness_matrix(vertices, cells))
     smooth: Floats = values.reshape(len(values), -1).astype(float)
-    for _ in range(steps):
+    for _ in range(STEPS):
         smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, 1e-8)
     return smooth.reshape(values.shape)
 
@@ -75,7 +67,7 @@ def continue_harmonically(
 ) -> Floats:
     """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices.
 
-    The boundary is free elsewhere; `tolerance` is as in `diffuse`.
+    The boundary is free elsewhere; `tolerance` is that of `conjugate_gradients`.
     """
     unknown = np.setdiff1d(np.unique(cells), known)
     continued = np.zeros((len(vertices), values.shape[1]))
