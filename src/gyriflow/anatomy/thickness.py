@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.matching import layer_thickness, nearest_on
 from ..geometry.poses import Pose
-from ..geometry.triangles import TriangleMesh, merged, transformed, vertex_areas
+from ..geometry.triangles import TriangleMesh, area, merged, transformed, vertex_areas
 from ..parameters.schemes import LabelScheme
 from ..parameters.terms import SIDES
 from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
@@ -32,6 +32,8 @@ LEAST_VOXELS = 1.5
 QUANTILES = (0.05, 0.95)
 # on the medial wall, where there is no cortex, white and pial surfaces meet
 LEAST_MM = 0.3
+LEAST_RATIO = 0.95
+HIDDEN = "a part of the pial surface is hidden in shut sulci: area and gyrification are lower bounds"
 USUAL_MM = 0.4, 3.5  # means in label atlases of 21 to 36 GW are 0.8 to 2.7 mm
 # the white surface crosses the pial one where so much of its area is so far outside
 OUTSIDE_MM, MOST_OUTSIDE = 0.5, 0.01
@@ -65,7 +67,8 @@ def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine:
     brainstem), and where a fissure that the labels hide was opened.
 
     `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
-    its cortex; it was made with the same smoothing.
+    its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over the
+    cortex's volume by its mean thickness.
     """
     core = smooth_mask(cerebrum & ~cortex)
     kept, _, _ = main_parts(core > LEVEL)
@@ -90,6 +93,8 @@ def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine:
     filled = values.copy()
     filled[~measured] = values[measured][nearest]
     report = summary(values, measured, vertex_areas(pial))
+    # a sheet of this volume and thickness has this area in its middle; its outside in a folded brain has more
+    report["area_ratio"] = area(pial) * report["mean_mm"] / (float(cortex.sum()) * voxel**3)
     return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 
 
@@ -109,6 +114,8 @@ def thickness_from_labels(
         log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", mean)
     if (voxels := thickness.report["voxels_through_cortex"]) < LEAST_VOXELS:
         log.warning("the labels of the cortex are %.1f voxels thick: they say little of its thickness", voxels)
+    elif (ratio := thickness.report["area_ratio"]) < LEAST_RATIO:
+        log.warning("the pial area is %.2f of the cortex's volume over its thickness: %s", ratio, HIDDEN)
     return thickness
 
 

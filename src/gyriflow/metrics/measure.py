@@ -177,6 +177,19 @@ def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
     ]
 
 
+def area_ratio_rows(table: Sequence[Row]) -> list[Row]:
+    """Return the row of the pial area over the cortex's volume by its mean thickness, where rows of a whole have these.
+
+    A cortical sheet of volume V and thickness H has the area V/H in its middle and a larger one outside: a ratio much
+    below 1 tells that sulci are shut.
+    """
+    known = {name: value for name, value, _ in table}
+    if not {"volume_cortex", "mean_thickness"} <= set(known):
+        return []
+    sheet_cm2 = known["volume_cortex"] / ML_PER_MM3 / known["mean_thickness"] * CM2_PER_MM2
+    return [("area_ratio", known["area"] / sheet_cm2, "1")]
+
+
 def spectrum_rows(side: Hemisphere) -> list[Row]:
     """Return the rows of a hemisphere's spectrum.
 
@@ -264,8 +277,9 @@ def measure_brain(
         thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
         sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
-    rows = [("whole", *row) for row in size_rows(whole, crossing_faces(whole)) + _rows_of(sides)]
-    rows += [("whole", metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
+    of_whole = size_rows(whole, crossing_faces(whole)) + _rows_of(sides)
+    of_whole += [(metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
+    rows = [("whole", *row) for row in of_whole + area_ratio_rows(of_whole)]
     for side in sides:
         of_side = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
         rows += [(side.name, *row) for row in of_side]

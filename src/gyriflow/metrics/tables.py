@@ -14,7 +14,7 @@ BRAIN = ["subject", "run", "week"]
 
 OF_THE_ANALYSIS = (
     *("crossing_faces", "curvature_radius", "curvature_wavelength", "spangy_modes", "spangy_captured_share"),
-    *("weyl_number", "thickness_measured_share"),
+    *("weyl_number", "thickness_measured_share", "area_ratio"),
 )
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
 

@@ -203,6 +203,8 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
         facts["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
     if thickness is not None:
         facts["thickness"] = f"{thickness:.2f} mm (measured on {100 * row['thickness_measured_share']:.0f} %)"
+    if row["area_ratio"] is not None:
+        facts["area / (cortex volume / thickness)"] = f"{row['area_ratio']:.2f}"
     return facts
 
 
@@ -237,6 +239,7 @@ def quality_row(
         "mean_thickness_mm": thickness.get("mean_mm"),
         "thickness_measured_share": thickness.get("measured_area_share"),
         "voxels_through_cortex": thickness.get("voxels_through_cortex"),
+        "area_ratio": thickness.get("area_ratio"),
         "pose_by": pose.by,
         "rotation_deg": angle_deg(pose.of_file()[:3, :3]),
         "asymmetry_mm": report.get("asymmetry_mm"),

@@ -117,6 +117,19 @@ def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog
     assert (message in caplog.text) == told
 
 
+@pytest.mark.parametrize(("shut_mm", "ratio"), [(0.0, 1.11), (26.0, 0.86), (40.0, 0.78)])
+def test_area_that_shut_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, shut_mm, ratio):
+    """A shut sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as `shut_mm`."""
+    pial, depth, inside, affine = ball
+    x, _, z = (affine[0, 3] + 0.8 * index for index in np.indices(inside.shape))
+    banks = inside & (np.abs(x) < 2.0) & (z > 20.0 - shut_mm)
+    labels = np.where(inside, np.where((depth < 2.0) | banks, 5, 1), 0)
+    scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
+    found = thickness_from_labels(labels, affine, scheme, pial, Pose())
+    assert found.report["area_ratio"] == pytest.approx(ratio, abs=0.04)
+    assert ("hidden in shut sulci" in caplog.text) == (ratio < 0.95)
+
+
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     pial, depth, inside, affine = ball
     # the voxels go on beyond the surface, as where a fissure was opened

@@ -7,7 +7,7 @@ from shapes import ellipsoid, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh
-from gyriflow.metrics.measure import BrainMetrics, measure_brain
+from gyriflow.metrics.measure import BrainMetrics, area_ratio_rows, measure_brain
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -71,6 +71,12 @@ def test_volumes_of_tissues_are_of_the_whole_where_labels_know_them(apart: Brain
     assert found["hemisphere"].tolist() == ["whole", "whole"]
     assert dict(zip(found["metric"], found["value"], strict=True)) == {"volume_tissue": 90.0, "volume_cortex": 20.0}
     assert not cut.table["metric"].str.startswith("volume_").any()
+
+
+def test_the_pial_area_is_compared_with_that_of_a_sheet_of_the_cortex() -> None:
+    rows = [("area", 300.0, "cm2"), ("volume_cortex", 80.0, "mL"), ("mean_thickness", 2.0, "mm")]
+    assert area_ratio_rows(rows) == [("area_ratio", pytest.approx(0.75), "1")]
+    assert area_ratio_rows(rows[:2]) == []
 
 
 def test_neither_the_fissure_nor_a_cut_is_a_sulcus(apart: BrainMetrics, cut: BrainMetrics) -> None:

@@ -56,7 +56,8 @@ def test_the_page_shows_planes_views_and_warnings():
 
 
 def test_verdicts_and_refused_brains_stand_in_one_table():
-    fine = quality_row(LABELS, REPORT, {"mean_mm": 1.5, "measured_area_share": 0.9}, [], 80.0)
+    known = {"mean_mm": 1.5, "measured_area_share": 0.9, "area_ratio": 0.93}
+    fine = quality_row(LABELS, REPORT, known, [], 80.0)
     look = quality_row(LABELS | {"subject": "b", "sides": "left"}, REPORT, {}, ["one", "two"], 80.0)
     refused = [{"subject": "c", "week": None, "cause": "no such file"}]
     table = quality_table([fine, look], refused, ["c", "b", "a", "d"])
@@ -64,6 +65,7 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     assert table["verdict"].tolist() == ["refused", "look", "fine"]
     assert table["cause"].tolist() == ["no such file", "", ""]
     assert table["warnings"].tolist()[1] == "one | two"
+    assert table["area_ratio"].tolist()[2] == 0.93
     # of one hemisphere half a brain is expected
     assert table["share_of_expected_volume"].tolist()[1:] == [1.0, 0.5]
 
