@@ -62,19 +62,23 @@ def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_
     return smooth.reshape(values.shape)
 
 
-def continue_harmonically(
-    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], values: Floats, tolerance: float = 1e-8
-) -> Floats:
-    """Return (n, k) values that are harmonic along a mesh and as given, (m, k), at the `known` vertices.
+def harmonic_continuation(
+    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], tolerance: float = 1e-8
+) -> Callable[[Floats], Floats]:
+    """Return the function that continues values (m, k) at the `known` vertices to (n, k) harmonically along a mesh.
 
     The boundary is free elsewhere; `tolerance` is that of `conjugate_gradients`.
     """
     unknown = np.setdiff1d(np.unique(cells), known)
-    continued = np.zeros((len(vertices), values.shape[1]))
-    continued[known] = values
     rows = stiffness_matrix(vertices, cells)[unknown]
-    matrix, right = rows[:, unknown], -(rows[:, known] @ values)
-    continued[unknown] = conjugate_gradients(matrix, right, np.zeros_like(right), tolerance)
+    matrix, to_known = rows[:, unknown], rows[:, known]
+
+    def continued(values: Floats) -> Floats:
+        everywhere = np.zeros((len(vertices), values.shape[1]))
+        everywhere[known], right = values, -(to_known @ values)
+        everywhere[unknown] = conjugate_gradients(matrix, right, np.zeros_like(right), tolerance)
+        return everywhere
+
     return continued
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, transform_points
-from ..geometry.diffusion import cell_sizes, continue_harmonically, diffuse, vertex_sizes
+from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, vertex_sizes
 from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
@@ -72,11 +72,11 @@ def carry_sharply(
     InputError where points leave the grid of a registration, or the boundary lies beside matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
-    pieces = linear_pieces(mesh)
+    continued = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
     positions = [mesh.vertices]
 
     def go(places: Floats, moved: Floats) -> None:
-        positions.append(places + continue_harmonically(mesh.vertices, pieces, used, moved - places[used]))
+        positions.append(places + continued(moved - places[used]))
 
     for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
         numbered, before = list(group), positions[-1]

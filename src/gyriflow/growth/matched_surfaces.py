@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, rigid_fit
 from ..geometry.deformations import MatchedSurfaces
-from ..geometry.diffusion import continue_harmonically
+from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, vertex_areas, vertex_normals
@@ -98,7 +98,7 @@ def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Fl
     boundary, used = boundary_surface(mesh)
     along = follow_surfaces(boundary, chain)
     moves = (along - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
-    inside = continue_harmonically(mesh.vertices, linear_pieces(mesh), used, moves)
+    inside = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(moves)
     return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(along), 3).transpose(1, 0, 2))
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from ..geometry.diffusion import continue_harmonically
+from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
 from ..parameters.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
@@ -107,7 +107,7 @@ def measure_hemisphere(
     weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
     away, shape_index = np.flatnonzero(bend.reliable), bend.shape_index[:, None]
-    proxy = continue_harmonically(mesh.vertices, mesh.faces, away, shape_index[away], tolerance=1e-12)[:, 0]
+    proxy = harmonic_continuation(mesh.vertices, mesh.faces, away, tolerance=1e-12)(shape_index[away])[:, 0]
     return Hemisphere(
         **vars(folds),
         name=name,

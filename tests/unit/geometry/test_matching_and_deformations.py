@@ -10,7 +10,7 @@ from gyriflow.geometry.deformations import (
     determinants,
     transform_points,
 )
-from gyriflow.geometry.diffusion import continue_harmonically, diffuse, vertex_sizes
+from gyriflow.geometry.diffusion import diffuse, harmonic_continuation, vertex_sizes
 from gyriflow.geometry.matching import labels_at, layer_labels, match_points, values_at
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
@@ -115,7 +115,7 @@ def test_a_harmonic_continuation_of_a_gradient_is_the_gradient():
     for vertices, cells in ((bar.vertices, bar.tets), (surface.vertices, surface.faces)):
         known = np.flatnonzero(np.abs(vertices[:, 0]) > 7.9)
         given = np.stack([3 * vertices[:, 0], np.ones(len(vertices))], axis=1)
-        found = continue_harmonically(vertices, cells, known, given[known], tolerance=1e-12)
+        found = harmonic_continuation(vertices, cells, known, tolerance=1e-12)(given[known])
         np.testing.assert_allclose(found, given, atol=1e-9)
         np.testing.assert_array_equal(found[known], given[known])
 
