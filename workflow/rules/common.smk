@@ -6,7 +6,7 @@ from gyriflow.errors import GyriflowError
 from gyriflow.parameters.measures import SHAPE_MEASURES
 from gyriflow.parameters.terms import SIDES
 from gyriflow.study import resolve
-from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of
+from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of, measured_name
 from gyriflow.study.paths import *
 from gyriflow.cli.launch import GOES_ON, LOOKS, MEASURES_ONLY, hold_lock, refused_brains
 from gyriflow.cli.provenance import input_contents, require_own_results

@@ -1,4 +1,5 @@
-# What the jobs took and warned of, and the report: one HTML page with the figures and tables of the registry.
+# What the jobs took and warned of, and the report: an HTML page with the figures and tables of the registry, and one of
+# each brain.
 from itertools import takewhile
 
 PAGE = f"{workflow.basedir}/workflow/report/page"
@@ -31,6 +32,7 @@ rule study_resources:
 rule provenance:
     input:
         rules.figures.input,
+        asked_for(FIGURES, "brain", "small"),
         rules.metrics.input,
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
@@ -55,22 +57,33 @@ rule provenance:
         "../scripts/provenance.py"
 
 
+OF_PAGES = dict(
+    quality=rules.quality_table.output[0],
+    metrics=f"{STUDY}/metrics.csv",
+    centiles=rules.derived_tables.output.centiles,
+    warnings=rules.study_resources.output.warnings,
+    words=f"{workflow.basedir}/workflow/report/figures.yaml",
+    provenance=rules.provenance.output.report,
+    methods=rules.provenance.output.methods,
+    page=f"{PAGE}/page.html",
+    style=f"{PAGE}/style.css",
+)
+OF_BRAINS = ("quality", "brain")
+PAGE_OF_BRAIN = "results/report/brains/{brain}.html"
+
+
 rule html_report:
     input:
         rules.figures.input,
         rules.metrics.input,
         rules.influence_figures.input,
-        asked_for(FIGURES, "report", "quality"),
+        asked_for(FIGURES, "report"),
+        expand(PAGE_OF_BRAIN, brain=study.brains),
+        **OF_PAGES,
+        small=[figure.path for figure in FIGURES if figure.target == "small"],
         runs=rules.study_runs.output.csv if study.folded else [],
-        quality=rules.quality_table.output[0],
-        warnings=rules.study_resources.output.warnings,
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         view=asked_for(FIGURES, "view")[0],
-        words=f"{workflow.basedir}/workflow/report/figures.yaml",
-        provenance=rules.provenance.output.report,
-        methods=rules.provenance.output.methods,
-        page=f"{PAGE}/page.html",
-        style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
         notice=f"{PAGE}/three.LICENSE.txt",
         controls=f"{PAGE}/OrbitControls.js",
@@ -78,8 +91,39 @@ rule html_report:
     output:
         "results/report/report.html",
     params:
-        figures=[(figure.name, figure.path, dict(figure.names)) for figure in FIGURES if figure.target],
+        figures=[
+            (figure.name, figure.path, dict(figure.names))
+            for figure in FIGURES
+            if figure.target not in ("", "small", *OF_BRAINS)
+        ],
         brains=study.described_brains,
+        pictured=list(study.brains),
+        norm=measured_name(study.brains[brain] for brain in study.norm_reference),
+        config=study.used_settings,
+    script:
+        "../scripts/html_report.py"
+
+
+# the report of one brain
+rule brain_page:
+    input:
+        lambda w: [
+            figure.path
+            for figure in FIGURES
+            if figure.target in OF_BRAINS and figure.names["brain"] == w.brain
+        ],
+        **OF_PAGES,
+    output:
+        PAGE_OF_BRAIN,
+    params:
+        figures=lambda w: [
+            (figure.name, figure.path, dict(figure.names))
+            for figure in FIGURES
+            if figure.target in OF_BRAINS and figure.names["brain"] == w.brain
+        ],
+        brains=lambda w: [brain for brain in study.described_brains if brain["id"] == w.brain],
+        pictured=None,
+        norm=rules.html_report.params.norm,
         config=study.used_settings,
     script:
         "../scripts/html_report.py"
@@ -96,3 +140,4 @@ localrules:
     atlas_file,
     parameters,
     html_report,
+    brain_page,

@@ -31,6 +31,7 @@ rule derived_tables:
         scans=study.scans,
         covariates={brain.id: brain.given.covariates for brain in study.brains.values()},
         reference=study.norm_reference,
+        individuals=study.individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
     script:
         "../scripts/derived_tables.py"

@@ -76,6 +76,8 @@ rule deviation_scores:
         f"{STUDY}/deviation.csv",
     output:
         f"{STUDY}/deviation_centiles.csv",
+    params:
+        individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
     script:
         "../scripts/deviation_scores.py"
 

@@ -21,8 +21,8 @@ with step(snakemake.log[0]):
         "change": change_between_scans(long, params.scans),
         "asymmetry": pd.concat(parts, ignore_index=True),
         "norms": measured_norms(people, params.reference),
-        "norm_curves": norm_curves(people, params.reference),
-        "centiles": measured_scores(people, params.reference),
+        "norm_curves": norm_curves(people, params.reference, individuals=params.individuals),
+        "centiles": measured_scores(people, params.reference, individuals=params.individuals),
         "spectral_distance": spectral_distances(read_table(files.spectra)),
     }
     for name, table in tables.items():

@@ -14,6 +14,7 @@ with step(snakemake.log[0]):
     for _, table in read_table(snakemake.input[0]).dropna(subset=["value"]).groupby("run", sort=False):
         # deviations are metrics of real brains; other scans of a subject tell nothing of what is usual
         parts = table["hemisphere"] + " " + table["region"].fillna("")
-        scores = measured_scores(table.assign(run=MEASURED, hemisphere=parts), list(table["subject"]))
+        rows, subjects = table.assign(run=MEASURED, hemisphere=parts), list(table["subject"])
+        scores = measured_scores(rows, subjects, individuals=snakemake.params.individuals)
         tables.append(table.reset_index(drop=True).join(scores[SCORES]))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

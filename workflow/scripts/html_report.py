@@ -1,4 +1,4 @@
-"""The report, one HTML page that needs nothing else."""
+"""The report of a study or of one brain, an HTML page that needs nothing else."""
 
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_text
@@ -15,15 +15,18 @@ with step(snakemake.log[0]):
     pictures = [path for _, path, _ in figures if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
     contents |= {path: read_body(path) for _, path, _ in figures if path not in contents}
+    small = None if params.pictured is None else picture_addresses(files.small, PICTURE_BYTES)
     content = page_content(
         brains=params.brains,
+        pictures=None if small is None else dict(zip(params.pictured, small, strict=True)),
+        norm=params.norm,
         provenance=read_json(files.provenance),
         methods=read_text(files.methods),
         configuration=yaml_text(hide_paths(params.config)),
         shown=shown_figures(words, figures, contents),
-        validation=read_table(files.validation) if files.validation else None,
-        **{name: read_table(files[name]) for name in ("quality", "warnings")},
-        runs=read_table(files.runs) if files.runs else None,
+        **{name: read_table(files[name]) for name in ("quality", "warnings", "metrics", "centiles")},
+        **{name: read_table(path) if (path := files.get(name)) else None for name in ("runs", "validation")},
     )
     parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
-    write_text(snakemake.output[0], report_page(read_text(files.page), parts, read_json(files.view), **content))
+    view = read_json(path) if (path := files.get("view")) else {"groups": []}
+    write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **content))

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from ..io.yaml_files import SCHEMES
 from ..parameters.folding import VARYING, value_problems
 from ..parameters.settings import Key, Problem, messages, nearest
-from ..parameters.terms import AMPLITUDE, MEASURED, STIFFNESS_RATIO
+from ..parameters.terms import AMPLITUDE, MEASURED, MOST_COLOURED, STIFFNESS_RATIO
 from ..parameters.varying import Varying
 from .root import Config
 from .runs import (
@@ -149,7 +149,15 @@ def growth(config: Config) -> Iterator[Problem]:
 def metrics(config: Config) -> Iterator[Problem]:
     """Yield brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
     given = config.metrics
-    yield from _unknown(given.norm_reference or (), config, ("metrics", "norm_reference"))
+    atlases = {used.atlas.name for used in config.atlases}
+    norm = [name for name in given.norm_reference or () if name not in atlases]
+    yield from _unknown(norm, config, ("metrics", "norm_reference"))
+    values = {brain.covariates.get(given.colour_by or "") for brain in config.brains} - {None}
+    if given.colour_by and not 1 < len(values) <= MOST_COLOURED:
+        yield Problem(
+            f"found {len(values)} values of {given.colour_by!r}; colours tell 2 to {MOST_COLOURED} apart",
+            ("metrics", "colour_by"),
+        )
     with_regions = given.regions if isinstance(given.regions, dict) else {}
     yield from _unknown(with_regions, config, ("metrics", "regions"))
     yield from _unknown([given.template] if given.template else (), config, ("metrics", "template"))

@@ -65,9 +65,12 @@ class MetricsSettings(Settings):
     """Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`, each with four times as
     many modes as the one before."""
     norm_reference: tuple[str, ...] | None = None
-    """Ids of the measured brains that others are compared with in tables of centiles. `null`: all real ones (of
+    """Ids of the measured brains that others are compared with, or names of atlases. `null`: all real ones (of
     several populations, the start brain's). Brains with other hemispheres than
-    the first start brain are left out."""
+    the first start brain are left out. Averages such as an atlas' give no centiles."""
+    colour_by: str | None = None
+    """Covariate whose values have colours in charts of measured brains. `null`: the first that has 2 to 6 values, and
+    fewer than there are subjects."""
     regions: Regions = Field({})
     """Regions of the cortex, by the id of the brain on which they are given, or `named_sulci`, drawn on a brain of
     the spina bifida atlas. Registration carries them to other brains, and the tissue to simulated ones."""

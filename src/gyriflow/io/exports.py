@@ -42,6 +42,7 @@ IGNORED = """\
 # tables of the whole study, its report, and what is to be kept of the work
 /metrics_*
 /report.html
+/brains
 /methods.rst
 figures
 /work
@@ -239,7 +240,8 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
     pages = {
         f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
     }
-    of_all = {name: f"report/{name}" for name in ("report.html", "methods.rst")} if whole else {}
+    names = ("report.html", "methods.rst", *(f"brains/{brain}.html" for brain in brains))
+    of_all = {name: f"report/{name}" for name in names} if whole else {}
     for target, page in (pages | of_all).items():
         if (exported.parent / page).is_file():
             _copy(exported.parent / page, folder / target)

@@ -11,7 +11,7 @@ from scipy import stats
 from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..parameters.schemes import LabelScheme
-from ..parameters.terms import MEASURED, SIDES, Side
+from ..parameters.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
 from .tables import BRAIN, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
@@ -140,19 +140,19 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
     return pd.DataFrame(rows, columns=columns)
 
 
-def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
     """Return where brains stand among the measured brains of a reference, at their own week.
 
     A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
     squares, in which the scans of a subject count as one together. The centile is that of a further brain's value under
     Student's distribution, which is the wider the fewer subjects there are: t = (x − expected)/(s √(1 + h)), with s the
     scatter round the curve and h the leverage of the week. All brains of the table are scored; one of the reference is
-    compared with those of other subjects.
+    compared with those of other subjects. Where the reference's brains are no `individuals`, but averages as those of
+    an atlas, their scatter is not that of individuals: there are values to be expected, and no sd, z and centile.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
-    (0 to 100), brains (subjects of the reference), brains_of_week, flag: "ok"; "one brain a week": z and centile are of
-    the scatter of such brains (templates) round the curve, which is less than that of subjects; "outside the
-    reference's weeks", "too few brains" or "other hemispheres" (than the reference has), then without z and centile.
+    (0 to 100), brains (subjects of the reference), brains_of_week, flag: "ok"; `SPREAD_UNKNOWN`; "outside the
+    reference's weeks", "too few brains" or "other hemispheres" (than the reference has), then without all of these.
     """
     by_metric = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
@@ -164,7 +164,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataF
             continue
         # a measured brain is compared with the others, of whom none is an earlier scan of itself
         others = others[alike & ((row["run"] != MEASURED) | (others["person"] != person))]
-        *score, flag = _score(row["week"], row["value"], others)
+        *score, flag = _score(row["week"], row["value"], others, individuals)
         rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
     columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
     return pd.DataFrame(rows, columns=columns)
@@ -216,11 +216,11 @@ def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
     return _Curve(here @ factors, leverage, sd, freedom)
 
 
-def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
+def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
     """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
-    Student's distribution.
+    Student's distribution; NaN where the reference's brains are no `individuals`.
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]
@@ -228,14 +228,17 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame
         weeks = brains["week"].to_numpy(dtype=float)
         at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
         if (curve := _curve(brains, at)) is not None:
-            half = float(stats.t.ppf(0.95, curve.freedom)) * curve.sd * np.sqrt(1 + curve.leverage)
+            sd = curve.sd if individuals else np.nan
+            half = float(stats.t.ppf(0.95, curve.freedom)) * sd * np.sqrt(1 + curve.leverage)
             band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}
             names = {"hemisphere": hemisphere, "metric": metric, "unit": brains["unit"].iloc[0]}
             parts.append(pd.DataFrame(band).assign(**names)[columns])
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def _score(week: float, value: float, brains: pd.DataFrame) -> tuple[float, float, float, float, int, int, str]:
+def _score(
+    week: float, value: float, brains: pd.DataFrame, individuals: bool
+) -> tuple[float, float, float, float, int, int, str]:
     weeks = brains["week"].to_numpy(dtype=float)
     counts = brains["person"].nunique(), brains.loc[np.abs(weeks - week) <= WINDOW_GW, "person"].nunique()
     curve = _curve(brains, np.array([week])) if len(brains) else None
@@ -243,9 +246,10 @@ def _score(week: float, value: float, brains: pd.DataFrame) -> tuple[float, floa
         why = "too few brains" if curve is None else "outside the reference's weeks"
         return np.nan, np.nan, np.nan, np.nan, *counts, why
     expected = float(curve.expected[0])
+    if not individuals:
+        return expected, np.nan, np.nan, np.nan, *counts, SPREAD_UNKNOWN
     if curve.sd == 0:
         return expected, curve.sd, np.nan, np.nan, *counts, "too few brains"
     z = (value - expected) / curve.sd
     centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + curve.leverage[0]), curve.freedom))
-    single = (np.abs(weeks[:, None] - weeks) <= WINDOW_GW).sum() == len(weeks)
-    return expected, curve.sd, z, centile, *counts, "one brain a week" if single else "ok"
+    return expected, curve.sd, z, centile, *counts, "ok"

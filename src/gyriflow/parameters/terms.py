@@ -60,6 +60,11 @@ LONGEST_NAME = 100
 MEASURED = "real"
 """The run of measured brains in tables."""
 
+MOST_COLOURED = 6
+"""Values of a covariate that charts tell apart by colours."""
+SPREAD_UNKNOWN = "spread of individuals unknown"
+"""The flag of a brain that is compared with averages, such as an atlas: they have a curve, and no centiles."""
+
 CORTICAL_STEEPNESS = 10.0
 """Of the cortical weight w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core."""
 

@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES
+from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES, SPREAD_UNKNOWN
 from .labels import METRICS, value_labels, with_unit
 from .pictures import region_colours
 from .style import (
@@ -86,17 +86,28 @@ def _stars(
     *,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     markers: Mapping[str, str] = NO_SUBJECTS,
+    shades: Mapping[str, Any] = NO_SUBJECTS,
     column: str = "value",
     **look: Any,
 ) -> None:
-    """Draw measured brains; the scans of a subject are joined by a line and have its marker."""
+    """Draw measured brains, some in a shade of their own; the scans of a subject are joined and have its marker."""
     for person, scans in rows.groupby(rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False):
         ordered, marker = scans.sort_values("week"), markers.get(str(person), "*")
         if person and len(scans) > 1:
             axes.plot(ordered["week"], ordered[column], "-", color=MUTED_COLOUR, linewidth=0.8, zorder=2.5)
         size = 7 if marker == "*" else 4.5
-        shown = {"color": colour, "markersize": size, "zorder": 3} | look
-        axes.plot(ordered["week"], ordered[column], marker, **shown)
+        own = ordered["subject"].map(lambda brain: shades.get(brain, colour))
+        for shade, part in ordered.groupby(own, sort=False):
+            shown = {"color": shade, "markersize": size, "zorder": 3} | look
+            axes.plot(part["week"], part[column], marker, **shown)
+
+
+def _shades(groups: Mapping[str, str], colours: Mapping[str, Any]) -> tuple[dict[str, Any], list[Artist]]:
+    """Return the colour of each brain of a group, one that no run has, and the entries of the legend."""
+    free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
+    of_groups = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    entries: list[Artist] = [star(name, colour, marker="o", markersize=5) for name, colour in of_groups.items()]
+    return {brain: of_groups[name] for brain, name in groups.items() if name in of_groups}, entries
 
 
 @styled
@@ -106,30 +117,33 @@ def metrics_chart(
     runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
     """Draw a panel per metric of whole brains over weeks: runs as lines, measured brains as black stars.
 
-    The scans of a subject are joined, with a marker for each as far as a legend holds. Metrics that the table lacks are
-    left out.
+    The scans of a subject are joined, with a marker for each as far as a legend holds, and groups of brains have
+    colours. Metrics that the table lacks are left out.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
         `run` is "real" for measured brains; InputError if the table has none of the metrics.
     subjects : {brain: whose scan it is}, where that is known
+    groups : {brain: what it is in a covariate}
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     present, colours = _present(whole, OVERVIEW), run_colours(whole["run"], runs)
-    markers = _markers(whole, subjects)
+    markers, (shades, entries) = _markers(whole, subjects), _shades(groups, colours)
     figure, panels = panel_figure(len(present))
     for axes, name in zip(panels, present, strict=True):
         rows = whole[whole["metric"] == name]
         _lines(axes, rows, colours)
-        _stars(axes, rows[rows["run"] == MEASURED], subjects=subjects, markers=markers)
+        _stars(axes, rows[rows["run"] == MEASURED], subjects=subjects, markers=markers, shades=shades)
         _title(axes, rows)
         week_axis(axes, whole["week"])
-    stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(subjects if markers else ()), "run"]
-    run_legend(figure, colours, measured=measured if len(stars) else "", markers=markers)
+    told = [*(subjects if markers else ()), *shades]
+    stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(told), "run"]
+    run_legend(figure, colours, measured=measured if len(stars) else "", markers=markers, extra=entries)
     return figure
 
 
@@ -143,11 +157,13 @@ def norms_chart(
     runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
     """Draw a panel per metric of whole brains: reference brains, the curve through them, and the others.
 
-    The band holds 90 % of further brains by Student's distribution; quantiles are drawn as bars where a week has five
-    brains or more. Stars are measured brains, of the reference black, others coloured; lines are runs.
+    The band holds 90 % of further brains by Student's distribution, where their spread is known; quantiles are drawn as
+    bars where a week has five brains or more. Stars are measured brains, of the reference black, others coloured, as
+    are groups; lines are runs.
 
     Parameters
     ----------
@@ -156,13 +172,13 @@ def norms_chart(
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
         Brains that the curves go through.
-    subjects : as for `metrics_chart`
+    subjects, groups : as for `metrics_chart`
 
     InputError where none of the metrics is there.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     present, colours = _present(whole, WITH_NORMS), run_colours(whole["run"], runs)
-    markers = _markers(whole, subjects)
+    markers, (shades, extra) = _markers(whole, subjects), _shades(groups, colours)
     figure, panels = panel_figure(len(present), panel_in=2.0, foot_in=0.6)
     others = False
     for axes, name in zip(panels, present, strict=True):
@@ -177,14 +193,16 @@ def norms_chart(
         _lines(axes, rows, colours)
         real = rows[rows["run"] == MEASURED]
         within = real["subject"].isin(reference)
-        _stars(axes, real[within], subjects=subjects, markers=markers)
-        _stars(axes, real[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers)
-        others |= bool((~within).any())
+        _stars(axes, real[within], subjects=subjects, markers=markers, shades=shades)
+        _stars(axes, real[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades)
+        others |= bool((~within & ~real["subject"].isin(shades)).any())
         _title(axes, rows)
         week_axis(axes, rows["week"])
-    extra: list[Artist] = [star("other measured brains", RUN_COLOURS[-1])] if others else []
-    if len(curves):
+    extra += [star("other measured brains", RUN_COLOURS[-1])] if others else []
+    if curves["low"].notna().any():
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
+    elif len(curves):
+        extra.append(Line2D([], [], color=MUTED_COLOUR, label=f"curve of the norm; {SPREAD_UNKNOWN}"))
     run_legend(figure, colours, measured=measured, markers=markers, extra=extra)
     return figure
 
@@ -246,9 +264,9 @@ def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: f
 
 
 def _spectra_legend(
-    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], measured: str, *, bars: bool
+    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], measured: str, groups: list[Artist], *, bars: bool
 ) -> None:
-    """Draw the legend of a chart of bands, with what is drawn of bands that are cut off or not resolved."""
+    """Draw the legend of a chart of bands, with groups and what is drawn of bands that are cut off or not resolved."""
     untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
     label = "cut off or not resolved, or a share of such"
     extra: list[Artist] = []
@@ -260,7 +278,7 @@ def _spectra_legend(
         words = "the same, of the real brain" if extra else label
         extra.append(star(words, markersize=8, markerfacecolor="white"))
     name = measured if (rows["run"] == MEASURED).any() else ""
-    run_legend(figure, colours, measured=name, bars=bars, extra=extra)
+    run_legend(figure, colours, measured=name, bars=bars, extra=[*groups, *extra])
 
 
 def _sides_of(rows: pd.DataFrame) -> list[str]:
@@ -324,7 +342,7 @@ def influence_spectra(
         axes.set_title(f"{hemisphere} hemisphere")
     panels[0].set_ylabel("relative power")
     from_zero(panels[0])
-    _spectra_legend(figure, rows, colours, measured, bars=True)
+    _spectra_legend(figure, rows, colours, measured, [], bars=True)
     return figure
 
 
@@ -335,11 +353,12 @@ def spectra_weeks_chart(
     runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
     """Draw the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
 
-    Runs are lines, measured brains black stars, those of a subject joined; bands that are cut off, are shares of such,
-    or are not resolved have open markers.
+    Runs are lines, measured brains black stars, those of a subject joined and of groups coloured; bands that are cut
+    off, are shares of such, or are not resolved have open markers.
 
     Parameters
     ----------
@@ -350,20 +369,23 @@ def spectra_weeks_chart(
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
     rows = _of_bands(runs_by_name(spectra), bands)
     sides, colours = _sides_of(rows), run_colours(rows["run"], runs)
+    shades, entries = _shades(groups, colours)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
     figure, panels = panel_figure(len(sides) * len(bands), **layout)
     for axes, (hemisphere, band) in zip(panels, product(sides, bands), strict=True):
         here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
         for run in [*colours, MEASURED]:
             series = here[here["run"] == run].sort_values("week")
-            colour, marker, size = (REAL_COLOUR, "*", 7) if run == MEASURED else (colours[run], "o", 3)
-            if run != MEASURED:
-                axes.plot(series["week"], series["relative_power"], color=colour)
+            if run == MEASURED:
+                _stars(axes, series, subjects=subjects, column="relative_power", markersize=0)
             else:
-                _stars(axes, series, colour, subjects=subjects, column="relative_power", markersize=0)
+                axes.plot(series["week"], series["relative_power"], color=colours[run])
             for trusted, part in series.groupby("trusted"):
-                look: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": size}
-                axes.plot(part["week"], part["relative_power"], marker, color=colour, **look)
+                look: dict[str, Any] = {} if trusted else {"markerfacecolor": "white"}
+                if run == MEASURED:
+                    _stars(axes, part, shades=shades, column="relative_power", **look)
+                else:
+                    axes.plot(part["week"], part["relative_power"], "o", color=colours[run], markersize=3, **look)
         week_axis(axes, rows["week"])
         if not here["relative_power"].notna().any():
             _beyond_the_modes(axes, 0.5, axes.transAxes)
@@ -376,5 +398,5 @@ def spectra_weeks_chart(
             axes.set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[: len(bands)]:
         from_zero(axes)
-    _spectra_legend(figure, rows, colours, measured, bars=False)
+    _spectra_legend(figure, rows, colours, measured, entries, bars=False)
     return figure

@@ -13,9 +13,9 @@ from docutils.core import publish_parts
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from ..parameters.terms import ELEMENTS_NEEDED, run_names
-from .labels import plain, week_label
-from .tables import html_table
+from ..parameters.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
+from .labels import METRICS, plain, week_label, with_unit
+from .tables import brain_table, html_table, standing
 
 FILE = "(file)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
@@ -25,6 +25,15 @@ DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
 FIRST = "weekly_figure"
 """The rule whose first figure stands on the first page."""
+OF_BRAINS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
+"""The metrics in the row of a brain."""
+NORM_WORDS = {
+    "ok": "Below a number: its centile (z) at this age among the other subjects of the norm, {norm}.",
+    SPREAD_UNKNOWN: "Below a number: its difference from the curve of the norm, {norm}, whose brains are averages, one "
+    "a week. How far individuals spread around such a curve is unknown: no centile can be given.",
+    "too few brains": "There are too few subjects for centiles: a curve over the weeks takes six others.",
+}
+"""What is said of numbers by how brains stand among the norm."""
 DEEP_MM = 0.5
 """Walls of the fissure that begin so far beyond their planes are told of."""
 
@@ -81,6 +90,10 @@ def page_content(
     *,
     brains: Sequence[Mapping[str, Any]],
     quality: pd.DataFrame,
+    metrics: pd.DataFrame,
+    centiles: pd.DataFrame,
+    pictures: Mapping[str, tuple[str, float]] | None,
+    norm: str,
     runs: pd.DataFrame | None,
     validation: pd.DataFrame | None,
     warnings: pd.DataFrame,
@@ -93,7 +106,8 @@ def page_content(
 
     Parameters
     ----------
-    brains, quality : as for `brains_table`
+    brains, quality, metrics, centiles, pictures : as for `brains_table`; without pictures the page is of one brain
+    norm : what the brains of the norm are called
     runs, validation : as for `scores_table`; no runs where brains were measured only
     warnings : columns subject, run, step, level, message
     provenance : what `software` returns, and files (brain, what, sha256)
@@ -103,22 +117,30 @@ def page_content(
     """
     software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
     warnings, quality = (table.replace(_FOLDERS, "", regex=True) for table in (warnings, quality))
+    ids = [brain["id"] for brain in brains]
+    if pictures is None:
+        warnings = warnings[warnings["subject"].isin(ids)]
+    own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
+    files = [file for file in provenance["files"] if file["brain"] in ids]
     versions = [(name, version) for name, version in software.items() if version]
     return {
-        "title": "Cortical folding, measured"
+        "title": f"Cortical folding, {'measured' if pictures is not None else ids[0]}"
         if runs is None
         else f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
         "verdict": "" if runs is None else verdict(runs, validation, warnings),
         "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
-        "brains": html_table(brains_table(brains, quality)),
+        "brains": html_table(brains_table(brains, quality, metrics, centiles, pictures or {})),
+        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if (own["flag"] == flag).any()],
+        "alone": pictures is None,
+        "numbers": html_table(brain_table(metrics[metrics["subject"] == ids[0]], centiles)) if pictures is None else "",
         "runs": "" if runs is None else html_table(scores_table(runs, validation)),
         "warnings": "" if warnings.empty else html_table(grouped(warnings)),
         "weeks": next((item for item in shown if item["first"]), None),
         "sections": sections([item for item in shown if not item["first"]]),
         "made": made(provenance),
         "methods": caption_html(methods),
-        "files": html_table(pd.DataFrame(provenance["files"]).rename(columns={"sha256": "SHA-256"})),
+        "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
         "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
         "configuration": configuration,
     }
@@ -160,32 +182,55 @@ def caption_html(caption: str) -> Markup:
     return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
 
 
-def brains_table(brains: Sequence[Mapping[str, Any]], quality: pd.DataFrame) -> pd.DataFrame:
-    """Return a row for each brain: source, population, licence, age, size, verdict and warnings.
+def brains_table(
+    brains: Sequence[Mapping[str, Any]],
+    quality: pd.DataFrame,
+    metrics: pd.DataFrame,
+    centiles: pd.DataFrame,
+    pictures: Mapping[str, tuple[str, float]],
+) -> pd.DataFrame:
+    """Return a row for each brain: its pictures, what it is with a link to its page, numbers, verdict and warnings.
 
     Parameters
     ----------
-    brains : id, week, population, source, licence, and whether it is synthetic, as the configuration has them
-    quality : columns subject, verdict, cause, warnings, volume_ml, area_cm2
+    brains : id, week, population, source, licence, covariates and whether it is synthetic, as configured
+    quality : columns subject, verdict, cause, warnings
         The table of quality control.
+    metrics, centiles : the study's; below a number stands what `standing` returns
+    pictures : data address and width in inches of the pictures of each brain that has a page, by its id
     """
     judged = quality.set_index("subject")
     causes = judged["cause"].fillna("").where(judged["cause"].fillna("") != "", judged["warnings"].fillna(""))
-    rows = [
-        {
-            "brain": brain["id"],
-            "age": week_label(brain["week"]),
-            "source": brain["source"],
-            "population": brain["population"] or ("synthetic" if brain["synthetic"] else "not stated"),
-            "licence": brain["licence"] or ("made here" if brain["synthetic"] else "your own data"),
-            "volume (mL)": judged.loc[brain["id"], "volume_ml"],
-            "pial area (cm²)": judged.loc[brain["id"], "area_cm2"],
-            "verdict": judged.loc[brain["id"], "verdict"],
-            "warnings": causes[brain["id"]] or "none",
-        }
-        for brain in brains
-    ]
+    whole, scored = (
+        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["metric"].isin(OF_BRAINS)]
+        for table in (metrics, centiles)
+    )
+    scored = scored[["subject", "metric"]].assign(stands=standing(scored))
+    whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"stands": ""})
+    cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", str(row.stands)) for row in whole.itertuples()}
+    heads = {name: with_unit(METRICS[name], unit) for name, unit in zip(whole["metric"], whole["unit"], strict=True)}
+    rows = []
+    for brain in brains:
+        key = brain["id"]
+        row: dict[str, Any] = {"": picture(*pictures[key], key)} if key in pictures else {"": ""} if pictures else {}
+        row["brain"] = _described(brain, linked=key in pictures)
+        row |= {head: cells.get((key, name), "–") for name, head in heads.items()}
+        rows.append(row | {"verdict": judged.loc[key, "verdict"], "warnings": causes[key] or "none"})
     return pd.DataFrame(rows)
+
+
+def _described(brain: Mapping[str, Any], *, linked: bool) -> Markup:
+    """Return a brain's name, as a link to its page, above its age, population, source, licence and covariates."""
+    name = Markup('<a href="brains/{0}.html">{0}</a>' if linked else "{}").format(brain["id"])
+    population = brain["population"] or ("synthetic" if brain["synthetic"] else "")
+    licence = brain["licence"] or ("made here" if brain["synthetic"] else "your own data")
+    covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
+    said = filter(None, [week_label(brain["week"]), population, *covariates, brain["source"], licence])
+    return _above(name, "; ".join(said))
+
+
+def _above(text: str, below: str) -> Markup:
+    return Markup('{}<br><span class="pale">{}</span>').format(text, below)
 
 
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
@@ -284,7 +329,7 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
 def grouped(warnings: pd.DataFrame) -> pd.DataFrame:
     """Return warnings that say the same once, with the brains and runs that they are of."""
     # of a brain's step there is no run
-    named = warnings[["subject", "run"]].fillna("").astype(str)
+    named = warnings[["subject", "run"]].astype(object).fillna("").astype(str)
     places = [", ".join(filter(None, place)) for place in named.itertuples(index=False)]
     prefix = warnings["level"].map(lambda level: "" if level == "warning" else f"{level}: ")
     rows = warnings.assign(message=prefix + warnings["message"])

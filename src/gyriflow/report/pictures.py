@@ -23,7 +23,9 @@ from .scene import (
     VIEWS,
     View,
     colour_scale,
+    half_extents,
     paint,
+    render,
     restricted,
     uniform_colours,
 )
@@ -61,6 +63,8 @@ ZONE_COLOURS = {
     "medial wall": "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
+SMALL_DEEP_MM, SMALL_PER_MM, SMALL_PER_INCH = 10.0, 4.0, 400
+"""Of small pictures: the end of the scale of depth, and dots per mm of the brain and per inch of the print."""
 TINTS = (0.0, 0.4, 0.7)
 """How far towards white the colours of further regions are."""
 
@@ -307,6 +311,29 @@ def influence_picture(
         panels = [_map_panel(shown, scale, view) for shown in maps.values()]
         rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
     return panel_grid(list(brains), rows, colour_bar=(scale, MAPS[quantity]))
+
+
+@styled
+def small_pictures(halves: Halves, *, side: str) -> Figure:
+    """Draw a brain small and without words: shape index from a side, and depth from above, 0 to `SMALL_DEEP_MM`.
+
+    All brains have one scale.
+    """
+    mesh, maps = whole_maps(halves, ("shape_index", "sulcal_depth_mm"))
+    depth = colour_scale(SHAPE_MEASURES["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
+    shown = {side: ("shape_index", scale_of("shape_index", np.empty(0))), "top": ("sulcal_depth_mm", depth)}
+    extents = {view: half_extents(mesh, VIEWS[view]) for view in shown}
+    tall = 1.05 * max(height for _, height in extents.values())
+    images = [
+        render(mesh, paint(maps[name], scale), VIEWS[view], (1.05 * extents[view][0], tall), SMALL_PER_MM, light=MAP)
+        for view, (name, scale) in shown.items()
+    ]
+    image = np.hstack(images)
+    figure = Figure(figsize=(image.shape[1] / SMALL_PER_INCH, image.shape[0] / SMALL_PER_INCH))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.imshow(image)
+    axes.set_axis_off()
+    return figure
 
 
 def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:

@@ -9,8 +9,7 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
-from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED
-from .charts import WITH_NORMS
+from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED, SIDES
 from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
 from .style import REAL_BRAIN, run_colours, runs_by_name
 
@@ -97,9 +96,9 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     return pd.DataFrame(columns).rename_axis(f"metric at {week_label(week)}")
 
 
-def _signed(percent: float) -> str:
+def _signed(percent: float, unit: str = "") -> str:
     """Return a difference in per cent with its sign, none where it is rounded to zero."""
-    return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0")
+    return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0") + unit
 
 
 def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame:
@@ -126,32 +125,34 @@ def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame
     return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])
 
 
-def centiles_table(centiles: pd.DataFrame) -> pd.DataFrame:
-    """Return the centiles of whole brains: a row per brain and week, a column per metric, with the number of brains.
+def standing(centiles: pd.DataFrame) -> list[str]:
+    """Return where each row of a table of centiles stands: "centile (z)", the difference from the norm in %, or "–"."""
+    away = (centiles["value"] / centiles["expected"] - 1).where(centiles["metric"] != AROUND_ZERO)
+    return [
+        f"{centile:.0f} ({z:+.1f})".replace("-", "−") if np.isfinite(centile) else _signed(100 * part, " %")
+        for centile, z, part in zip(centiles["centile"], centiles["z"], away, strict=True)
+    ]
+
+
+def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
+    """Return the metrics of a measured brain, whole and by hemisphere, and where the whole stands among the norm.
 
     Parameters
     ----------
-    centiles : columns subject, run, week, hemisphere, metric, z, centile, brains, brains_of_week, flag
-
-    Returns
-    -------
-    DataFrame indexed by brain, run and week (GW): "centile (z)" of the metrics of the chart, brains compared with,
-    those of the same week, and the note that goes with them
+    metrics : columns hemisphere, metric, value, unit, of this brain
+    centiles : those of the study, columns subject, run, hemisphere, metric, value, expected, z, centile, flag
     """
-    centiles = runs_by_name(centiles)
-    rows = centiles[(centiles["hemisphere"] == "whole") & centiles["metric"].isin(WITH_NORMS)]
-    text = [
-        f"{centile:.0f} ({z:+.1f})" if np.isfinite(centile) else "–"
-        for centile, z in zip(rows["centile"], rows["z"], strict=True)
-    ]
-    index = ["subject", "run", "week"]
-    wide = rows.assign(text=text).pivot_table("text", index, "metric", aggfunc="first")
-    brains = pd.MultiIndex.from_frame(rows[index].drop_duplicates())
-    wide = wide.reindex(index=brains, columns=[name for name in WITH_NORMS if name in wide])
-    wide = wide.rename(columns=METRICS)
-    first = rows.drop_duplicates(index).set_index(index)
-    wide["brains"], wide["of the week"], wide["note"] = first["brains"], first["brains_of_week"], first["flag"]
-    return wide.rename_axis(["brain", "run", "week (GW)"])
+    rows = metrics[~metrics["metric"].isin(OF_THE_SURFACE) & ~metrics["metric"].str.contains(QUANTILE)]
+    rows = rows.assign(name=_named)
+    wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(rows["name"].unique())
+    table = wide[[part for part in ("whole", *SIDES) if part in wide]]
+    own = (centiles["subject"] == metrics["subject"].iloc[0]) & (centiles["run"] == MEASURED)
+    scores = centiles[own & (centiles["hemisphere"] == "whole")].assign(name=_named)
+    if len(scores):
+        scores = scores.assign(stands=standing(scores)).set_index("name")
+        table = table.assign(norm=scores["expected"], **{"centile (z) or difference": scores["stands"]})
+        table["note"] = scores["flag"]
+    return table.rename_axis("metric")
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
@@ -273,6 +274,8 @@ def _kind(name: object, value: object, text: str) -> str:
     """Return the class of a cell, by which the style sheet lays it out."""
     if (isinstance(value, int | float | np.number) and not isinstance(value, bool)) or NUMBER.fullmatch(text):
         return "number"
+    if isinstance(text, Markup):
+        return "composed"
     if name == "verdict" and text in VERDICTS:
         return f"verdict {text}"
     # columns of sentences are wide, single words and numbers stay on one line
@@ -306,6 +309,8 @@ def _shown(value: object, digits: int = 6) -> str:
             return "–" if np.isnan(value) else number.replace("-", "−") + raised
         case None:
             return "–"
+        case Markup():
+            return value
         case list() | tuple():
             return ", ".join(_shown(item, digits) for item in value)
         case _:

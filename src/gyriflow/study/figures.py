@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..parameters.terms import run_names
+from ..parameters.terms import MOST_COLOURED, run_names
 from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
 from .records import Brain, Comparison, Measured, Simulation
 from .study import Study
@@ -137,6 +137,11 @@ def _halves(row: Measured) -> list[list[str]]:
     return [[row.parts[side], f"{row.folder}/{side}.shape.gii"] for side in row.sides]
 
 
+def _regions(row: Measured) -> list[list[str]]:
+    """Return the hemispheres of what is measured, each with its regions."""
+    return [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
+
+
 def _whole(one: Simulation) -> dict[float, str]:
     """Return the surfaces of the simulated brains by week."""
     return {row.week: row.parts["whole"] for row in one.measured}
@@ -149,7 +154,7 @@ def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
 
 def _of_brains(study: Study) -> Iterator[Figure]:
     for brain in study.brains.values():
-        yield Figure("quality_page", f"{BRAIN}/figures/quality.png", names={"brain": brain.id}, target="quality")
+        yield from _of_brain(brain)
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
     inputs: Given = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
     options: Given = {"views": THREE_SIDES, "measured": ""}
@@ -162,6 +167,22 @@ def _of_brains(study: Study) -> Iterator[Figure]:
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
     path = f"{STUDY}/mesh_quality.html"
     yield Figure("mesh_quality", path, "tables.mesh_quality_table", {"quality": quality}, {"gates": gates})
+
+
+def _of_brain(brain: Brain) -> Iterator[Figure]:
+    """Yield what the page of a measured brain has, and the pictures of its row in the report."""
+    names, row, folder = {"brain": brain.id}, brain.measured, f"{BRAIN}/figures"
+    yield Figure("quality_page", f"{folder}/quality.png", names=names, target="quality")
+    inputs: Given = {"halves": _halves(row)}
+    options: Given = {"side": row.sides[0]}
+    yield Figure("small_pictures", f"{folder}/small.png", "pictures.small_pictures", inputs, options, names, "small")
+    inputs = {"brains": {"": {row.week: _halves(row)}}}
+    options = {"quantity": "shape_index", "views": AROUND}
+    yield Figure("brain_maps", f"{folder}/shape_index.png", "pictures.shape_maps", inputs, options, names, "brain")
+    if brain.has_regions:
+        inputs = {"brains": {brain.id: _regions(row)}}
+        path = f"{folder}/regions.png"
+        yield Figure("brain_regions", path, "pictures.regions_picture", inputs, names=names, target="brain")
 
 
 def _of_growth(study: Study) -> Iterator[Figure]:
@@ -223,38 +244,49 @@ def _of_metrics(study: Study) -> Iterator[Figure]:
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
     options: Given = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
     subjects = {brain.id: brain.subject for brain in study.brains.values() if brain.given.subject is not None}
-    options["subjects"] = subjects
+    options |= {"subjects": subjects, "groups": _groups(study)}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
-    measured = {"measured": options["measured"]}
-    yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
+    if study.folded:
+        measured = {"measured": options["measured"]}
+        yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
     yield Figure("spectra_figure", f"{OF_STUDY}/spectra.png", "charts.spectra_weeks_chart", spectra, options)
     reference = list(study.norm_reference)
     if len({study.brains[brain].subject for brain in reference}) >= FEWEST_FOR_NORMS:
         inputs = {**metrics, "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
         name = measured_name(study.brains[brain] for brain in reference)
-        options = {"runs": options["runs"], "measured": name, "reference": reference, "subjects": subjects}
+        options = {**options, "measured": name, "reference": reference}
         yield Figure("norms_figure", f"{OF_STUDY}/norms.png", "charts.norms_chart", inputs, options)
-        inputs = {"centiles": f"{STUDY}/centiles.csv"}
-        yield Figure("centiles_table", f"{STUDY}/centiles.html", "tables.centiles_table", inputs)
     yield from _of_regions(study)
+
+
+def _groups(study: Study) -> dict[str, str]:
+    """Return what each measured brain is in the covariate that colours them."""
+    brains, wanted = study.brains.values(), study.config.metrics.colour_by
+    for name in [wanted] if wanted else dict.fromkeys(name for brain in brains for name in brain.given.covariates):
+        values = {brain.id: of[name] for brain in brains if name in (of := brain.given.covariates)}
+        subjects = {study.brains[brain].subject for brain in values}
+        if 1 < len(set(values.values())) <= MOST_COLOURED and (wanted or len(set(values.values())) < len(subjects)):
+            return {brain: f"{name}: {value}" for brain, value in values.items()}
+    return {}
 
 
 def _of_regions(study: Study) -> Iterator[Figure]:
     brains = [brain for brain in study.brains.values() if brain.has_regions]
     if not brains:
         return
-    rows = {brain.id: brain.measured for brain in brains}
-    for one, name in zip(study.folded, run_names(study.pairs), strict=True):
-        if one.has_regions:
-            rows[f"{name}, {one.weeks[-1]:g} GW"] = one.measured[-1]
-    sides = {
-        heading: [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
-        for heading, row in rows.items()
-    }
-    yield Figure("regions_figure", f"{OF_STUDY}/regions.png", "pictures.regions_picture", {"brains": sides})
     tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
     options = {"measured": measured_name(brains)}
     yield Figure("regions_chart", f"{OF_STUDY}/regions_metrics.png", "charts.regions_chart", tables, options)
+    rows = {
+        f"{name}, {one.weeks[-1]:g} GW": one.measured[-1]
+        for one, name in zip(study.folded, run_names(study.pairs), strict=True)
+        if one.has_regions
+    }
+    if not rows:
+        return
+    rows = {brain.id: brain.measured for brain in brains} | rows
+    sides = {heading: _regions(row) for heading, row in rows.items()}
+    yield Figure("regions_figure", f"{OF_STUDY}/regions.png", "pictures.regions_picture", {"brains": sides})
     yield Figure("regions_table", f"{STUDY}/regions.html", "tables.region_table", tables)
 
 

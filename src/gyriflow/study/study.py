@@ -1,10 +1,12 @@
 """A study as it was resolved from its configuration: its records, and what is joined from all of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
+from ..config.atlas import Atlas
 from ..config.root import Config
 from ..errors import InputError
 from ..parameters.terms import MEASURED, SIDES, Side
@@ -214,6 +216,25 @@ class Study:
         }
 
     @cached_property
+    def atlases(self) -> dict[str, Atlas]:
+        """The atlas of each brain that is of one, by id."""
+        return {
+            used.atlas.brain_id(file.series, file.week): used.atlas
+            for used in self.config.atlases
+            for file in used.files
+        }
+
+    def individuals(self, brains: Iterable[str]) -> bool:
+        """Return whether measured brains differ as individuals do: none is of an atlas, which has averages.
+
+        Brains of no named subject that are half a week or more apart may be an atlas' as well.
+        """
+        given = [self.brains[brain].given for brain in brains]
+        weeks = sorted(brain.week for brain in given)
+        told = all(brain.subject for brain in given) or any(late - early < 0.5 for early, late in pairwise(weeks))
+        return told and not any(brain.id in self.atlases for brain in given)
+
+    @cached_property
     def norm_reference(self) -> list[str]:
         """The ids of the measured brains that others are compared with: the given ones, or else all real ones.
 
@@ -227,7 +248,8 @@ class Study:
         start, given = first[0], self.config.metrics.norm_reference
         alike = [brain for brain in self.brains.values() if brain.sides == start.sides]
         if given is not None:
-            return [brain.id for brain in alike if brain.id in given]
+            named = {brain: atlas.name for brain, atlas in self.atlases.items()}
+            return [brain.id for brain in alike if {brain.id, named.get(brain.id)} & set(given)]
         real = [brain for brain in alike if not brain.given.synthetic]
         if len({brain.given.population for brain in real}) > 1:
             real = [brain for brain in real if brain.given.population == start.given.population]
@@ -324,12 +346,8 @@ class Study:
     @property
     def described_brains(self) -> list[dict[str, Any]]:
         """What the configuration says of each brain, refused ones too, with its licence where it is of an atlas."""
-        licences = {
-            used.atlas.brain_id(file.series, file.week): used.atlas.licence.name
-            for used in self.config.atlases
-            for file in used.files
-        }
-        keys = ("id", "week", "population", "source", "synthetic")
+        licences = {brain: atlas.licence.name for brain, atlas in self.atlases.items()}
+        keys = ("id", "week", "population", "source", "synthetic", "covariates")
         return [
             {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
             for brain in self.config.brains

@@ -123,8 +123,11 @@ def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     assert (folder / "sub-01" / "figures" / "sub-01_ses-1_quality.png").exists()
     assert not (folder / "participants.tsv").exists()
     write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
-    hand_over(exported, folder, source, [], whole=True)
+    (exported.parent / "report" / "brains").mkdir(parents=True)
+    (exported.parent / "report" / "brains" / "sub-01_ses-1.html").touch()
+    hand_over(exported, folder, source, ["sub-01_ses-1"], whole=True)
     assert (folder / "participants.tsv").exists()
+    assert (folder / "brains" / "sub-01_ses-1.html").exists()
     assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
 
 

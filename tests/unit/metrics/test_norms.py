@@ -17,6 +17,7 @@ from gyriflow.metrics.norms import (
     published_scores,
     structure_volumes,
 )
+from gyriflow.parameters.terms import SPREAD_UNKNOWN
 
 FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))
@@ -105,10 +106,22 @@ def test_what_cannot_be_scored_is_said() -> None:
     weeks = np.arange(21.0, 29.0)
     metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("a", 33.0, 1.0), ("b", 25.0, 250.0))
     found = measured_scores(metrics, reference).set_index("run")["flag"]
-    assert (found["a"], found["b"]) == ("outside the reference's weeks", "one brain a week")
+    assert (found["a"], found["b"]) == ("outside the reference's weeks", "ok")
     few = measured_scores(*table(weeks[:4], weeks[:4], ("a", 22.0, 1.0))).set_index("run").loc["a"]
     assert few["flag"] == "too few brains"
     assert np.isnan(few["centile"])
+
+
+def test_averages_give_a_curve_and_no_centiles() -> None:
+    weeks = np.arange(21.0, 29.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("b", 25.0, 260.0))
+    found = measured_scores(metrics, reference, individuals=False).set_index("run").loc["b"]
+    assert found["expected"] == pytest.approx(250.0, abs=0.5)
+    assert found[["sd", "z", "centile"]].isna().all()
+    assert found["flag"] == SPREAD_UNKNOWN
+    curves = norm_curves(metrics, reference, individuals=False)
+    assert curves["expected"].notna().all()
+    assert curves[["low", "high"]].isna().all(axis=None)
 
 
 def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
@@ -124,7 +137,7 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
         )
     ]
     found = measured_scores(pd.concat(sides, ignore_index=True), reference).set_index(["run", "hemisphere"])
-    assert found.loc[("all", "whole"), "flag"] == "one brain a week"
+    assert found.loc[("all", "whole"), "flag"] == "ok"
     for side in ("whole", "left"):
         assert found.loc[("half", side), "flag"] == "other hemispheres"
         assert found.loc[("half", side), ["z", "centile", "expected"]].isna().all()

@@ -13,7 +13,7 @@ from gyriflow.errors import InputError
 from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
 from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.tables import centiles_table
+from gyriflow.report.tables import brain_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
 REGIONS = pd.DataFrame(
@@ -68,6 +68,11 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     assert sum(linestyle == "-" for _, linestyle, _ in drawn) == 1
     assert {marker: weeks for marker, _, weeks in drawn if marker != "None"} == {"s": [22, 26], "^": [24], "*": [23]}
     assert {"sub-a", "sub-b", "real brain"} <= words(figure)
+    # a covariate has colours beside the markers
+    figure = metrics_chart(pd.concat(parts), subjects=subjects, groups={"a1": "sex: F", "a2": "sex: F", "b1": "sex: M"})
+    colours = {line.get_marker(): line.get_color() for line in figure.axes[0].lines if line.get_linestyle() != "-"}
+    assert len(set(colours.values())) == 3
+    assert {"sex: F", "sex: M", "sub-a", "real brain"} <= words(figure)
     # more than a legend holds share the star
     many = pd.concat([parts[0].assign(subject=f"s{number}") for number in range(9)])
     figure = metrics_chart(many, subjects={f"s{number}": f"sub-{number}" for number in range(9)})
@@ -193,14 +198,27 @@ def test_the_band_holds_ninety_per_cent_of_further_brains():
     assert 0.86 < inside / 400 < 0.94
 
 
-def test_table_of_centiles_says_of_how_many_brains(metrics_with_norms):
-    table = centiles_table(measured_scores(metrics_with_norms, REFERENCE))
-    case = table.loc[("case", "real", 25.0)]
-    assert case["brains"] == 10
-    assert case["of the week"] == 1
-    assert case["note"] == "one brain a week"
-    centile, z = case["pial area"].rstrip(")").split(" (")
+def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
+    curves = norm_curves(metrics_with_norms, REFERENCE, individuals=False)
+    norms = measured_norms(metrics_with_norms, REFERENCE)
+    figure = norms_chart(metrics_with_norms, curves, norms, reference=REFERENCE, groups={"case": "sex: F"})
+    curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) > 20)
+    assert curve.get_ydata()[[0, -1]] == pytest.approx([210, 300], abs=1)
+    (band,) = (part.get_paths() for part in figure.axes[0].collections[:1])
+    assert not band or np.isnan(band[0].vertices).any()
+    assert {"curve of the norm; spread of individuals unknown", "sex: F"} <= words(figure)
+    assert not {"90 % of further brains", "other measured brains"} & words(figure)
+
+
+def test_a_brain_has_its_numbers_with_where_they_stand(metrics_with_norms):
+    own = metrics_with_norms[metrics_with_norms["subject"] == "case"]
+    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE)).loc["pial area (cm²)"]
+    assert (row["whole"], row["note"]) == (252.0, "ok")
+    centile, z = row["centile (z) or difference"].rstrip(")").split(" (")
     assert float(centile) > 95
     assert float(z) > 3
-    # a brain of the reference is compared with the others
-    assert table.loc[("s3", "real", 24.0), "brains"] == 9
+    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE, individuals=False)).loc["pial area (cm²)"]
+    assert row["norm"] == pytest.approx(250, abs=0.5)
+    assert row["centile (z) or difference"] in ("+0.8 %", "+0.9 %", "+0.7 %")
+    assert row["note"] == "spread of individuals unknown"
+    assert list(brain_table(own, measured_scores(own, []))) == ["whole"]

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from markupsafe import Markup
 
+from gyriflow.parameters.terms import SPREAD_UNKNOWN
 from gyriflow.report.page import (
     brains_table,
     caption_html,
@@ -25,8 +27,10 @@ from gyriflow.report.tables import html_table, resolution_over_steps
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
 BRAINS = [
     {"id": name, "week": week, "population": "healthy", "source": "labels", "synthetic": False, "licence": licence}
-    for name, week, licence in (("young", 21.0, "CC0 1.0"), ("old", 23.0, None))
+    | {"covariates": covariates}
+    for name, week, licence, covariates in (("young", 21.0, "CC0 1.0", {"sex": "F"}), ("old", 23.0, None, {}))
 ]
+PICTURES = {"young": ("data:image/webp;base64,AAAA", 1.5)}
 RUNS = pd.DataFrame(
     {
         "run": ["thin"], "subject": ["young"], "start_week": [21.0], "preset": ["measured"], "end_week": [23.0],
@@ -44,13 +48,23 @@ VALIDATION = pd.DataFrame(
 )  # fmt: skip
 
 
-NO_WARNINGS = pd.DataFrame({"level": [], "message": []})
+NO_WARNINGS = pd.DataFrame({"subject": [], "level": [], "message": []})
 QUALITY = pd.DataFrame(
     {
         "subject": ["young", "old"], "verdict": ["look", "refused"], "cause": [np.nan, "cropped"],
-        "warnings": ["a bridge was cut", np.nan], "volume_ml": [46.2, np.nan], "area_cm2": [90.0, np.nan],
+        "warnings": ["a bridge was cut", np.nan],
     }
 )  # fmt: skip
+METRICS = pd.DataFrame(
+    {
+        "subject": "young", "run": "real", "week": 21.0, "hemisphere": ["whole", "whole", "left"],
+        "metric": ["volume", "area", "area"], "value": [46.2, 90.0, 44.0], "unit": ["mL", "cm2", "cm2"],
+    }
+)  # fmt: skip
+CENTILES = METRICS.iloc[:2].assign(
+    expected=[40.0, 100.0], z=[1.2, np.nan], centile=[88.4, np.nan], flag=["ok", SPREAD_UNKNOWN]
+)
+MEASURES = {"quality": QUALITY, "metrics": METRICS, "centiles": CENTILES}
 PROVENANCE = {
     "commit": "abc-dirty",
     "recorded": "2026-01-01T12:30:00+00:00",
@@ -71,10 +85,11 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
     return shown_figures(words, figures, {path: content for _, path, _ in figures})
 
 
-def page(figures: list[dict], view: dict | None = None) -> str:
+def page(figures: list[dict], view: dict | None = None, **others) -> str:
+    usual = {"brains": BRAINS, "pictures": PICTURES, "runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
     content = page_content(
-        brains=BRAINS, quality=QUALITY, runs=RUNS, validation=VALIDATION, warnings=NO_WARNINGS,
-        provenance=PROVENANCE, methods="**Brains.** Two.", configuration="start: young\n", shown=figures,
+        **MEASURES | usual | others, norm="the norm", provenance=PROVENANCE, methods="**Brains.** Two.",
+        configuration="start: young\n", shown=figures,
     )  # fmt: skip
     parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
     parts["notice"] = "three.LICENSE.txt"
@@ -86,10 +101,10 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     figures = [*shown("growth_figure", content="<table></table>"), *shown("weekly_figure", caption="first <page>")]
     text = page(figures, {"groups": [{"name": "</script><b>"}], "maps": []})
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside) == []
+    assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside) == ['href="brains/young.html"']
     assert "</script><b>" not in text
     assert "<em>all</em>" in text
-    parts = ("first &lt;page", "<h3>Runs", "<h3>Brains", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Provenance")
+    parts = ("first &lt;page", "<h3>Runs", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Brains", "<h2>Provenance")
     order = [text.index(word) for word in parts]
     assert order == sorted(order)
     assert "2 brains of 21 to 23 GW (healthy) went in. young was filled with" in " ".join(text.split())
@@ -142,12 +157,38 @@ def test_paths_are_hidden():
     assert hide_paths(named | plain) == hidden | plain
 
 
-def test_a_brain_has_its_verdict_with_cause_or_warnings():
-    table = brains_table(BRAINS, QUALITY).set_index("brain")
-    assert table["verdict"].to_dict() == {"young": "look", "old": "refused"}
-    assert table["warnings"].to_list() == ["a bridge was cut", "cropped"]
-    assert table["licence"].to_list() == ["CC0 1.0", "your own data"]
-    assert table.loc["young", ["volume (mL)", "pial area (cm²)"]].to_list() == [46.2, 90.0]
+def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
+    young, old = brains_table(BRAINS, **MEASURES, pictures=PICTURES).to_dict("records")
+    assert [row["verdict"] for row in (young, old)] == ["look", "refused"]
+    assert [row["warnings"] for row in (young, old)] == ["a bridge was cut", "cropped"]
+    assert [Markup(row["brain"]).striptags() for row in (young, old)] == [
+        "young21 GW; healthy; sex: F; labels; CC0 1.0", "old23 GW; healthy; labels; your own data"
+    ]  # fmt: skip
+    assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (+1.2)", "–"]
+    # averages give no centile
+    assert Markup(young["pial area (cm²)"]).striptags() == "90−10.0 %"
+    assert ("<img " in young[""], old[""], "href" in old["brain"]) == (True, "", False)
+
+
+def test_a_page_says_what_its_centiles_are_worth():
+    text = page(shown("growth_figure"))
+    assert "its centile (z) at this age among the other subjects of the norm, the norm." in text
+    assert "How far individuals spread around such a curve is unknown" in text
+    assert "There are too few subjects" not in text
+
+
+def test_a_brain_has_a_page_of_its_own():
+    warnings = pd.DataFrame(
+        {"subject": ["young", "other"], "run": np.nan, "step": "s", "level": "warning", "message": ["own", "other's"]}
+    )
+    alone = {"brains": BRAINS[:1], "pictures": None, "runs": None, "validation": None, "warnings": warnings}
+    text = page(shown("quality"), **alone)
+    assert "<h1>Cortical folding, young</h1>" in text
+    assert 'href="../report.html"' in text
+    assert "other&#39;s" not in text
+    assert text.index(">own<") < text.index("<th>left</th>") < text.index("<h2>quality")
+    # both hemispheres and where the brain stands
+    assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 %", text)
 
 
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
@@ -240,9 +281,4 @@ def test_messages_tell_files_without_their_folders(monkeypatch):
 
 
 def test_a_page_without_simulations_has_no_verdict():
-    none = pd.DataFrame({"level": [], "message": []})
-    content = page_content(
-        brains=BRAINS, quality=QUALITY, runs=None, validation=None, warnings=none, provenance=PROVENANCE,
-        methods="", configuration="", shown=[],
-    )  # fmt: skip
-    assert content["verdict"] == ""
+    assert "<strong>" not in page([], runs=None, validation=None).partition("<h2>Methods")[0]
