@@ -25,12 +25,21 @@ def labelled(week: int) -> dict:
 
 
 SMALL_STUDY = {
-    "brains": [{"id": "a", "week": 21, **labelled(21)}, {"id": "b", "week": 22, **labelled(22)}],
+    "brains": [
+        {"id": "a", "week": 21, **labelled(21)},
+        {"id": "b", "week": 22, **labelled(22)},
+    ],
     "start": "a",
     "folding": {"end_week": 22},
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
 }
-COARSE = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 3.0, "core_edge_mm": 5.0, "max_surface_distance_mm": 1.0}
+COARSE = {
+    "order": 1,
+    "mesher": "tetgen",
+    "surface_edge_mm": 3.0,
+    "core_edge_mm": 5.0,
+    "max_surface_distance_mm": 1.0,
+}
 """A mesh that is made in a second."""
 
 

@@ -91,7 +91,10 @@ def alone(side, change):
     return made
 
 
-MOTIONS = {"left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)), "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0))}
+MOTIONS = {
+    "left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)),
+    "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0)),
+}
 POSED = [flipped(transformed(half, turn)) for half, turn in zip(atlas_halves(), MOTIONS.values(), strict=True)]
 GOOD = {
     "plain": labelled(),

@@ -83,6 +83,7 @@ rule html_report:
         small=[figure.path for figure in FIGURES if figure.target == "small"],
         runs=rules.study_runs.output.csv if study.folded else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
+        worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
         view=asked_for(FIGURES, "view")[0],
         three=f"{PAGE}/three.min.js",
         notice=f"{PAGE}/three.LICENSE.txt",
@@ -97,6 +98,7 @@ rule html_report:
             if figure.target not in ("", "small", *OF_BRAINS)
         ],
         brains=study.described_brains,
+        prediction=study.described_prediction,
         pictured=list(study.brains),
         norm=measured_name(study.brains[brain] for brain in study.norm_reference),
         config=study.used_settings,

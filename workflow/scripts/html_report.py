@@ -16,7 +16,11 @@ with step(snakemake.log[0]):
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
     contents |= {path: read_body(path) for _, path, _ in figures if path not in contents}
     small = None if params.pictured is None else picture_addresses(files.small, PICTURE_BYTES)
+    prediction = params.get("prediction")
+    if prediction:
+        prediction |= {"worth": read_yaml(files.worth)}
     content = page_content(
+        prediction=prediction,
         brains=params.brains,
         pictures=None if small is None else dict(zip(params.pictured, small, strict=True)),
         norm=params.norm,

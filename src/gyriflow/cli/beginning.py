@@ -8,16 +8,15 @@ import yaml
 
 from ..config.atlas import Atlas, AtlasSettings
 from ..config.brains import Brain
-from ..config.loading import OF_FOLDING
+from ..config.loading import OF_FOLDING, load
 from ..errors import InputError
 from ..io.files import read_json, write_json, write_text
-from ..io.volumes import read_label_volume
 from ..io.yaml_files import read_keys
 from ..parameters.growth import BEFORE_GW
 from ..parameters.settings import validated
 from ..shipped import SHIPPED
 from ..study.series import why_unmatched
-from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, choose_schemes, recognise, scheme_fits, scheme_reasons
+from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, recognise, recognise_labels, scheme_reasons
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -41,8 +40,12 @@ runs:
 MEASURED = """
   measured: {preset: measured}"""
 SHIPPED_ATLAS = "spina-bifida"
-SUBJECT = "subject"
-"""Id and population of the brain of a prediction."""
+QUICK: dict[str, Any] = {
+    "surface": {"edge_length_mm": 1.2},
+    "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": 0.67, "max_surface_distance_mm": 0.5},
+    "folding": {"step_s": 86400, "thickness_mm": 2.5},
+}
+"""What a quick prediction differs in: a mesh as the demo's, and a cortex that it resolves."""
 
 
 def write_configuration(
@@ -80,41 +83,48 @@ def write_configuration(
 
 def write_prediction(
     path: Path,
+    there: Path,
     labels: Path,
     weeks: tuple[float, float],
     *,
     atlas: str | None,
+    folder: Path | None,
     scheme: str | None,
     image: Path | None,
     accepted: bool,
+    quick: bool,
+    force: bool,
 ) -> Iterator[str]:
     """Write a configuration by which a brain is folded as an atlas grows; yield what is to be said of that.
 
-    One that is there already and says the same is kept. `weeks` are the brain's own and that to be predicted;
-    `accepted` tells whether the atlas' licence is. InputError where anything is missing.
+    `weeks` are the brain's own and that to be predicted; `folder` is that of the atlas' files, and `accepted` tells
+    whether its licence is. Paths are relative to the working directory of this process. InputError where anything is
+    missing, or where a configuration is `there` that says something else and `force` is not set.
     """
     if atlas is None:
         yield (
             f"warning: no --atlas is named, so that of {SHIPPED_ATLAS} is taken. Its brains are of spina bifida "
             "aperta, not normal ones, and end at 25 GW unoperated"
         )
-    brain = Recognised({"scheme": scheme or UNSET}, fits=scheme_fits(read_label_volume(labels).labels))
-    choose_schemes([brain], scheme)
-    if brain.notes:
-        raise InputError("has labels of an unknown scheme", path=labels, found=brain.notes[0], remedy="Name --scheme")
-    scheme = brain.entry["scheme"]
-    entry = {"id": SUBJECT, "week": weeks[0], "population": SUBJECT, "labels": str(labels.resolve()), "scheme": scheme}
-    settings = validated(AtlasSettings, atlas or SHIPPED_ATLAS, "--atlas")
+    entry = recognise_labels(labels.resolve(), scheme)
+    entry = {"id": entry["id"], "week": weeks[0], "population": entry["id"]} | entry
+    entry |= {"image": str(image.resolve())} if image else {}
+    given = {"name": atlas or SHIPPED_ATLAS, "folder": folder and str(folder), "accept_licence": accepted}
+    settings = validated(AtlasSettings, given, "--atlas").located(Path.cwd())
     series = _growing(Atlas(**read_keys(settings.description)), weeks, accepted)
-    section = settings.model_dump(exclude_defaults=True) | series | ({"accept_licence": True} if accepted else {})
-    brains = [entry | ({"image": str(image.resolve())} if image else {})]
-    folding = {"preset": "expected", "end_week": weeks[1]}
-    text = yaml.safe_dump({"brains": brains, "atlas": section, "start": SUBJECT, "folding": folding}, sort_keys=False)
-    if not path.exists():
-        write_text(path, text)
-    elif path.read_text() != text:
-        raise InputError("is there already and says something else", path=path, remedy="Choose another --directory.")
-    yield f"{SUBJECT}: {labels} ({scheme}), {weeks[0]:g} GW; atlas {section}; written to {path}"
+    section = settings.model_dump(exclude_defaults=True) | series
+    more = QUICK if quick else {"folding": {}}
+    folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
+    config = {"brains": [entry], "atlas": section, "start": entry["id"], **more, "folding": folding}
+    config["runs"] = {"predicted": {}}
+    load(config)
+    text = yaml.safe_dump(config, sort_keys=False)
+    if there.exists() and there.read_text() != text and not force:
+        remedy = "Choose another --directory, or add --force."
+        raise InputError("is there already and says something else", path=there, remedy=remedy)
+    write_text(path, text)
+    span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
+    yield f"{entry['id']}: {labels} ({entry['scheme']}), {span}; configuration: {there}"
 
 
 def remembered(path: Path, options: dict[str, Any]) -> dict[str, Any]:

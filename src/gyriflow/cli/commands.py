@@ -6,6 +6,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
@@ -211,8 +212,11 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 @click.option("--until", type=float, required=True, help="Week to predict it for.")
 @click.option("--atlas", help="Whose growth: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
 @scheme_option
+@click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: they are downloaded]")
 @click.option("--image", type=FILE, help="T2-weighted volume of the same brain.")
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the atlas' licence, where it asks for it.")
+@click.option("--quick", is_flag=True, help="A coarse mesh and steps of a day, for a first look.")
+@click.option("--force", is_flag=True, help="Replace a configuration that is there.")
 @directory_option
 @cores_option
 @dry_run_option
@@ -221,14 +225,17 @@ def predict(
 ) -> None:
     """Predict a brain of later weeks from its tissue LABELS, by the growth of an atlas.
 
-    It writes gyriflow.yaml into the working directory and runs it up to the report; the same command goes on after an
-    interruption.
+    It writes gyriflow.yaml into the working directory and runs it up to the report and the predicted surfaces and
+    labels, whose places the report names. The same command goes on after an interruption.
     """
     from .beginning import write_prediction
 
-    for line in write_prediction(directory / CONFIG, labels, (week, until), **settings):
-        click.echo(line)
-    sys.exit(_run(directory / CONFIG, directory, cores, dry_run, ["--cores", str(cores)]))
+    with TemporaryDirectory() as scratch:
+        config = Path(scratch if dry_run else directory) / CONFIG
+        for line in write_prediction(config, directory / CONFIG, labels, (week, until), **settings):
+            click.echo(line)
+        code = _run(config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export")
+    sys.exit(code)
 
 
 @main.command()

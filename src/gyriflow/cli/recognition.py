@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
+from ..parameters.settings import nearest
 
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
 SURFACES = (".gii", ".vtk", ".vtp", ".stl", ".ply", ".obj")
@@ -92,6 +93,18 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
             except InputError as error:
                 causes[name] = str(error).partition(";")[0]
     return causes
+
+
+def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
+    """Return the entry of one label volume: its id, file and scheme; InputError where that is unknown or not one."""
+    if scheme not in (None, *SCHEMES):
+        raise InputError(f"--scheme: found {scheme!r}; {nearest(str(scheme), SCHEMES)}")
+    entry = {"id": _id(file), "labels": str(file), "scheme": UNSET}
+    brain = Recognised(entry, fits=scheme_fits(read_label_volume(file).labels))
+    choose_schemes([brain], scheme)
+    if brain.notes:
+        raise InputError("has labels of an unknown scheme", path=file, found=brain.notes[0], remedy="Name --scheme")
+    return brain.entry
 
 
 def choose_schemes(brains: Sequence[Recognised], given: str | None = None) -> None:

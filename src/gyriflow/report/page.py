@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from ..parameters.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
 from .labels import METRICS, plain, week_label, with_unit
-from .tables import brain_table, html_table, standing
+from .tables import brain_table, html_table, predicted_table, span, standing, worth_table
 
 FILE = "(file)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
@@ -23,8 +23,8 @@ _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders before the name of a file: they may hold names of people, and are nobody else's matter."""
 DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
-FIRST = "weekly_figure"
-"""The rule whose first figure stands on the first page."""
+FIRST = ("predicted_figure", "weekly_figure")
+"""The rules of which the first figure stands on the first page."""
 OF_BRAINS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """The metrics in the row of a brain."""
 NORM_WORDS = {
@@ -34,6 +34,7 @@ NORM_WORDS = {
     "too few brains": "There are too few subjects for centiles: a curve over the weeks takes six others.",
 }
 """What is said of numbers by how brains stand among the norm."""
+NOT_COMPARED = "No real brain of the same population and week was there to compare a simulation with."
 DEEP_MM = 0.5
 """Walls of the fissure that begin so far beyond their planes are told of."""
 
@@ -53,7 +54,7 @@ def shown_figures(
     contents : {path: HTML, or a picture's data address and its width in inches}
     """
     starts = {rule: {names.get("brain") for other, _, names in figures if other == rule} for rule, _, _ in figures}
-    first = next((path for rule, path, _ in figures if rule == FIRST), None)
+    first = next((path for of in FIRST for rule, path, _ in figures if rule == of), None)
     shown = []
     for rule, path, names in figures:
         # the page's title names a brain that all figures of a kind are of
@@ -101,6 +102,7 @@ def page_content(
     methods: str,
     configuration: str,
     shown: Sequence[Mapping[str, Any]],
+    prediction: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return what the page's template names: the first page, the sections, and where all comes from.
 
@@ -114,6 +116,7 @@ def page_content(
     methods : reStructuredText
     configuration : text, without paths
     shown : what `shown_figures` returns
+    prediction : what `Study.described_prediction` returns, and worth, of `norms/predictions.yaml`
     """
     software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
     warnings, quality = (table.replace(_FOLDERS, "", regex=True) for table in (warnings, quality))
@@ -123,18 +126,28 @@ def page_content(
     own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
     files = [file for file in provenance["files"] if file["brain"] in ids]
     versions = [(name, version) for name, version in software.items() if version]
+    title, said, scores = f"Cortical folding, {'measured' if pictures is not None else ids[0]}", "", ""
+    if runs is not None:
+        title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
+        said = verdict(runs, validation, warnings, worth_told(prediction) if prediction else NOT_COMPARED)
+        # a prediction alone is compared with nothing
+        scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
+    if prediction:
+        title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
+        title += prediction["growth_of"]
+        numbers, known = predicted_table(metrics, prediction), worth_table(prediction["worth"])
+        prediction = {**prediction, "numbers": html_table(numbers), "known": html_table(known)}
     return {
-        "title": f"Cortical folding, {'measured' if pictures is not None else ids[0]}"
-        if runs is None
-        else f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}",
-        "verdict": "" if runs is None else verdict(runs, validation, warnings),
+        "title": title,
+        "verdict": said,
+        "prediction": prediction,
         "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality, metrics, centiles, pictures or {})),
         "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if (own["flag"] == flag).any()],
         "alone": pictures is None,
         "numbers": html_table(brain_table(metrics[metrics["subject"] == ids[0]], centiles)) if pictures is None else "",
-        "runs": "" if runs is None else html_table(scores_table(runs, validation)),
+        "runs": scores,
         "warnings": "" if warnings.empty else html_table(grouped(warnings)),
         "weeks": next((item for item in shown if item["first"]), None),
         "sections": sections([item for item in shown if not item["first"]]),
@@ -253,15 +266,35 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
     return pd.DataFrame(rows)
 
 
-def verdict(runs: pd.DataFrame, validation: pd.DataFrame | None, warnings: pd.DataFrame) -> str:
+def worth_told(prediction: Mapping[str, Any]) -> str:
+    """Return in words what predictions as far ahead were worth on brains whose later scan was known."""
+    rows, ahead = pd.DataFrame(prediction["worth"]["rows"]), prediction["week"] - prediction["start_week"]
+    # the next that was tried, or the farthest
+    horizon = min((tried for tried in rows["horizon"] if tried >= ahead - 1e-6), default=rows["horizon"].max())
+    ways = rows[rows["horizon"] == horizon].groupby("model")
+    run, atlas, scaled = (
+        f"{span(of['distance_mm'])} mm from the real brain, r {span(of['r_shape_index'])}"
+        for of in map(ways.get_group, ("run", "atlas", "scaled"))
+    )
+    beyond = f" None was tried {ahead:.3g} weeks ahead." if ahead > horizon + 1e-6 else ""
+    return (
+        f"A prediction, not a scan. {horizon:g} weeks ahead such predictions were {run} of shape index; the atlas' own "
+        f"brain {atlas}; the scaled start {scaled}.{beyond} These were averages of many normal fetuses: how far single "
+        "fetuses are from their predictions is not known."
+    )
+
+
+def verdict(
+    runs: pd.DataFrame, validation: pd.DataFrame | None, warnings: pd.DataFrame, sentence: str = NOT_COMPARED
+) -> str:
     """Return in a sentence how the run nearest to its last real brain compares with no folding, and the worst warning.
 
     Parameters
     ----------
     runs, validation : as for `scores_table`
     warnings : columns level and message
+    sentence : what is said where there is no real brain
     """
-    sentence = "No real brain of the same population and week was there to compare a simulation with."
     if validation is not None and len(validation):
         last = validation[validation["week"] == validation["week"].max()]
         best = last.sort_values("r_shape_index", ascending=False).iloc[0]

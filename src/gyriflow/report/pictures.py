@@ -101,6 +101,7 @@ def runs_by_week(
     deviations: Mapping[float, SurfaceMaps] | None = None,
     views: Sequence[str] = SIDE_VIEWS,
     measured: str = REAL_BRAIN,
+    predicted: str = "",
 ) -> Figure:
     """Draw the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
 
@@ -111,13 +112,15 @@ def runs_by_week(
         A week that one of them lacks leaves its place empty.
     deviations : {week: (surface, maps)}
         Of which `labels.DISTANCE` is shown below.
+    predicted : the heading of a predicted brain (blue) among the real ones
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
     if real:
         groups[measured] = (real, REAL_SURFACE_COLOUR)
     keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), [VIEWS[name] for name in views]
+    other = {predicted: SIMULATED_SURFACE_COLOUR}
     panels = {
-        name: {view: [_plain_panel(meshes.get(key), colour, view) for key in keys] for view in seen}
+        name: {view: [_plain_panel(meshes.get(key), other.get(key, colour), view) for key in keys] for view in seen}
         for name, (meshes, colour) in groups.items()
     }
     bar = None

@@ -39,6 +39,8 @@ OF_EVERY_RUN = (
     *("step_s", "tets", "order", "elements_through_cortex", "steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are told of runs even where all have the same."""
+OF_PREDICTIONS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness")
+"""Metrics of predicted brains: the thickness of their cortex is a setting."""
 AROUND_ZERO = "mean_shape_index"
 """A metric that may be zero, so that a difference in per cent says nothing."""
 OF_THE_MESH = {
@@ -235,6 +237,52 @@ def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     table = table.drop_duplicates(["start", "week", "way"]).set_index(["start", "week", "way"])
     shown = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error"]
     return table[[*shown, "crossing_faces", "roughness_ratio", "skill"]].rename(columns=plain)
+
+
+def predicted_table(metrics: pd.DataFrame, prediction: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the metrics of a predicted brain, of its start and of the atlas' brain, and its difference from that in %.
+
+    `metrics` are as for `metrics_table`; `prediction` names the run, the brain, the atlas' one beside it, and weeks.
+    """
+    rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(OF_PREDICTIONS)]
+    rows = rows.assign(name=_named).set_index("name")
+
+    def values(brain: str, run: str, when: str) -> pd.Series:
+        at = np.isclose(rows["week"], prediction[when], atol=0.005)
+        return rows.loc[at & (rows["subject"] == prediction[brain]) & (rows["run"] == run), "value"]
+
+    start, beside = values("brain", MEASURED, "start_week"), values("beside", MEASURED, "beside_week")
+    predicted = values("brain", prediction["run"], "week")
+    columns = {
+        f"start, {week_label(prediction['start_week'])}": start,
+        f"predicted, {week_label(prediction['week'])}": predicted,
+        f"the atlas' own brain, {week_label(prediction['beside_week'])}": beside,
+        "predicted less the atlas' (%)": (100 * (predicted / beside - 1)).map(_signed),
+    }
+    return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
+
+
+def worth_table(worth: Mapping[str, Any]) -> pd.DataFrame:
+    """Return what predictions and simpler ways were worth: a row per horizon, with what the numbers of the starts span.
+
+    `worth` has rows (start, horizon in GW, model, distance_mm, r_shape_index, and area_error and volume_error as
+    fractions of the real brain's), of models `run` and of `SIMPLER_WAYS`.
+    """
+    table: dict[Any, dict[str, str]] = {}
+    for (horizon, model), rows in pd.DataFrame(worth["rows"]).groupby(["horizon", "model"]):
+        distance, r = span(rows["distance_mm"]), span(rows["r_shape_index"])
+        if model == "run":
+            errors = {f"{size} (%)": span(100 * rows[f"{size}_error"], "+.1f") for size in ("area", "volume")}
+            table[horizon] = {"distance (mm)": distance, "r": r} | errors | table.get(horizon, {})
+        else:
+            table.setdefault(horizon, {})[SIMPLER_WAYS[str(model)]] = f"{distance} mm, r {r}"
+    return pd.DataFrame.from_dict(table, orient="index").rename_axis("weeks ahead")
+
+
+def span(values: pd.Series, pattern: str = ".2f") -> str:
+    """Return the least and the largest of numbers, once where they are the same; a dash for none."""
+    ends = [format(value, pattern).replace("-", "−") for value in (values.min(), values.max()) if np.isfinite(value)]
+    return " to ".join(dict.fromkeys(ends)) or "–"
 
 
 def mesh_quality_table(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> pd.DataFrame:

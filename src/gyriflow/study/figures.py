@@ -200,7 +200,18 @@ def _of_growth(study: Study) -> Iterator[Figure]:
     yield Figure("growth_figure", path, "growth.growth_chart", GROWTH, options, target="growth", paper=True)
 
 
+def _of_prediction(one: Simulation, beside: Brain) -> Figure:
+    predicted = f"predicted\n{one.weeks[-1]:g} GW"
+    brains = {f"start\n{one.start.week:g} GW": one.start.pial, predicted: one.measured[-1].parts["whole"]}
+    brains[f"atlas' own brain\n{beside.week:g} GW"] = beside.pial
+    options: Given = {"views": THREE_SIDES, "measured": "", "predicted": predicted}
+    inputs: Given = {"runs": {}, "real": brains}
+    return Figure("predicted_figure", f"{OF_RUN}/predicted.png", "pictures.runs_by_week", inputs, options, one.names)
+
+
 def _of_folding(study: Study) -> Iterator[Figure]:
+    if study.prediction is not None:
+        yield _of_prediction(study.prediction, study.atlas_brain(study.prediction))
     for start in study.starts:
         runs = [one for one in study.folded if one.start is start]
         names, real = {"brain": start.id}, _measured_by_week(*runs)

@@ -9,6 +9,7 @@ from typing import Any
 from ..config.atlas import Atlas
 from ..config.root import Config
 from ..errors import InputError
+from ..io.exports import ExportedBrain, labels_of
 from ..parameters.terms import MEASURED, SIDES, Side
 from ..units import week_tag
 from . import paths
@@ -111,6 +112,15 @@ class Study:
     def expected(self) -> list[Simulation]:
         """Those of them that say what was to be expected of a real brain."""
         return [one for one in self.validated if one.from_others_only]
+
+    @cached_property
+    def prediction(self) -> Simulation | None:
+        """The one simulation of a study that folds no other, where it is a prediction by the growth of an atlas."""
+        return self.folded[0] if len(self.folded) == 1 and self.folded[0].from_others_only else None
+
+    def atlas_brain(self, one: Simulation) -> Brain:
+        """Return the brain, of those whose growth a prediction has, that is nearest in week to its end."""
+        return min(self.chains[one.start.id, "atlas"].later, key=lambda brain: abs(brain.week - one.weeks[-1]))
 
     @cached_property
     def predictions(self) -> list[Simulation]:
@@ -352,6 +362,24 @@ class Study:
             {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
             for brain in self.config.brains
         ]
+
+    @property
+    def described_prediction(self) -> dict[str, Any] | None:
+        """What the report of a prediction begins with: names, weeks, whose growth it has, and where its files are."""
+        if (one := self.prediction) is None:
+            return None
+        at, beside = one.measured[-1], self.atlas_brain(one)
+        exported = [ExportedBrain(**brain) for brain in self.exported]
+        last = next(brain for brain in exported if (brain.run, brain.week) == (one.run, at.week))
+        atlas = self.atlases.get(beside.id)
+        return {
+            **{**one.names, "start_week": one.start.week, "week": at.week},
+            **{"beside": beside.id, "beside_week": beside.week},
+            "growth_of": f"the atlas {atlas.name}" if atlas else beside.population,
+            "atlas": atlas and atlas.model_dump(include={"title", "licence", "reference"}),
+            "surfaces": [*at.parts.values()],
+            "labels": labels_of("results/export", last, exported) if last.volume else None,
+        }
 
     @property
     def method(self) -> dict[str, Any]:

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from gyriflow.anatomy.hindbrain import pose_of_labels
-from gyriflow.anatomy.labels import cerebrum_mask, require_cortex_outside, require_sides
+from gyriflow.anatomy.labels import (
+    cerebrum_mask,
+    require_cortex_outside,
+    require_sides,
+)
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES

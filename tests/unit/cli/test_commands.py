@@ -1,10 +1,13 @@
 """What the commands hand on to Snakemake, and what they tell to type next."""
 
+from pathlib import Path
+
 import pytest
 import yaml
 from click.testing import CliRunner
 
-from gyriflow.cli import launch
+from gyriflow.cli import checking, launch
+from gyriflow.cli.checking import coarse_cortices
 from gyriflow.cli.commands import main
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -71,11 +74,15 @@ def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
     assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
 
 
+FOUND = "fetal_SB_atlas_GA22_notoperated"
+"""The id of the brain that is predicted, by the folder of its labels."""
+
+
 @pytest.fixture
 def predicted(monkeypatch, tmp_path):
     """Return what `gyriflow predict` says of the shipped brain of 22 GW, and hand the run's arguments on."""
     monkeypatch.setattr(launch, "main", lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0)
-    labels = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"
+    labels = SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz"
 
     def said(*given):
         arguments = ["predict", str(labels), "--directory", str(tmp_path), "--cores", "3", *given]
@@ -91,14 +98,45 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
     config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
     study = resolve(config)
-    assert [(simulation.start.id, simulation.shapes) for simulation in study.folded] == [("subject", "atlas")]
-    assert [brain.id for brain in study.chains["subject", "atlas"].later] == [brain.id for brain in config.brains[1:]]
+    assert [(simulation.start.id, simulation.shapes) for simulation in study.folded] == [(FOUND, "atlas")]
+    assert [brain.id for brain in study.chains[FOUND, "atlas"].later] == [brain.id for brain in config.brains[1:]]
     asked = (tmp_path / "asked.txt").read_text()
-    assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path}"
+    assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path} all export"
     # the same call goes on, another one replaces nothing
     assert predicted("--week", "22.4", "--until", "24.5").exit_code == 0
     other = predicted("--week", "22.4", "--until", "24")
     assert (other.exit_code, "is there already and says something else" in other.output) == (2, True)
+    assert predicted("--week", "22.4", "--until", "24", "--force").exit_code == 0
+    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs["predicted"].end_week == 24
+
+
+def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monkeypatch, predicted, tmp_path):
+    atlas = SHIPPED / "atlases" / "spina-bifida"
+    monkeypatch.chdir(atlas.parent)
+    asked = ("--week", "22", "--until", "24", "--quick", "--atlas", f"{atlas.name}/atlas.yaml", "--folder", atlas.name)
+    assert predicted(*asked).exit_code == 0
+    monkeypatch.chdir(tmp_path)
+    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
+    assert (section["atlas"]["name"], section["atlas"]["folder"]) == (str(atlas / "atlas.yaml"), str(atlas))
+    study = resolve(load(section))
+    assert all(Path(file).is_file() for brain in study.brains.values() for file in brain.given.files)
+    # what the cortex is resolved by
+    assert list(coarse_cortices(study)) == []
+    assert study.folded[0].settings.step_s == 86400
+    assert study.config.mesh.order == 1
+
+
+def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path):
+    seen = []
+    monkeypatch.setattr(checking, "plan", lambda config, *_, **__: seen.append(config.is_file()) or [])
+    before = set(tmp_path.rglob("*"))
+    dry = ("--week", "22", "--until", "24", "--directory", str(tmp_path / "new"), "--dry-run")
+    assert predicted(*dry).exit_code == 0
+    assert (seen, set(tmp_path.rglob("*"))) == ([True], before)
+    # what it would not replace, it says then
+    (tmp_path / "gyriflow.yaml").write_text("start: mine")
+    assert "says something else" in predicted("--week", "22", "--until", "24", "-n").output
+    assert (tmp_path / "gyriflow.yaml").read_text() == "start: mine"
 
 
 @pytest.mark.parametrize(
@@ -108,6 +146,8 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
         ("22", [], "or another --until, after --week"),
         ("30", ["--atlas", "crl"], "For non-commercial education and research only"),
         ("30", ["--atlas", "crk"], "did you mean crl?"),
+        ("25", ["--scheme", "feta"], "--scheme: found 'feta'; did you mean feta-7?"),
+        ("25", ["--folder", "nowhere"], "Directory 'nowhere' does not exist"),
     ],
 )
 def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until, more, told):

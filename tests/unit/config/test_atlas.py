@@ -34,7 +34,12 @@ def study(atlas, start, **changes):
 
 def own_atlas(folder, **changes):
     """Write an atlas of two weeks and return its description."""
-    series = {"population": "sheep", "scheme": "binary", "files": {"labels": "w{week}.nii.gz"}, "weeks": [21, 22]}
+    series = {
+        "population": "sheep",
+        "scheme": "binary",
+        "files": {"labels": "w{week}.nii.gz"},
+        "weeks": [21, 22],
+    }
     content = {
         "name": "mine",
         "title": "An atlas",

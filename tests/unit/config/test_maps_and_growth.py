@@ -6,7 +6,11 @@ from configurations import LABELLED, problems, touched
 from gyriflow.config import load
 from gyriflow.study import resolve
 
-BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, **LABELLED}, {"id": "c", "week": 22, **LABELLED}]
+BRAINS = [
+    {"id": "a", "week": 21, **LABELLED},
+    {"id": "b", "week": 22, **LABELLED},
+    {"id": "c", "week": 22, **LABELLED},
+]
 FOLDING = {"end_week": 24}
 
 

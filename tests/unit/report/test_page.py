@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from markupsafe import Markup
 
+from gyriflow.io.yaml_files import read_yaml
 from gyriflow.parameters.terms import SPREAD_UNKNOWN
 from gyriflow.report.page import (
     brains_table,
@@ -21,8 +22,10 @@ from gyriflow.report.page import (
     sections,
     shown_figures,
     verdict,
+    worth_told,
 )
 from gyriflow.report.tables import html_table, resolution_over_steps
+from gyriflow.shipped import SHIPPED
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
 BRAINS = [
@@ -148,6 +151,57 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     assert alone.startswith("No real brain of the same population")
     assert alone.endswith("No step has warned.")
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
+
+
+WORTH = read_yaml(SHIPPED / "norms" / "predictions.yaml")
+
+
+def foretold(weeks: float) -> dict:
+    """Return what the report of a prediction is given, so many weeks ahead of 22 GW."""
+    atlas = {"title": "An atlas", "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None}}
+    atlas["licence"] = {"name": "CRL licence", "url": None, "terms": "Research only.", "accept": True}
+    return {
+        "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks, "beside": "crl-30", "beside_week": 30,
+        "growth_of": "the atlas crl", "atlas": atlas, "worth": WORTH,
+        "surfaces": ["results/a.surf.gii"], "labels": "results/a_dseg.nii.gz",
+    }  # fmt: skip
+
+
+def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_where_it_is():
+    figures = shown("weekly_figure", "predicted_figure", caption="of *all*")
+    metrics = pd.concat([METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)])
+    text = " ".join(page(figures, validation=None, prediction=foretold(7.5), metrics=metrics).split())
+    parts = (
+        "Prediction of young to 29.5 GW, by the growth of the atlas crl</h1>",
+        *("A prediction, not a scan. 8 weeks", "7.5 weeks later", "210.5", "What such predictions were worth"),
+        *("norms/predictions.yaml", "results/a.surf.gii", "results/a_dseg.nii.gz"),
+        *("Cite: A. et al., doi 10.1/x.", "CRL licence. Research only.", "<h2>Brains"),
+    )
+    order = [text.index(part) for part in parts]
+    assert order == sorted(order)
+    # no table of dashes, and the other figure in its section
+    assert "<h3>Runs" not in text
+    assert "<h2>weekly_figure" in text
+    assert "<h3>Runs" in page(figures, prediction=foretold(7.5))
+
+
+def test_a_prediction_beyond_those_that_were_tried_says_so():
+    last = max(row["horizon"] for row in WORTH["rows"])
+    assert "None was tried" not in worth_told(foretold(last))
+    assert f"{last:g} weeks ahead such" in worth_told(foretold(last + 1))
+    assert f"None was tried {last + 1:g} weeks ahead." in worth_told(foretold(last + 1))
+
+
+def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_beside_simpler_ways():
+    rows = pd.DataFrame(WORTH["rows"])
+    assert (rows.groupby("horizon")["start"].nunique() == 2).all()
+    assert not rows.duplicated(["start", "horizon", "model"]).any()
+    by_way = rows.pivot_table("distance_mm", ["start", "horizon"], "model")
+    assert set(by_way) == {"run", "atlas", "atlas_deformed", "scaled"}
+    assert by_way.notna().all(axis=None)
+    # a prediction that is worth less than no folding would not be shipped
+    assert (by_way["run"] < by_way["scaled"]).all()
+    assert rows["r_shape_index"].between(0, 1).all()
 
 
 def test_paths_are_hidden():

@@ -48,6 +48,13 @@ def test_up_is_superior_and_in_the_top_view_anterior():
         assert 0 < width[:30].max() < width[-30:].max()
 
 
+def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
+    real = {"start": BRAIN, "then": box((24, 34, 24)), "atlas": BRAIN}
+    figure = runs_by_week({}, real, views=("left", "top"), measured="", predicted="then")
+    tones = [tone(picture(figure, number)) for number in range(6)]
+    assert [blue > red for red, _, blue in tones] == 2 * [False, True, False]
+
+
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
     small, large = BRAIN, box((60, 80, 60))
     figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))

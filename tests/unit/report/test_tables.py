@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gyriflow.report.tables import html_table, metrics_table, resources, runs_table
+from gyriflow.report.labels import SIMPLER_WAYS
+from gyriflow.report.tables import html_table, metrics_table, predicted_table, resources, runs_table, worth_table
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 
@@ -44,6 +45,38 @@ def test_metrics_of_the_last_common_week_stand_with_the_difference_from_the_meas
     # without measured brains those of the last week
     table = metrics_table(metrics(("thin", 22.0, "area", 110.0), ("thin", 23.0, "area", 120.0)))
     assert table.loc["pial area (cm²)", ["thin", "thin, difference (%)"]].tolist() == [120.0, "–"]
+
+
+def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nearest_week():
+    rows = [
+        *(("s", "real", 22.4, "area", 100.0), ("s", "a", 29.9, "area", 210.0), ("s", "a", 22.4, "area", 101.0)),
+        *(("atlas30", "real", 30.0, "area", 200.0), ("atlas29", "real", 29.0, "area", 190.0)),
+        *(("s", "a", 29.9, "volume", 150.0), ("s", "a", 29.9, "crossing_faces", 0.0)),
+    ]
+    units = {"area": "cm2", "volume": "mL"}
+    table = [(brain, run, week, "whole", name, value, units.get(name, "1")) for brain, run, week, name, value in rows]
+    of = {"run": "a", "brain": "s", "start_week": 22.4, "week": 29.9, "beside": "atlas30", "beside_week": 30}
+    found = predicted_table(pd.DataFrame(table, columns=COLUMNS), of)
+    assert list(found) == [
+        "start, 22.4 GW", "predicted, 29.9 GW", "the atlas' own brain, 30 GW", "predicted less the atlas' (%)"
+    ]  # fmt: skip
+    assert found.loc["pial area (cm²)"].tolist() == [100.0, 210.0, 200.0, "+5.0"]
+    # what a brain has not is a dash
+    assert found.index.tolist() == ["pial area (cm²)", "volume (mL)"]
+    assert found.loc["volume (mL)"].isna().tolist() == [True, False, True, False]
+
+
+def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span():
+    names = ["start", "horizon", "model", "distance_mm", "r_shape_index", "area_error", "volume_error"]
+    rows = [
+        ("crl", 2.0, "run", 0.2, 0.8, -0.02, np.nan), ("wu", 2.0, "run", 0.3, 0.9, 0.01, np.nan),
+        ("crl", 2.0, "atlas", 0.5, 0.4, 0, 0), ("wu", 2.0, "atlas", 0.7, 0.4, 0, 0),
+    ]  # fmt: skip
+    (row,) = worth_table({"rows": [dict(zip(names, row, strict=True)) for row in rows]}).to_dict("records")
+    assert list(row.items()) == [
+        *(("distance (mm)", "0.20 to 0.30"), ("r", "0.80 to 0.90"), ("area (%)", "−2.0 to +1.0"), ("volume (%)", "–")),
+        (SIMPLER_WAYS["atlas"], "0.50 to 0.70 mm, r 0.40"),
+    ]
 
 
 def test_runs_table_puts_what_differs_first():

@@ -1,0 +1,100 @@
+"""What predictions are worth by horizon: a normal atlas' brain of 22 GW, grown to 34 GW by the growth of another.
+
+    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --write norms/predictions.yaml
+
+CRL and CHINESE are the folders with the labels of these two atlases, which are not part of gyriflow. In FOLDER each
+start has a study of its own; the same command goes on after an interruption. All weeks of an atlas give its growth; the
+brains of every second week of the other tell what the prediction is worth. The last line is one JSON object, which
+`--write` writes as YAML: for each start, horizon (GW) and model the columns of `results/study/prediction.csv` that
+`NUMBERS` names.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+from calibration import call
+
+from gyriflow.config.atlas import ATLASES
+from gyriflow.io.files import read_json, read_table, write_text
+from gyriflow.io.yaml_files import read_keys
+
+WEEKS = range(22, 35)
+GROWN_BY = {"crl": "chinese", "chinese": "crl"}
+MODELS = ("run", "atlas", "atlas_deformed", "scaled")
+NUMBERS = {"distance_mm": 3, "r_shape_index": 3, "area_error": 4, "volume_error": 4}
+RUN = "predicted"
+HEAD = """\
+# What predictions were worth on brains whose later scan was known, by horizon (weeks): distance of the surfaces, r of
+# the shape index, errors of area and volume as fractions of the real brain's. Written by benchmarks/horizon.py.
+"""
+NOTE = "The Chinese brain of 26 GW is 14 % smaller than the weeks around it suggest; no way of predicting meets that."
+
+
+def study(start: str, folders: dict[str, Path], edge_mm: float) -> dict[str, Any]:
+    """Return the configuration of a prediction from the first brain of an atlas."""
+    weeks = {start: list(WEEKS[::2]), GROWN_BY[start]: list(WEEKS)}
+    own = {"accept_licence": True}
+    return {
+        "atlas": [own | {"name": name, "folder": str(folders[name]), "weeks": weeks[name]} for name in weeks],
+        "start": f"{start}-{WEEKS[0]}",
+        "mesh": {
+            "order": 1,
+            "mesher": "tetgen",
+            "surface_edge_mm": edge_mm,
+            "max_surface_distance_mm": 0.5,
+            # a coarse mesh of a detailed surface has flat elements
+            "min_radius_ratio": 0.005,
+        },
+        "folding": {"preset": "expected", "end_week": WEEKS[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
+        "runs": {RUN: {}},
+    }
+
+
+def rows(folder: Path, start: str) -> list[dict[str, Any]]:
+    """Return the numbers of a finished study, rounded."""
+    table = read_table(folder / "results" / "study" / "prediction.csv").sort_values("horizon", kind="stable")
+    return [
+        {"start": start, "horizon": float(row["horizon"]), "model": row["model"]}
+        | {name: round(float(row[name]), digits) for name, digits in NUMBERS.items()}
+        for row in table[table["model"].isin(MODELS)].to_dict("records")
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    for name in GROWN_BY:
+        parser.add_argument(f"--{name}", type=Path, required=True)
+    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--edge", type=float, default=0.9, help="edges of the mesh (mm)")
+    parser.add_argument("--write", type=Path)
+    arguments = parser.parse_args()
+    folders = {name: getattr(arguments, name).resolve() for name in GROWN_BY}
+    found, elements = [], []
+    for start in GROWN_BY:
+        folder = arguments.folder.resolve() / start
+        folder.mkdir(parents=True, exist_ok=True)
+        call(folder, study(start, folders, arguments.edge), "results/study/prediction.csv", arguments.cores)
+        found += rows(folder, start)
+        summary = read_json(folder / f"results/runs/{RUN}/{start}-{WEEKS[0]}/folding/summary.json")
+        elements.append(int(summary["tets"]))
+    atlases = {name: read_keys(ATLASES / name / "atlas.yaml")["reference"] for name in GROWN_BY}
+    result = {
+        "source": "benchmarks/horizon.py",
+        "references": [f"{one['citation']}, {one.get('doi') or one['url']}" for one in atlases.values()],
+        "note": NOTE,
+        "start_week": WEEKS[0],
+        "mesh": {"order": 1, "surface_edge_mm": arguments.edge, "elements": elements},
+        "rows": found,
+    }
+    if arguments.write:
+        text = yaml.safe_dump(result, sort_keys=False, width=10_000, default_flow_style=None, allow_unicode=True)
+        write_text(arguments.write, HEAD + text)
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()
