@@ -55,7 +55,7 @@ def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
     # a small one has what every job needs
     asked = reference(STUDY)
     assert job_limits(*asked) == (2000, 60)
-    asked = reference(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 2}})
+    asked = reference(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 4}})
     needs = folding_needs(*asked)
     assert job_limits(*asked) == pytest.approx((2 * needs.memory_mib, needs.seconds / 60), abs=1)
 
