@@ -57,7 +57,7 @@ def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
     assert job_limits(*asked) == (2000, 60)
     asked = reference(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 4}})
     needs = folding_needs(*asked)
-    assert job_limits(*asked) == pytest.approx((2 * needs.memory_mib, needs.seconds / 60), abs=1)
+    assert job_limits(*asked) == pytest.approx((2 * needs.memory_mib, 2 * needs.seconds / 4 / 60), abs=1)
 
 
 def test_the_memory_of_a_surface_follows_the_header(tmp_path):
