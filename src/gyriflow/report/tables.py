@@ -273,7 +273,7 @@ def worth_table(worth: Mapping[str, Any]) -> pd.DataFrame:
         distance, r = span(rows["distance_mm"]), span(rows["r_shape_index"])
         if model == "run":
             errors = {f"{size} (%)": span(100 * rows[f"{size}_error"], "+.1f") for size in ("area", "volume")}
-            table[horizon] = {"distance (mm)": distance, "r": r} | errors | table.get(horizon, {})
+            table[horizon] = {"prediction: distance (mm)": distance, "r": r} | errors | table.get(horizon, {})
         else:
             table.setdefault(horizon, {})[SIMPLER_WAYS[str(model)]] = f"{distance} mm, r {r}"
     return pd.DataFrame.from_dict(table, orient="index").rename_axis("weeks ahead")

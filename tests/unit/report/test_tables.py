@@ -74,7 +74,8 @@ def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span
     ]  # fmt: skip
     (row,) = worth_table({"rows": [dict(zip(names, row, strict=True)) for row in rows]}).to_dict("records")
     assert list(row.items()) == [
-        *(("distance (mm)", "0.20 to 0.30"), ("r", "0.80 to 0.90"), ("area (%)", "−2.0 to +1.0"), ("volume (%)", "–")),
+        *(("prediction: distance (mm)", "0.20 to 0.30"), ("r", "0.80 to 0.90")),
+        *(("area (%)", "−2.0 to +1.0"), ("volume (%)", "–")),
         (SIMPLER_WAYS["atlas"], "0.50 to 0.70 mm, r 0.40"),
     ]
 

@@ -9,6 +9,7 @@ from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import resolve
+from gyriflow.study.figures import figures_of
 from gyriflow.study.paths import CURVES, FOLDING
 
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
@@ -358,7 +359,8 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
 
 
 def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
-    described = study(of_two(22.4), **EXPECTED, folding={"end_week": 23.9}).described_prediction
+    found = study(of_two(22.4), **EXPECTED, folding={"end_week": 23.9})
+    described = found.described_prediction
     at = "results/runs/a/own22.4/surfaces/week-23.90"
     assert described | {"surfaces": described["surfaces"][:1]} == {
         **{"run": "a", "brain": "own22.4", "start_week": 22.4, "week": 23.9, "beside": "b24", "beside_week": 24},
@@ -366,7 +368,12 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         **{"growth_of": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
-    # nor is one that its own later brains explain, or a study of several runs
+    (drawn,) = (figure for figure in figures_of(found) if figure.name == "predicted_figure")
+    headings = ["start\n22.4 GW", "predicted\n23.9 GW", "atlas' own brain\n24 GW"]
+    shown = [surface("own22.4"), f"{at}/pial.surf.gii", surface("b24")]
+    assert list(drawn.inputs["real"].items()) == list(zip(headings, shown, strict=True))
+    assert drawn.options["predicted"] == headings[1]
+    # no prediction is one that its own later brains explain, or a study of several runs
     assert study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).described_prediction is None
     assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).described_prediction is None
 
