@@ -99,8 +99,12 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of one label volume: its id, file and scheme; InputError where that is unknown or not one."""
     if scheme not in (None, *SCHEMES):
         raise InputError(f"--scheme: found {scheme!r}; {nearest(str(scheme), SCHEMES)}")
-    entry = {"id": _id(file), "labels": str(file), "scheme": UNSET}
-    brain = Recognised(entry, fits=scheme_fits(read_label_volume(file).labels))
+    entry, fits = {"id": _id(file), "labels": str(file), "scheme": UNSET}, scheme_fits(read_label_volume(file).labels)
+    fitting = [name for name, against in fits.items() if not against]
+    if scheme and fitting and scheme not in fitting:
+        problem = f"has labels that lie as those of {' or '.join(fitting)}, not as those of {scheme}"
+        raise InputError(problem, path=file, found=fits.get(scheme) or "labels that it does not know")
+    brain = Recognised(entry, fits=fits)
     choose_schemes([brain], scheme)
     if brain.notes:
         raise InputError("has labels of an unknown scheme", path=file, found=brain.notes[0], remedy="Name --scheme")

@@ -147,6 +147,7 @@ def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path
         ("30", ["--atlas", "crl"], "For non-commercial education and research only"),
         ("30", ["--atlas", "crk"], "did you mean crl?"),
         ("25", ["--scheme", "feta"], "--scheme: found 'feta'; did you mean feta-7?"),
+        ("25", ["--scheme", "feta-7"], "lie as those of spina-bifida-atlas, not as those of feta-7"),
         ("25", ["--folder", "nowhere"], "Directory 'nowhere' does not exist"),
     ],
 )
