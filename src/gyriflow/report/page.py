@@ -28,9 +28,9 @@ FIRST = ("predicted_figure", "weekly_figure")
 OF_BRAINS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """The metrics in the row of a brain."""
 NORM_WORDS = {
-    "ok": "Below a number: its centile (z) at this age among the other subjects of the norm, {norm}.",
-    SPREAD_UNKNOWN: "Below a number: its difference from the curve of the norm, {norm}, whose brains are averages, one "
-    "a week. How far individuals spread around such a curve is unknown: no centile can be given.",
+    "ok": "Below a number: its centile (z) at this age among the norm's other subjects.",
+    SPREAD_UNKNOWN: "Below a number: its difference from the curve of the norm ({norm}), whose brains are averages, "
+    "one a week. How far individuals spread around such a curve is unknown: no centile can be given.",
     "too few brains": "There are too few subjects for centiles: a curve over the weeks takes six others.",
 }
 """What is said of numbers by how brains stand among the norm."""
@@ -220,7 +220,7 @@ def brains_table(
     )
     scored = scored[["subject", "metric"]].assign(stands=standing(scored))
     whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"stands": ""})
-    cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", str(row.stands)) for row in whole.itertuples()}
+    cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", row.stands, "whole") for row in whole.itertuples()}
     heads = {name: with_unit(METRICS[name], unit) for name, unit in zip(whole["metric"], whole["unit"], strict=True)}
     rows = []
     for brain in brains:
@@ -228,22 +228,24 @@ def brains_table(
         row: dict[str, Any] = {"": picture(*pictures[key], key)} if key in pictures else {"": ""} if pictures else {}
         row["brain"] = _described(brain, linked=key in pictures)
         row |= {head: cells.get((key, name), "–") for name, head in heads.items()}
-        rows.append(row | {"verdict": judged.loc[key, "verdict"], "warnings": causes[key] or "none"})
+        verdict = Markup('<span class="verdict {0}">{0}</span>').format(judged.loc[key, "verdict"])
+        rows.append(row | {"verdict": _above(verdict, causes[key])})
     return pd.DataFrame(rows)
 
 
 def _described(brain: Mapping[str, Any], *, linked: bool) -> Markup:
-    """Return a brain's name, as a link to its page, above its age, population, source, licence and covariates."""
+    """Return a brain's name, as a link to its page, above its age, population, covariates, source and licence."""
     name = Markup('<a href="brains/{0}.html">{0}</a>' if linked else "{}").format(brain["id"])
     population = brain["population"] or ("synthetic" if brain["synthetic"] else "")
-    licence = brain["licence"] or ("made here" if brain["synthetic"] else "your own data")
+    licence = brain["licence"] or ("made here" if brain["synthetic"] else "" if linked else "your own data")
     covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
-    said = filter(None, [week_label(brain["week"]), population, *covariates, brain["source"], licence])
+    source = "" if linked else brain["source"]
+    said = filter(None, [week_label(brain["week"]), population, *covariates, source, licence])
     return _above(name, "; ".join(said))
 
 
-def _above(text: str, below: str) -> Markup:
-    return Markup('{}<br><span class="pale">{}</span>').format(text, below)
+def _above(text: str, below: object, kind: str = "") -> Markup:
+    return Markup('{}<br><span class="pale {}">{}</span>').format(text, kind, below)
 
 
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:

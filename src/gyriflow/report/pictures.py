@@ -63,7 +63,7 @@ ZONE_COLOURS = {
     "medial wall": "#8C6D31",
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
-SMALL_DEEP_MM, SMALL_PER_MM, SMALL_PER_INCH = 10.0, 4.0, 400
+SMALL_DEEP_MM, SMALL_PER_MM, SMALL_PER_INCH = 5.0, 4.0, 400
 """Of small pictures: the end of the scale of depth, and dots per mm of the brain and per inch of the print."""
 TINTS = (0.0, 0.4, 0.7)
 """How far towards white the colours of further regions are."""

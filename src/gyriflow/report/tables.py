@@ -103,30 +103,6 @@ def _signed(percent: float, unit: str = "") -> str:
     return "–" if np.isnan(percent) else f"{percent:+z.1f}".replace("-", "−").replace("+0.0", "0.0") + unit
 
 
-def region_table(regions: pd.DataFrame, asymmetry: pd.DataFrame) -> pd.DataFrame:
-    """Return metrics by region: a row per brain, run, week and region, left, right and asymmetry of each metric.
-
-    Parameters
-    ----------
-    regions : columns subject, run, week, hemisphere, region, metric, value, unit
-    asymmetry : columns subject, run, week, region, metric, asymmetry_index
-    """
-    index = ["subject", "run", "week", "region"]
-    regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
-    names = _named(regions)
-    left_right = regions.assign(column=names + ", " + regions["hemisphere"])
-    wide = left_right.pivot_table("value", index, "column", aggfunc="first")
-    of_regions = asymmetry[asymmetry["region"].isin(set(regions["region"]))]
-    indices = of_regions.pivot_table("asymmetry_index", index, "metric", aggfunc="first")
-    order = []
-    for metric, name in dict(zip(regions["metric"], names, strict=True)).items():
-        heading = f"{METRICS.get(metric, plain(metric))}, asymmetry"
-        wide[heading] = indices.get(metric, np.nan)
-        order += [f"{name}, left", f"{name}, right", heading]
-    brains = pd.MultiIndex.from_frame(regions[index].drop_duplicates())
-    return wide.reindex(index=brains, columns=order).rename_axis(["brain", "run", "week (GW)", "region"])
-
-
 def standing(centiles: pd.DataFrame) -> list[str]:
     """Return where each row of a table of centiles stands: "centile (z)", the difference from the norm in %, or "–"."""
     away = (centiles["value"] / centiles["expected"] - 1).where(centiles["metric"] != AROUND_ZERO)
@@ -152,9 +128,9 @@ def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
     scores = centiles[own & (centiles["hemisphere"] == "whole")].assign(name=_named)
     if len(scores):
         scores = scores.assign(stands=standing(scores)).set_index("name")
-        table = table.assign(norm=scores["expected"], **{"centile (z) or difference": scores["stands"]})
-        table["note"] = scores["flag"]
-    return table.rename_axis("metric")
+        stands = {"centile (z) or difference": scores["stands"], "note": scores["flag"]}
+        table = table.assign(norm=scores["expected"], **stands)
+    return table.dropna(how="all").rename_axis("metric")
 
 
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:

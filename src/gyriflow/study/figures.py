@@ -293,12 +293,10 @@ def _of_regions(study: Study) -> Iterator[Figure]:
         for one, name in zip(study.folded, run_names(study.pairs), strict=True)
         if one.has_regions
     }
-    if not rows:
-        return
-    rows = {brain.id: brain.measured for brain in brains} | rows
-    sides = {heading: _regions(row) for heading, row in rows.items()}
-    yield Figure("regions_figure", f"{OF_STUDY}/regions.png", "pictures.regions_picture", {"brains": sides})
-    yield Figure("regions_table", f"{STUDY}/regions.html", "tables.region_table", tables)
+    if rows:
+        rows = {brain.id: brain.measured for brain in brains} | rows
+        sides = {heading: _regions(row) for heading, row in rows.items()}
+        yield Figure("regions_figure", f"{OF_STUDY}/regions.png", "pictures.regions_picture", {"brains": sides})
 
 
 def _of_validation(study: Study) -> Iterator[Figure]:
