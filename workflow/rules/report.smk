@@ -68,8 +68,15 @@ OF_PAGES = dict(
     page=f"{PAGE}/page.html",
     style=f"{PAGE}/style.css",
 )
-OF_BRAINS = ("quality", "brain")
 PAGE_OF_BRAIN = "results/report/brains/{brain}.html"
+
+
+def figures_on_page(brain=None):
+    """Return rule, path and names of the figures on the page of a brain, or on that of the study."""
+    alone = [figure for figure in FIGURES if figure.target in ("quality", "brain")]
+    others = [figure for figure in FIGURES if figure.target not in ("", "small", "quality", "brain")]
+    shown = [figure for figure in alone if figure.names["brain"] == brain] if brain else others
+    return [(figure.name, figure.path, dict(figure.names)) for figure in shown]
 
 
 rule html_report:
@@ -92,11 +99,7 @@ rule html_report:
     output:
         "results/report/report.html",
     params:
-        figures=[
-            (figure.name, figure.path, dict(figure.names))
-            for figure in FIGURES
-            if figure.target not in ("", "small", *OF_BRAINS)
-        ],
+        figures=figures_on_page(),
         brains=study.described_brains,
         prediction=study.described_prediction,
         pictured=list(study.brains),
@@ -109,20 +112,12 @@ rule html_report:
 # the report of one brain
 rule brain_page:
     input:
-        lambda w: [
-            figure.path
-            for figure in FIGURES
-            if figure.target in OF_BRAINS and figure.names["brain"] == w.brain
-        ],
+        lambda w: [path for _, path, _ in figures_on_page(w.brain)],
         **OF_PAGES,
     output:
         PAGE_OF_BRAIN,
     params:
-        figures=lambda w: [
-            (figure.name, figure.path, dict(figure.names))
-            for figure in FIGURES
-            if figure.target in OF_BRAINS and figure.names["brain"] == w.brain
-        ],
+        figures=lambda w: figures_on_page(w.brain),
         brains=lambda w: [brain for brain in study.described_brains if brain["id"] == w.brain],
         pictured=None,
         norm=rules.html_report.params.norm,
