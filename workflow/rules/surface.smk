@@ -24,10 +24,10 @@ def pial_settings(wildcards):
     given = study.brains[wildcards.brain].given
     if given.source == "shape":
         return {}
-    names = ["edge_length_mm"]
-    if not given.has_labels:
-        names += ["max_hole_mm"]
-    return surface_settings(*names)
+    names = ["edge_length_mm", "open_sulci" if given.has_labels else "max_hole_mm"]
+    # elements are wider than slits, and contact keeps walls apart by the smallest gap of the start's mesh
+    folded = study.brains[wildcards.brain] in study.starts
+    return surface_settings(*names) | ({"open_sulci": False} if folded and given.has_labels else {})
 
 
 # a simple shape in the place of a brain

@@ -11,16 +11,17 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0], *params.given.values()):
     surface, pose = read_surface(files.surface), read_pose(files.report)
+    fissure = read_json(files.report)["fissure_x_mm"]
     if labels := params.given.get("labels"):
         volume, scheme = read_label_volume(labels, affine_from=params.affine_from, cropped=True), params.scheme
-        known = volume.labels, volume.affine, LabelScheme(**scheme), surface, pose
+        known = volume.labels, volume.affine, LabelScheme(**scheme), surface, pose, fissure
         thickness = thickness_from_labels(*known)
     else:
         whites = {
             side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)
             for side, path in params.given.items()
         }
-        thickness = thickness_from_white(surface, pose, read_json(files.report)["fissure_x_mm"], whites)
+        thickness = thickness_from_white(surface, pose, fissure, whites)
     write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
     write_vertex_maps(output.measured, {"thickness_mm": thickness.measured_mm})
     write_json(output.report, thickness.report)

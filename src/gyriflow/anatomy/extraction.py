@@ -324,7 +324,7 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
     while given_back and len(places):
         waiting = []
         for i, j, k in places:
-            if _is_simple(mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2].tobytes()):
+            if is_simple(mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2].tobytes()):
                 mask[i, j, k] = ~mask[i, j, k]
             else:
                 waiting.append((i, j, k))
@@ -334,7 +334,7 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
 
 
 @lru_cache(maxsize=2**16)
-def _is_simple(around: bytes) -> bool:
+def is_simple(around: bytes) -> bool:
     voxels = np.frombuffer(around, dtype=bool).reshape(3, 3, 3)
     inside, outside = voxels & EDGE_NEIGHBOURS, ~voxels
     inside[1, 1, 1] = outside[1, 1, 1] = False

@@ -29,6 +29,7 @@ from .extraction import (
     Mask,
     isosurface,
     main_parts,
+    make_simple,
     refine,
     remove_bridges,
     smooth_mask,
@@ -81,6 +82,7 @@ from .pose import (
     pose_of_volume_by_shape,
 )
 from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
+from .sulci import open_shut_sulci
 
 log = logging.getLogger(__name__)
 
@@ -131,6 +133,7 @@ def from_labels(
     *,
     week: float,
     edge_length_mm: float = 1.0,
+    open_sulci: bool = False,
 ) -> PialSurface:
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
@@ -191,6 +194,19 @@ def from_labels(
     if scheme.cortex:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
+    if open_sulci:
+        sulci: dict[str, Any] = {"left_shut": "the labels have no white matter"}
+        if scheme.cortex and np.isin(tissue, scheme.white_matter).any():
+            # handles are cheaper to find before voxels are made finer
+            simple, repaired = make_simple(field, cerebrum.smallest_part)
+            gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
+            opened_ml -= gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+            field, affine, sulci = open_shut_sulci(simple, affine, core, fissure)
+            sulci["repaired_before"] = repaired
+        if why := sulci.get("left_shut"):
+            warnings += logged([f"sulci that the labels keep shut were not opened: {why}"])
+        opened_ml += sulci.get("opened_mL", 0.0)
+        report["sulci"] = sulci
     even = surface_of_mask(
         field,
         affine,

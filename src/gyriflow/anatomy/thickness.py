@@ -26,6 +26,8 @@ log = logging.getLogger(__name__)
 # surface where voxels outside are not much further
 NEAR_VOXELS = 1.0
 FARTHEST_VOXELS = 1.5
+# an opened fissure is this near to its plane
+FISSURE_REACH_MM = 3.0
 # a layer thinner than this part of a voxel is none
 THINNEST_VOXELS = 1 / 3
 LEAST_VOXELS = 1.5
@@ -57,14 +59,17 @@ class Thickness:
         return np.where(self.measured, self.values_mm, np.nan)
 
 
-def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats) -> Thickness:
+def cortical_thickness(
+    pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, fissure_x_mm: float | None = None
+) -> Thickness:
     """Return the cortical thickness at the vertices of a pial surface; InputError where it has no cortex under it.
 
     The inner border is the isosurface of the smoothed mask of the cerebrum without its cortex, which lies between
     voxels as the pial surface does. The thickness at a vertex is the mean of two distances: from the vertex to the
     nearest point of the inner border, and from there to the nearest point of the pial surface (Fischl & Dale 2000,
     doi 10.1073/pnas.200033797). It is not measured where the surface has no cortex under it (corpus callosum,
-    brainstem), and where a fissure that the labels hide was opened.
+    brainstem), and where a fissure that the labels hide was opened. Where `fissure_x_mm` tells where that is, it is
+    measured in sulci that were opened.
 
     `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
     its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over the
@@ -82,6 +87,8 @@ def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine:
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points) for mask in (~cortex, cerebrum)
     )
     at_labels, over_cortex = to_outside < FARTHEST_VOXELS * voxel, to_cortex < NEAR_VOXELS * voxel
+    if fissure_x_mm is not None:
+        at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
     measured = at_labels & over_cortex & (values >= THINNEST_VOXELS * voxel)
     if not measured.any():
         raise InputError(
@@ -99,15 +106,21 @@ def cortical_thickness(pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine:
 
 
 def thickness_from_labels(
-    labels: Labels, affine: Floats, scheme: LabelScheme, surface: TriangleMesh, pose: Pose
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    surface: TriangleMesh,
+    pose: Pose,
+    fissure_x_mm: float | None = None,
 ) -> Thickness:
     """Return the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
 
-    `surface` is the whole one, posed by `pose`; the scheme has to separate cortex from the tissue inside.
+    `surface` is the whole one, posed by `pose` with its fissure at `fissure_x_mm`; the scheme has to separate cortex
+    from the tissue inside.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     cortex = np.isin(cerebrum.tissue, scheme.cortex)
-    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine)
+    thickness = cortical_thickness(surface, cerebrum.mask, cortex, cerebrum.affine, fissure_x_mm)
     mean = thickness.report["mean_mm"]
     log.info("cortical thickness: %.2f mm on average", mean)
     if not USUAL_MM[0] <= mean <= USUAL_MM[1]:

@@ -384,7 +384,11 @@ class Study:
     @property
     def method(self) -> dict[str, Any]:
         """What the text of the methods says of the configuration: its brains, and settings by section."""
-        named = {"surface": {"edge_length_mm"}, "mesh": {"mesher", "order"}, "metrics": {"curvature_radius_mm"}}
+        named = {
+            "surface": {"edge_length_mm", "open_sulci"},
+            "mesh": {"mesher", "order"},
+            "metrics": {"curvature_radius_mm"},
+        }
         brains = [brain for brain in self.described_brains if brain["id"] in self.brains]
         return {"brains": brains, **self.config.model_dump(mode="json", include=named)}
 

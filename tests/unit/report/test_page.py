@@ -304,7 +304,7 @@ def test_the_methods_say_what_was_run():
             {"run": "own", "start": "a", "growth_of": "own", "parameters": led, "summary": summary},
         ],
         software={"gyriflow": "0.1", "packages": packages},
-        surface={"edge_length_mm": 0.8},
+        surface={"edge_length_mm": 0.8, "open_sulci": True},
         mesh={"order": 2, "mesher": "tetgen"},
         metrics={"curvature_radius_mm": 3.0},
     )
@@ -312,9 +312,15 @@ def test_the_methods_say_what_was_run():
         "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
     )
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
+    assert "Sulci that labels keep shut were opened, but in start brains, by slits" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
-    nothing = {"brains": [], "runs": [], "surface": {"edge_length_mm": 1}, "metrics": {"curvature_radius_mm": 3}}
+    nothing = {
+        "brains": [],
+        "runs": [],
+        "surface": {"edge_length_mm": 1, "open_sulci": False},
+        "metrics": {"curvature_radius_mm": 3},
+    }
     nothing["brains"] = [{"week": 21.0, "population": None, "source": "labels", "synthetic": False}]
     alone = methods_text(
         (PAGE / "methods.rst").read_text(), software={"gyriflow": "0.1", "packages": packages}, **nothing

@@ -1,0 +1,123 @@
+"""Sulci that voxels keep shut, on bodies of known area, depth and thickness and on shipped brains.
+
+`python benchmarks/open_sulci.py [FOLDER …]`: phantoms, and with folders of `parcellation.nii.gz` in the labels of the
+spina bifida atlas, named by their week, the pial area over the cortex's volume by its thickness.
+"""
+
+import json
+import re
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial.transform import Rotation
+
+from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.pial import from_labels
+from gyriflow.anatomy.repair import surface_of_mask
+from gyriflow.anatomy.sulci import open_shut_sulci
+from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
+from gyriflow.geometry.triangles import area, convex_hull, euler_number, vertex_areas
+from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.metrics.gyrification import sulcal_depth
+
+# a ball with sulci all round it, at x = ±X + A sin(y/L), all in mm
+RADIUS_MM, DEPTH_MM, THICKNESS_MM = 20.0, 6.0, 2.0
+PLACES_MM, WAVE_MM, LENGTH_MM = (-6.0, 6.0), 1.5, 4.0
+WIDTHS_MM, VOXELS_MM, TURNS_DEG = (0.0, 0.2, 0.5, 1.0), (0.5, 0.8, 1.0), ((0, 0, 0), (20, 30, 10), (45, 35, 0))
+# cells into which a voxel is divided along each axis, of which most give its label
+CELLS = 3
+EDGE_MM = 1.0
+
+
+def truth() -> dict[str, float]:
+    """Return the area of the ball and of its sulci's walls, mean depth below the hull, and gyrification."""
+    step = 0.02
+    y, z = np.meshgrid(*[np.arange(-RADIUS_MM, RADIUS_MM, step)] * 2, indexing="ij")
+    stretch = np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(y / LENGTH_MM)) ** 2)
+    hull = 4.0 * np.pi * RADIUS_MM**2
+    walls = depth = 0.0
+    for place in PLACES_MM:
+        below = RADIUS_MM - np.sqrt((place + WAVE_MM * np.sin(y / LENGTH_MM)) ** 2 + y**2 + z**2)
+        wall = 2.0 * stretch * step**2 * ((below > 0) & (below < DEPTH_MM))
+        walls, depth = walls + wall.sum(), depth + (wall * below).sum()
+    whole = hull + walls
+    return {"area_mm2": whole, "depth_mm": depth / whole, "gi": whole / hull, "thickness_mm": THICKNESS_MM}
+
+
+def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]):
+    """Return the (i, j, k) masks of the body and of what is inside its cortex, and their affine."""
+    count = int(np.ceil(RADIUS_MM / voxel_mm)) + 6
+    axis = np.arange(-count, count + 1) * voxel_mm + 0.13
+    cells = (axis[:, None] + voxel_mm * ((np.arange(CELLS) + 0.5) / CELLS - 0.5)).ravel()
+    turn = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
+    points = np.stack(np.meshgrid(cells, cells, cells, indexing="ij"), axis=-1) @ turn
+    below = RADIUS_MM - np.linalg.norm(points, axis=-1)
+    wave = points[..., 1] / LENGTH_MM
+    across = (points[..., 0] - WAVE_MM * np.sin(wave)) / np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(wave)) ** 2)
+    off = np.min([np.abs(across - place) for place in PLACES_MM], axis=0)
+    # the distance to the middle of the sulci less half their width, and to the outside of the ball
+    middle = (off < 0.6 * voxel_mm / CELLS) & (below < DEPTH_MM)
+    to_walls = ndimage.distance_transform_edt(~middle, sampling=voxel_mm / CELLS) - 0.5 * width_mm
+    outside = (below < 0) | ((off < 0.5 * width_mm) & (below < DEPTH_MM))
+    core = (below > THICKNESS_MM) & (to_walls > THICKNESS_MM)
+    shape = (len(axis), CELLS) * 3
+    body, core = (mask.reshape(shape).mean(axis=(1, 3, 5)) > 0.5 for mask in (~outside, core))
+    affine = np.diag([voxel_mm] * 3 + [1.0])
+    affine[:3, 3] = axis[0]
+    return body, core & body, affine
+
+
+def measured(mesh, body, core, affine) -> dict[str, float]:
+    """Return what a surface of the body has of what `truth` gives."""
+    hull, weights = convex_hull(mesh), vertex_areas(mesh)
+    thickness = cortical_thickness(mesh, body, body & ~core, affine, fissure_x_mm=-1e3)
+    depth = float(np.average(sulcal_depth(mesh, hull), weights=weights))
+    of_area = {"area_mm2": area(mesh), "depth_mm": depth, "gi": area(mesh) / area(hull)}
+    return of_area | {"thickness_mm": thickness.report["mean_mm"], "euler": euler_number(mesh)}
+
+
+def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]) -> dict:
+    """Return what today's surface of a phantom has, and that with its sulci opened."""
+    body, core, affine = phantom(width_mm, voxel_mm, turn_deg)
+    field, volume = smooth_mask(body), float(body.sum() * voxel_mm**3)
+    shut = surface_of_mask(field, affine, volume, EDGE_MM).mesh
+    field, fine, report = open_shut_sulci(field, affine, core)
+    opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
+    row = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
+    return row | {name: measured(mesh, body, core, affine) for name, mesh in (("shut", shut), ("opened", opened))}
+
+
+def try_brain(path: Path, week: float) -> dict:
+    """Return area, thickness and their ratio to the cortex's volume of a brain, its sulci shut and opened."""
+    volume, scheme, row = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"], {"week": week}
+    for name in ("shut", "opened"):
+        begin = time.process_time()
+        brain = from_labels(volume.labels, volume.affine, scheme, week=week, open_sulci=name == "opened")
+        taken = time.process_time() - begin
+        place = brain.whole, brain.pose, brain.fissure_x_mm
+        report = thickness_from_labels(volume.labels, volume.affine, scheme, *place).report
+        found = {"area_cm2": brain.report["area_cm2"]["whole"], "thickness_mm": report["mean_mm"]}
+        row[name] = found | {"area_ratio": report["area_ratio"], "euler": brain.report["euler_number"], "s": taken}
+    return row
+
+
+if __name__ == "__main__":
+    true, phantoms, brains = truth(), [], {}
+    if not sys.argv[1:]:
+        print(f"truth: {true}")
+        for voxel in VOXELS_MM:
+            for width in WIDTHS_MM:
+                for turn in TURNS_DEG:
+                    row = try_phantom(width, voxel, turn)
+                    phantoms.append(row)
+                    off = {n: {k: f"{row[n][k] / true[k] - 1:+.1%}" for k in true} for n in ("shut", "opened")}
+                    print(f"{voxel} mm voxels, {width} mm wide, turned {turn}: {off}", flush=True)
+    for folder in sys.argv[1:]:
+        week = re.findall(r"\d+", Path(folder).name)[0]
+        brains[Path(folder).name] = row = try_brain(Path(folder) / "parcellation.nii.gz", float(week))
+        print(f"{Path(folder).name}: {row}", flush=True)
+    print(json.dumps({"truth": true, "phantoms": phantoms, "brains": brains}))

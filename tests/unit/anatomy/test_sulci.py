@@ -1,0 +1,85 @@
+"""Shut sulci are opened where two banks of cortex touch, and nowhere else."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from gyriflow.anatomy.extraction import handles, smooth_mask
+from gyriflow.anatomy.fissure import Fissure, MidPlane
+from gyriflow.anatomy.repair import surface_of_mask
+from gyriflow.anatomy.sulci import open_shut_sulci
+from gyriflow.anatomy.thickness import cortical_thickness
+from gyriflow.geometry.triangles import area, euler_number
+
+VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 12.0, 2.0
+
+
+def ball():
+    """Return a ball's mask, the (i, j, k, 3) places in mm, their depth below its surface, and the affine."""
+    axis = np.arange(-22, 23) * VOXEL_MM + 0.13
+    affine = np.diag([VOXEL_MM] * 3 + [1.0])
+    affine[:3, 3] = axis[0]
+    places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    depth = RADIUS_MM - np.linalg.norm(places, axis=-1)
+    return depth > 0, places, depth, affine
+
+
+def with_sulcus(depth_mm):
+    """Return a ball with a shut sulcus all round it, in a plane that is oblique to the voxels."""
+    body, places, depth, affine = ball()
+    across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
+    to_end = np.hypot(across, np.maximum(depth - depth_mm, 0.0))
+    return body, body & (depth > THICKNESS_MM) & (to_end > THICKNESS_MM), affine
+
+
+@pytest.mark.parametrize("depth_mm", [4.0, 6.0])
+def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
+    body, core, affine = with_sulcus(depth_mm)
+    field, volume = smooth_mask(body), body.sum() * VOXEL_MM**3
+    truth = 4 * np.pi * RADIUS_MM**2 + 2 * np.pi * (RADIUS_MM**2 - (RADIUS_MM - depth_mm) ** 2)
+    shut = surface_of_mask(field, affine, volume, 1.0).mesh
+    assert area(shut) < 0.83 * truth
+    opened, fine, report = open_shut_sulci(field, affine, core)
+    assert handles(opened > 0.5) == 0
+    taken = 1e3 * report["opened_mL"]
+    even = surface_of_mask(opened, fine, volume, 1.0, taken_mm3=taken)
+    assert "remade" not in even.report
+    assert euler_number(even.mesh) == 2
+    assert area(even.mesh) == pytest.approx(truth, rel=0.06)
+    # half a millimetre wide
+    assert taken < 0.6 * (truth - area(shut)) / 2
+    found = cortical_thickness(even.mesh, body, body & ~core, affine, fissure_x_mm=-100.0)
+    assert found.measured.mean() > 0.95
+    assert found.report["mean_mm"] == pytest.approx(THICKNESS_MM, abs=0.25)
+
+
+def test_hemispheres_are_no_banks_of_a_sulcus():
+    body, core, affine = with_sulcus(6.0)
+    normal = np.array([0.8, 0.36, 0.48])
+    axes = np.linalg.svd(normal[None])[2][1:]
+    between = Fissure(MidPlane(normal, 0.0, 0.0, 0), axes, np.array([-20.0, -20.0]), np.zeros((81, 81)))
+    assert open_shut_sulci(smooth_mask(body), affine, core, between)[2]["slit_voxels"] == 0
+
+
+@pytest.mark.parametrize("kind", ["thick crest", "groove"])
+def test_cortex_without_a_second_bank_stays_whole(kind):
+    body, places, depth, affine = ball()
+    if kind == "groove":
+        # an open valley of 90°
+        body &= places[..., 2] < 4.0 + np.abs(places[..., 0])
+        depth = VOXEL_MM * (ndimage.distance_transform_edt(body) - 0.5)
+        core = body & (depth > THICKNESS_MM)
+    else:
+        # 1.2 mm thick below, 4.4 mm above
+        core = np.linalg.norm(places + [0.0, 0.0, 1.6], axis=-1) < RADIUS_MM - 2.8
+    assert open_shut_sulci(smooth_mask(body), affine, core)[2]["slit_voxels"] == 0
+
+
+def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
+    body, places, depth, affine = ball()
+    core = body & (depth > THICKNESS_MM) & (places[..., 0] > 3.0)
+    field = smooth_mask(body)
+    same, grid, report = open_shut_sulci(field, affine, core)
+    assert "of the cortex is further" in report["left_shut"]
+    np.testing.assert_array_equal(same, field)
+    np.testing.assert_array_equal(grid, affine)
