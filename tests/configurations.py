@@ -21,10 +21,19 @@ def study(brains=None, **changes):
 
 
 def touched(folder, *names):
-    """Make empty files in a folder, which it returns."""
+    """Make empty files in a folder and below, and return it."""
     for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).touch()
     return folder
+
+
+def both_kinds(folder, weeks):
+    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
+    touched(folder, "pial.surf.gii")
+    made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
+    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
+    return study([*made, *given], start="s21")
 
 
 def refusal(raw, folder="."):

@@ -23,6 +23,7 @@ PROPORTIONS = np.array([0.75, 1.0, 0.77])
 # where the brain's centre lies in the world, off the origin on purpose
 CENTRE_MM = np.array([4.3, -12.7, 8.9])
 MARGIN_MM = 6.0
+CORTEX_MM = 2.0
 # voxels for finding the size: fine across the fissure
 COARSE_MM = (0.4, 2.4, 2.4)
 # the volume is stored with axes that point posterior, inferior, right, on purpose: columns of the affine
@@ -36,14 +37,10 @@ SULCUS_WIDTH = 0.5
 
 @dataclass(frozen=True)
 class Shape:
-    """What a phantom's form depends on, in mm; the ventricles' size is relative to the brain.
-
-    Folds begin before week 21, the late ones after week 27.
-    """
+    """What a phantom's form depends on, in mm; the ventricles' size is relative to the brain."""
 
     half_length: float
     fold_depth: float
-    late_fold_depth: float
     sylvian_depth: float
     fissure: float
     ventricles: float
@@ -56,7 +53,7 @@ def cerebral_volume_ml(week: float) -> float:
 
 
 def phantom_labels(
-    week: float, *, voxel_mm: float = 0.8, seed: int = 0, cortex_mm: float = 2.0
+    week: float, *, voxel_mm: float = 0.8, seed: int = 0
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the (i, j, k) labels of a synthetic brain of 21 to 36 GW and their (4, 4) affine to RAS+ mm.
 
@@ -67,7 +64,6 @@ def phantom_labels(
     shape = Shape(
         half_length=28.0 * (cerebral_volume_ml(week) / 48.0) ** (1 / 3),
         fold_depth=0.6 + 8.4 * age**1.2,
-        late_fold_depth=6.0 * max(0.0, (week - 27.0) / 9.0),
         sylvian_depth=3.0 + 11.0 * age,
         fissure=max(2.0 + 1.5 * age, 2.5 * voxel_mm),
         ventricles=1.0 - 0.45 * age,
@@ -79,7 +75,7 @@ def phantom_labels(
         factor = (cerebral_volume_ml(week) / volume) ** (1 / 3)
         shape = Shape(**{**vars(shape), "half_length": shape.half_length * factor})
     points = _grid(shape, (voxel_mm,) * 3)
-    labels = _tissues(points, shape, seed, voxel_mm, cortex_mm)
+    labels = _tissues(points, shape, seed, voxel_mm)
     # from axes R, A, S to P, I, R
     stored = labels[:, ::-1, ::-1].transpose(1, 2, 0)
     affine = np.eye(4)
@@ -128,7 +124,7 @@ def _cerebrum(points: list[Floats], shape: Shape, seed: int) -> tuple[Mask, Floa
     depth = (outline - rho) * np.sqrt(x**2 + y**2 + z**2) / rho
     inside = depth > 0
     # folds reach only so far: the rest need not be looked at
-    shell = inside & (depth < shape.fold_depth + shape.late_fold_depth + shape.sylvian_depth)
+    shell = inside & (depth < shape.fold_depth + shape.sylvian_depth)
     inside[shell] = depth[shell] > _sulcal_depth((u[shell], v[shell], w[shell]), shape, seed)
     # a fissure that bends to and fro: with this frequency, a root of tan k = k, it has no tilt on the whole
     middle = 0.01 * half[0] * np.sin(4.493 * y / half[1])
@@ -154,11 +150,7 @@ def _sulcal_depth(directions: tuple[Floats, Floats, Floats], shape: Shape, seed:
         axis=0,
     )
     early = 0.85 * _pattern((side, v, w), 9.0, seed) + 0.5 * _pattern((u, v, w), 9.0, seed + 1)
-    folds = np.maximum(shape.sylvian_depth * sylvian, shape.fold_depth * np.exp(-((early / SULCUS_WIDTH) ** 2)))
-    if shape.late_fold_depth > 0:
-        late = 0.85 * _pattern((side, v, w), 16.0, seed + 2) + 0.5 * _pattern((u, v, w), 16.0, seed + 3)
-        folds = np.maximum(folds, shape.late_fold_depth * np.exp(-((late / SULCUS_WIDTH) ** 2)))
-    return folds
+    return np.maximum(shape.sylvian_depth * sylvian, shape.fold_depth * np.exp(-((early / SULCUS_WIDTH) ** 2)))
 
 
 def _bump(u: Floats, v: Floats, w: Floats, centre: tuple[float, float, float], width: float) -> Floats:
@@ -178,7 +170,7 @@ def _ellipsoid(points: list[Floats], centre: tuple[float, float, float], half: t
     return x**2 + y**2 + z**2 < 1.0
 
 
-def _tissues(points: list[Floats], shape: Shape, seed: int, voxel_mm: float, cortex_mm: float) -> NDArray[np.int32]:
+def _tissues(points: list[Floats], shape: Shape, seed: int, voxel_mm: float) -> NDArray[np.int32]:
     """Return the labels on the grid of `points`."""
     x, y, z = points
     a, b, c = shape.half_length * PROPORTIONS
@@ -195,9 +187,9 @@ def _tissues(points: list[Floats], shape: Shape, seed: int, voxel_mm: float, cor
         [both[0], y, z + 0.25 * y**2 / b], (0.24 * a, -0.05 * b, 0.10 * c), (0.13 * a * size, 0.50 * b, 0.15 * c * size)
     )
     labels[cerebrum & ventricles] = VENTRICLES
-    cortex = cerebrum & (ndimage.distance_transform_edt(cerebrum) * voxel_mm <= cortex_mm)
+    cortex = cerebrum & (ndimage.distance_transform_edt(cerebrum) * voxel_mm <= CORTEX_MM)
     # no cortex where the brainstem leaves the cerebrum, nor on the callosum
-    stem = ndimage.distance_transform_edt(labels != BRAINSTEM) * voxel_mm <= cortex_mm + voxel_mm
+    stem = ndimage.distance_transform_edt(labels != BRAINSTEM) * voxel_mm <= CORTEX_MM + voxel_mm
     labels[cortex & ~stem] = CORTEX
     arch = ((y / b - 0.05) / 0.50) ** 2 + ((z / c + 0.15) / 0.42) ** 2
     callosum = (np.abs(x) < 0.16 * a) & (arch > 0.72) & (arch < 1.02) & (z > -0.1 * c)

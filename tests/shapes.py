@@ -5,14 +5,14 @@ from functools import cache
 import nibabel as nib
 import numpy as np
 import trimesh
-from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage
+from nibabel.gifti import GiftiDataArray, GiftiImage
 from odd_brains import CEREBRUM, positions
 from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
-from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.geometry.triangles import TriangleMesh, vertex_normals
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""
@@ -33,6 +33,11 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
 def moved(mesh: TriangleMesh, *shift: float) -> TriangleMesh:
     """Return a surface shifted by mm along x, or x, y and z."""
     return TriangleMesh(mesh.vertices + [*shift, 0.0, 0.0][:3], mesh.faces)
+
+
+def inner(mesh: TriangleMesh, depth_mm: float) -> TriangleMesh:
+    """Return a surface whose vertices are mm further inside along their normals."""
+    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
 
 
 def sphere(radius: float = 10.0, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> TriangleMesh:
@@ -125,12 +130,8 @@ def save_labels(path, labels: np.ndarray, affine: np.ndarray) -> None:
     nib.save(image, path)
 
 
-def save_gifti(
-    path, mesh: TriangleMesh, matrix: np.ndarray | None = None, data: str = "UNKNOWN", to: str = "SCANNER_ANAT"
-) -> None:
-    """Write a GIFTI surface as it is, whatever is wrong with it, with a matrix from one space to another if given."""
+def save_gifti(path, mesh: TriangleMesh) -> None:
+    """Write a GIFTI surface as it is, whatever is wrong with it, and name no space."""
     points = GiftiDataArray(mesh.vertices.astype(np.float32), intent="NIFTI_INTENT_POINTSET")
-    if matrix is not None:
-        points.coordsys = GiftiCoordSystem(f"NIFTI_XFORM_{data}", f"NIFTI_XFORM_{to}", matrix)
     triangles = GiftiDataArray(mesh.faces.astype(np.int32), intent="NIFTI_INTENT_TRIANGLE")
     nib.save(GiftiImage(darrays=[points, triangles]), path)

@@ -1,13 +1,8 @@
 """Waves on a growing slab: the theory in its closed limits, and the solver against the theory."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from boxes import COMM
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
 from verification_cases.modes import Slab, critical_growth, growth_rates
 from verification_cases.slab import Waved, amplified, rate_error

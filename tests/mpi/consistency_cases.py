@@ -1,12 +1,7 @@
 """With layers, remembered stress, clamped facets and contact at once: forces fit the energy, stiffness the forces."""
 
-import sys
-from pathlib import Path
-
 import pytest
 from boxes import COMM
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.consistency import patch_residual, slopes_of_remainders
 
 

@@ -1,8 +1,5 @@
 """Steps of folding with contact: a closing sulcus, mirrored hemispheres, free blocks, and stress as it is written."""
 
-import sys
-from pathlib import Path
-
 import igl.predicates
 import numpy as np
 import pytest
@@ -19,6 +16,7 @@ from contact_bodies import (
     two_blocks,
 )
 from mpi4py import MPI
+from verification_cases.mirrored import folded, hemisphere
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
@@ -27,9 +25,6 @@ from gyriflow.geometry.tetrahedra import boundary_faces
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.parameters.terms import FREE
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from verification_cases.mirrored import folded, hemisphere
 
 GROWTH = 2e-7
 

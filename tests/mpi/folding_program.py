@@ -1,6 +1,5 @@
 """How tests start the folding program, and how they break it off."""
 
-import subprocess
 import sys
 
 import processes
@@ -28,9 +27,7 @@ def command(mesh, out, ranks=1, **changes):
 
 
 def fold(mesh, out, ranks=1, **changes):
-    return subprocess.run(
-        command(mesh, out, ranks, **changes), capture_output=True, text=True, timeout=300, check=False
-    )
+    return processes.ran(*command(mesh, out, ranks, **changes))
 
 
 def failing_after(steps):

@@ -2,23 +2,11 @@
 
 import numpy as np
 import pytest
-from boxes import (
-    distorted_box,
-    everywhere_known,
-    problem_on,
-    set_layers,
-    smooth_displacement,
-    zones_of,
-)
+from boxes import distorted_box, everywhere_known, problem_on, set_layers, smooth_displacement, zones_of
 from shapes import box_mesh
 
 from gyriflow.folding import linear_solver
-from gyriflow.folding.linear_solver import (
-    SHIFTED,
-    NotConvergedError,
-    TwoLevelPreconditioner,
-    positive_inverses,
-)
+from gyriflow.folding.linear_solver import SHIFTED, NotConvergedError, TwoLevelPreconditioner, positive_inverses
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 

@@ -1,11 +1,6 @@
 """The solver's errors against manufactured solutions fall as those of linear and quadratic elements must."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.manufactured import CASES, rates, solved
 
 pytestmark = [pytest.mark.slow, pytest.mark.one_rank]

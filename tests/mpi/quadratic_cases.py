@@ -2,13 +2,7 @@
 
 import numpy as np
 import pytest
-from boxes import (
-    COMM,
-    curved_box,
-    everywhere_known,
-    problem_on,
-    zones_of,
-)
+from boxes import COMM, curved_box, everywhere_known, problem_on, zones_of
 from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
 from mpi4py import MPI
 from shapes import box_mesh

@@ -1,13 +1,8 @@
 """Two hemispheres that are mirror images fold as mirror images, contact with the planes included."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from boxes import COMM
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from verification_cases.mirrored import block, folded, hemisphere, reflected_and_merged, rounded
 
 from gyriflow.geometry.tetrahedra import signed_volumes

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from folding_program import TIGHT, WEEK, command, fold, kill
+from processes import ran
 from shapes import ellipsoid_mesh
 
 from gyriflow.errors import StorageError
@@ -130,7 +131,7 @@ def test_a_map_of_the_thickness_acts_where_it_says_on_any_ranks(mesh, tmp_path):
         out = tmp_path / f"out{ranks}"
         settings = {"thickness_mm": {"map": "thickness_mm"}, "solver": TIGHT, "fields": ["cortex_weight"]}
         call = [*command(mesh, out, ranks, **settings), "--maps", str(tmp_path / "maps.h5")]
-        done = subprocess.run(call, capture_output=True, text=True, timeout=300, check=False)
+        done = ran(*call)
         assert done.returncode == 0, done.stdout + done.stderr
         ends.append(read_positions(out / "frames.h5", 21.5))
     assert np.abs(ends[0] - ends[1]).max() <= 1e-8 * np.abs(ends[0] - brain.vertices).max()
@@ -140,7 +141,7 @@ def test_a_map_of_the_thickness_acts_where_it_says_on_any_ranks(mesh, tmp_path):
 
     write_maps(tmp_path / "short.h5", {"thickness_mm": np.ones(7)})
     call[-1] = str(tmp_path / "short.h5")
-    done = subprocess.run(call, capture_output=True, text=True, timeout=300, check=False)
+    done = ran(*call)
     assert done.returncode == 2
     assert done.stderr.count("the map thickness_mm does not fit the mesh") == 1
 
@@ -173,7 +174,7 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     shutil.copytree(default_run[0], out)
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     program = [sys.executable, "-c", FULL_DISK, *command(mesh, out)[6:]]
-    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False)
+    done = ran(*program)
     assert done.returncode == 5, done.stdout + done.stderr
     assert "cannot be written" in done.stderr
     assert "Free disk space" in done.stderr

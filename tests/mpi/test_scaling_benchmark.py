@@ -1,19 +1,18 @@
 """The benchmark of time and memory against size, on its coarsest mesh."""
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import ran
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 pytestmark = pytest.mark.slow
 
 
 def test_the_same_steps_are_done_on_one_rank_and_on_two():
-    program = [sys.executable, str(BENCHMARKS / "scaling.py"), "--sizes", "40000", "--steps", "1", "--repeats", "1"]
-    done = subprocess.run(program, capture_output=True, text=True, timeout=300, check=False)
+    done = ran(sys.executable, BENCHMARKS / "scaling.py", "--sizes", "40000", "--steps", "1", "--repeats", "1")
     assert done.returncode == 0, done.stdout + done.stderr
     *lines, last = map(json.loads, done.stdout.splitlines())
     one, two = last["rows"]

@@ -1,10 +1,10 @@
 """A step ends in the exit code of its error, with one message on the terminal and in its log."""
 
 import logging
-import subprocess
 import sys
 
 import pytest
+from processes import ran
 
 from gyriflow.errors import MeshError
 from gyriflow.step import EXIT_FILE, record_exit_code, recorded_exit_code, step
@@ -77,9 +77,7 @@ def test_memory_that_ran_out_is_said_with_the_input(exit_file, tmp_path, capsys)
 def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path):
     log = tmp_path / "log"
     log.write_text("before\n")
-    end = subprocess.run(
-        [sys.executable, "-m", "gyriflow.step", "137", str(log)], capture_output=True, text=True, check=False
-    )
+    end = ran(sys.executable, "-m", "gyriflow.step", "137", str(log))
     assert end.returncode == 137
     assert "memory ran out" in end.stderr
     assert log.read_text().startswith("before\n")

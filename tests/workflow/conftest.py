@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from processes import ran
 from shapes import ellipsoid_mesh, hemisphere, phantom, save_labels
 
 from gyriflow.io.files import read_json, write_json
@@ -25,21 +26,12 @@ def labelled(week: int) -> dict:
 
 
 SMALL_STUDY = {
-    "brains": [
-        {"id": "a", "week": 21, **labelled(21)},
-        {"id": "b", "week": 22, **labelled(22)},
-    ],
+    "brains": [{"id": "a", "week": 21, **labelled(21)}, {"id": "b", "week": 22, **labelled(22)}],
     "start": "a",
     "folding": {"end_week": 22},
     "runs": {"reference": {}, "thick": {"thickness_mm": 3.0}},
 }
-COARSE = {
-    "order": 1,
-    "mesher": "tetgen",
-    "surface_edge_mm": 3.0,
-    "core_edge_mm": 5.0,
-    "max_surface_distance_mm": 1.0,
-}
+COARSE = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 3.0, "core_edge_mm": 5.0, "max_surface_distance_mm": 1.0}
 """A mesh that is made in a second."""
 
 
@@ -93,15 +85,7 @@ class Workflow:
 
     def run(self, *arguments: str, timeout_s: float = 300) -> subprocess.CompletedProcess[str]:
         """Run the launcher in the working directory."""
-        return subprocess.run(
-            self.command(*arguments),
-            cwd=self.directory,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-            check=False,
-        )
+        return ran(*self.command(*arguments), timeout_s=timeout_s, cwd=self.directory, env=self.environment)
 
     def jobs(self, *arguments: str) -> dict[str, int]:
         """Return the number of jobs per rule that a dry run plans."""

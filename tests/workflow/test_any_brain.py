@@ -9,12 +9,12 @@ from atlas_brains import atlas_halves
 from nibabel.freesurfer.io import write_geometry
 from phantoms import CENTRE_MM
 from reliability import trying
-from shapes import cerebrum_surface, phantom, rigid, save_labels
+from shapes import cerebrum_surface, inner, phantom, rigid, save_labels
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask
 from gyriflow.anatomy.repair import pieces
 from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_surface, write_surface
 
@@ -26,10 +26,6 @@ LABELS, AFFINE = phantom(voxel_mm=2.0)
 WHOLE = cerebrum_surface(LABELS, AFFINE)
 APART = odd_brains.apart(LABELS, AFFINE)
 LEFT, RIGHT = sorted(pieces(cerebrum_surface(APART, AFFINE)), key=lambda piece: piece.vertices[:, 0].mean())
-
-
-def inner(mesh, depth_mm):
-    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
 
 
 def with_polyp(mesh):
@@ -91,10 +87,7 @@ def alone(side, change):
     return made
 
 
-MOTIONS = {
-    "left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)),
-    "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0)),
-}
+MOTIONS = {"left": rigid(100, 40, -70, shift=(30.0, 0.0, -50.0)), "right": rigid(-20, 130, 60, shift=(0.0, 9.0, 0.0))}
 POSED = [flipped(transformed(half, turn)) for half, turn in zip(atlas_halves(), MOTIONS.values(), strict=True)]
 GOOD = {
     "plain": labelled(),

@@ -15,12 +15,7 @@ pytestmark = pytest.mark.slow
 
 VOLUME_ML = 4 / 3 * np.pi * HALF_AXES.prod() / 1e3
 LEFT, RIGHT = hemisphere(-1), hemisphere(1)
-MESHING = {
-    "surface_edge_mm": 4.0,
-    "core_edge_mm": 10.0,
-    "envelope_mm": 0.1,
-    "max_surface_distance_mm": 1.0,
-}
+MESHING = {"surface_edge_mm": 4.0, "core_edge_mm": 10.0, "envelope_mm": 0.1, "max_surface_distance_mm": 1.0}
 BRAIN = {"id": "apart", "week": 21, **labelled(21)}
 STUDY = {"brains": [BRAIN], "start": "apart", "mesh": MESHING, "folding": {"end_week": 22}}
 MESH = "results/brains/apart/mesh/brain.xdmf"

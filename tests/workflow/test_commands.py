@@ -1,19 +1,17 @@
 """The commands of gyriflow as a user types them."""
 
 import re
-import subprocess
 import sys
 
 import pytest
+from processes import ran
 
 from .conftest import SMALL_STUDY, labelled
 
 
 def gyriflow(workflow, *arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "gyriflow.cli", *arguments],
-        cwd=workflow.directory, env=workflow.environment, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+    command = sys.executable, "-m", "gyriflow.cli", *arguments
+    return ran(*command, cwd=workflow.directory, env=workflow.environment)
 
 
 @pytest.mark.fault(27)

@@ -2,12 +2,12 @@
 
 import re
 import shlex
-import subprocess
 from pathlib import Path
 
 import pytest
 import yaml
-from configurations import labelled
+from configurations import labelled, touched
+from processes import ran
 
 from gyriflow.config import load
 
@@ -40,11 +40,8 @@ CONFIGURATIONS = [
 
 @pytest.mark.parametrize("block", CONFIGURATIONS)
 def test_a_configuration_that_is_shown_is_one(block, tmp_path):
-    for name in FILE.findall(block):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).touch()
+    touched(tmp_path, *FILE.findall(block), "labels.nii.gz")
     (tmp_path / "participants.tsv").write_text("participant_id\tgestational_age\tfiles\ns1\t24.1\tlabels.nii.gz\n")
-    (tmp_path / "labels.nii.gz").touch()
     assert load(completed(block), tmp_path).runs
 
 
@@ -71,7 +68,6 @@ def test_targets_and_files_of_commands_that_are_shown_exist():
 
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path):
-    command = ["mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
-    done = subprocess.run(command, cwd=CHECKOUT, capture_output=True, text=True)
+    done = ran("mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site"), cwd=CHECKOUT)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "site" / "how-to" / "extend.html").exists()

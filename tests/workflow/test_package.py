@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from processes import ran
 
 from .conftest import CHECKOUT
 
@@ -18,10 +19,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    built = subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, CHECKOUT],
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+    built = ran(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, CHECKOUT)
     assert built.returncode == 0, built.stdout + built.stderr
     (found,) = folder.glob("gyriflow-*.whl")
     return found
@@ -34,7 +32,7 @@ def installed(wheel, tmp_path_factory):
     subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder], check=True, timeout=120)
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
-    site = subprocess.run([python, "-c", found], capture_output=True, text=True, check=True).stdout.strip()
+    site = ran(python, "-c", found).stdout.strip()
     (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
     plain = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", wheel]
@@ -44,11 +42,9 @@ def installed(wheel, tmp_path_factory):
 
 def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    tracked = subprocess.run(
-        ["git", "-C", CHECKOUT, "ls-files", "Snakefile", "workflow", "atlases", "schemes", "norms", "config",
-         "profiles", "envs"],
-        capture_output=True, text=True, check=True,
-    ).stdout.split()  # fmt: skip
+    folders = ("workflow", "atlases", "schemes", "norms", "config", "profiles", "envs")
+    tracked = ran("git", "-C", CHECKOUT, "ls-files", "Snakefile", *folders).stdout.split()
+    assert len(tracked) > 100
     assert {f"gyriflow/shipped/{name}" for name in tracked} <= names
     assert "snakemake_logger_plugin_gyriflow/__init__.py" in names
     assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]
@@ -58,10 +54,7 @@ def test_the_command_works_in_an_empty_folder(installed, tmp_path):
     command, environment = installed
 
     def gyriflow(*arguments):
-        return subprocess.run(
-            [command, *arguments],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False,
-        )  # fmt: skip
+        return ran(command, *arguments, cwd=tmp_path, env=environment)
 
     assert gyriflow("--version").stdout.startswith("gyriflow 0.")
     target = "results/brains/spina-bifida-unoperated-21/surface/pial.surf.gii"

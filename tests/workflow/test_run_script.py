@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from processes import command_of
+from processes import command_of, ran
 
 pytestmark = pytest.mark.slow
 
@@ -70,8 +70,8 @@ OWN = f"9{os.getpid()}.25"
 """Seconds to sleep by which the processes of these tests are told from all others."""
 
 
-def run(*command, env=None, **options):
-    return subprocess.run([RUN, *command], env=env, capture_output=True, text=True, timeout=60, **options)
+def run(*command, env=None):
+    return ran(RUN, *command, env=env, timeout_s=60)
 
 
 def start(*command, env):

@@ -11,13 +11,12 @@ IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^
 
 
 def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
-    """Return a hash of all modules of this package that a Python program imports, and of data files beside them.
+    """Return a hash of all modules of this package that a Python program imports.
 
     Further `modules` are those that the program imports by a name that it is given. Of its functions, a single one
     counts where each job calls another one. A parameter of a rule, it reruns what depends on a change of the code.
     """
     files = modules_behind(program, function).union(modules, *map(modules_behind, modules))
-    files |= {data for folder in {module.parent for module in files} for data in _data_in(folder)}
     named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
     return hashlib.sha256(repr(named).encode()).hexdigest()[:12]
 
@@ -65,11 +64,6 @@ def _files_of(name: str) -> list[Path]:
         return []
     around = [PACKAGE.joinpath(*parts[:count], "__init__.py") for count in range(len(parts) + 1)]
     return [path for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py")) if path.is_file()]
-
-
-@cache
-def _data_in(folder: Path) -> list[Path]:
-    return [path for path in folder.iterdir() if path.suffix in (".yaml", ".json", ".csv")]
 
 
 @cache

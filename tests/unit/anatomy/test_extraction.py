@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyriflow.anatomy.extraction import (
-    isosurface,
-    main_parts,
-    make_simple,
-    refine,
-    remove_bridges,
-    smooth_mask,
-)
+from gyriflow.anatomy.extraction import isosurface, main_parts, make_simple, refine, remove_bridges, smooth_mask
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import area, euler_number, is_closed, signed_volume
 

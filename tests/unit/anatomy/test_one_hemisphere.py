@@ -5,13 +5,13 @@ import odd_brains
 import pytest
 from atlas_brains import atlas_halves
 from phantoms import CENTRE_MM
-from shapes import LPS, cerebrum_surface, phantom, rigid
+from shapes import LPS, cerebrum_surface, inner, phantom, rigid
 
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.thickness import thickness_from_white
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
-from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_normals
+from gyriflow.geometry.triangles import transformed
 from gyriflow.io.yaml_files import SCHEMES
 
 QUICK = {"week": 24.0, "edge_length_mm": 2.0}
@@ -84,10 +84,6 @@ def test_volumes_of_a_hemisphere_whose_affine_is_lps_are_turned_as_its_labels(br
     voxels = np.argwhere(np.isin(left, DHCP.cerebrum)) @ world[:3, :3].T + world[:3, 3]
     for end in (np.min, np.max):
         assert end(surface.whole.vertices, axis=0) == pytest.approx(end(voxels, axis=0), abs=2.0)
-
-
-def inner(mesh, depth_mm):
-    return TriangleMesh(mesh.vertices - depth_mm * vertex_normals(mesh), mesh.faces)
 
 
 def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):

@@ -3,9 +3,8 @@
 import numpy as np
 import odd_brains
 import pytest
-from atlas_brains import atlas_labels
 from phantoms import CENTRE_MM
-from shapes import phantom, rigid, sphere
+from shapes import phantom, sphere
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import with_volume
@@ -57,19 +56,6 @@ def test_a_side_of_a_few_voxels_is_no_hemisphere():
     sided[tuple(outermost.T)] = dict(zip(scheme.left, scheme.right, strict=True))[3]
     with pytest.raises(InputError, match=r"too small to be one; found areas of \d\.\d\d and \d\d\.\d\d cm²"):
         from_labels(sided, affine, scheme, week=21.0, edge_length_mm=3.0)
-
-
-@pytest.mark.parametrize("degrees", [(90, 0, 0), (0, 0, 180)])
-def test_a_volume_without_a_hindbrain_has_the_surface_of_the_brain_that_stands_right(degrees):
-    labels, affine = atlas_labels()
-    mask = np.isin(labels, (1, 2, 5, 6, 8)).astype(int)
-    surfaces = [
-        from_labels(mask, rigid(*turn) @ affine, SCHEMES["binary"], week=24.0, edge_length_mm=2.0)
-        for turn in ((0, 0, 0), degrees)
-    ]
-    assert [surface.pose.by for surface in surfaces] == ["file", "shape"]
-    right, turned = (np.array(surface.report["extents_mm"]) for surface in surfaces)
-    np.testing.assert_allclose(turned, right, rtol=0.02)
 
 
 def test_smoothing_keeps_volume_and_area():

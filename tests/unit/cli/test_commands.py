@@ -43,12 +43,14 @@ def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
     assert handed_on("--cores", "200", "--profile", "profiles/slurm")[:2] == ["--cores", "200"]
 
 
-@pytest.mark.parametrize("command", [["run", "no.yaml"], ["check", "no.yaml"]])
-def test_a_configuration_that_is_named_and_missing_is_told_in_one_line(monkeypatch, tmp_path, command):
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_missing_configuration_is_told_in_one_line_where_it_is_named(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, command)
+    done = CliRunner().invoke(main, [command, "no.yaml"])
     assert (done.exit_code, done.output.count("\n")) == (2, 1)
     assert f"{tmp_path / 'no.yaml'}: there is no configuration" in done.output
+    done = CliRunner().invoke(main, [command])
+    assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
 
 
 def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
@@ -65,13 +67,6 @@ def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(monkeypatch,
     assert (done.exit_code, f"{folder}: no brain was recognised" in done.output) == (2, True)
     # the command by its own name
     assert CliRunner().invoke(main, ["bids", folder, "out", "group"]).output == done.output
-
-
-@pytest.mark.parametrize("command", ["run", "check"])
-def test_a_missing_configuration_is_an_error(monkeypatch, tmp_path, command):
-    monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, [command])
-    assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
 
 
 FOUND = "fetal_SB_atlas_GA22_notoperated"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from configurations import touched
 from shapes import sphere
 
 from gyriflow.cli import launch
@@ -94,12 +95,6 @@ def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
     assert (first.entry["scheme"], other.entry["scheme"], other.notes) == (UNSET, "spina-bifida-atlas", [])
 
 
-def touched(folder, *names):
-    for name in names:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).touch()
-
-
 def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     for side in ("left", "right"):
         touched(
@@ -112,10 +107,7 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     assert first == {
         "id": "fetal.week22",
         "week": 22.0,
-        "hemispheres": {
-            "left": "fetal.week22.left.pial.surf.gii",
-            "right": "fetal.week22.right.pial.surf.gii",
-        },
+        "hemispheres": {"left": "fetal.week22.left.pial.surf.gii", "right": "fetal.week22.right.pial.surf.gii"},
         "white": ["fetal.week22.left.wm.surf.gii", "fetal.week22.right.wm.surf.gii"],
     }
     assert alone["hemisphere"] == {"file": "fetal.week23.left.pial.surf.gii", "side": "left"}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from configurations import LABELLED, problems, series_for, series_of
+from configurations import LABELLED, problems, series_for, series_of, touched
 
 from gyriflow.config import load
 from gyriflow.config.atlas import ATLASES, Atlas, retrieval_note, shipped_atlases
@@ -18,12 +18,6 @@ UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, 
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 
 
-def put(folder, *names, content=b""):
-    for name in names:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-
-
 def surfaces(*weeks, inside=""):
     return [inside + SURFACES.format(week, side) for week in weeks for side in ("left", "right")]
 
@@ -34,12 +28,7 @@ def study(atlas, start, **changes):
 
 def own_atlas(folder, **changes):
     """Write an atlas of two weeks and return its description."""
-    series = {
-        "population": "sheep",
-        "scheme": "binary",
-        "files": {"labels": "w{week}.nii.gz"},
-        "weeks": [21, 22],
-    }
+    series = {"population": "sheep", "scheme": "binary", "files": {"labels": "w{week}.nii.gz"}, "weeks": [21, 22]}
     content = {
         "name": "mine",
         "title": "An atlas",
@@ -127,7 +116,7 @@ def test_explicit_brains_stand_beside_those_of_atlases_and_may_be_the_start(tmp_
 
 
 def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp_path):
-    put(tmp_path / "mine", *surfaces(21, inside="some/where/"), "clone/atlas/fetal.week22.left.pial.surf.gii")
+    touched(tmp_path / "mine", *surfaces(21, inside="some/where/"), "clone/atlas/fetal.week22.left.pial.surf.gii")
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 22]}
     config = load(study(section, "dhcp-surface-21"), tmp_path)
     assert config.brains[0].hemispheres.left == f"{tmp_path}/mine/some/where/{SURFACES.format(21, 'left')}"
@@ -138,8 +127,8 @@ def test_files_are_found_by_name_wherever_they_lie_and_others_are_put_beside(tmp
 
 
 def test_an_atlas_folder_and_what_is_in_it_may_be_links(tmp_path):
-    put(tmp_path / "store", *surfaces(21))
-    put(tmp_path / "far", *surfaces(22))
+    touched(tmp_path / "store", *surfaces(21))
+    touched(tmp_path / "far", *surfaces(22))
     (tmp_path / "store" / "more").symlink_to(tmp_path / "far")
     # a link upwards, by which each file would be found over and over
     (tmp_path / "far" / "up").symlink_to(tmp_path / "store")
@@ -155,7 +144,7 @@ def test_an_atlas_folder_and_what_is_in_it_may_be_links(tmp_path):
 def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     known = read_yaml(ATLASES / "crl" / "atlas.yaml")["series"]["normative"]["weeks"]
     section = {"name": "crl", "folder": "mine", "weeks": [21, 22], "accept_licence": True}
-    put(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
+    touched(tmp_path / "mine", "Other21_Study1/parcellation.nii.gz", "x/HarvardSTA22_Study1/parcellation.nii.gz")
     config = load(study(section, "crl-21"), tmp_path)
     file = f"{tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz"
     assert [brain.labels for brain in config.brains][1] == file
@@ -167,19 +156,19 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
 
 
 def test_two_files_of_one_name_and_a_file_in_the_place_of_the_folder_are_refused(tmp_path):
-    put(tmp_path / "mine", *surfaces(21), surfaces(21, inside="copy/")[0])
+    touched(tmp_path / "mine", *surfaces(21), surfaces(21, inside="copy/")[0])
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21]}
     (found,) = problems(study(section, "dhcp-surface-21"), tmp_path)
     name = SURFACES.format(21, "left")
     assert found == f"atlas.folder: found {tmp_path}/mine/{name} and {tmp_path}/mine/copy/{name}; keep one of them"
-    put(tmp_path, "file")
+    touched(tmp_path, "file")
     found = problems(study(section | {"folder": "file"}, "dhcp-surface-21"), tmp_path)
     assert found == [f"atlas.folder: {tmp_path}/file is a file; expected a folder"]
 
 
 @pytest.mark.fault(16)
 def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
-    put(tmp_path / "mine", *surfaces("21.5"))
+    touched(tmp_path / "mine", *surfaces("21.5"))
     section = {"name": "dhcp-surface", "folder": "mine", "weeks": [21, 21.5]}
     config = load(study(section, "dhcp-surface-21.5"), tmp_path)
     assert [(brain.id, brain.week) for brain in config.brains] == [("dhcp-surface-21", 21), ("dhcp-surface-21.5", 21.5)]
@@ -196,7 +185,7 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
 
 
 def test_an_atlas_of_ones_own_is_one_file(tmp_path):
-    put(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
+    touched(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
     file = own_atlas(tmp_path / "mine")
     for given in ("mine/atlas.yaml", str(file), {"name": "mine/atlas.yaml", "series": ["all"]}):
         config = load(study(given, "mine-21", folding={"end_week": 22}), tmp_path)
@@ -218,7 +207,7 @@ def test_an_atlas_of_ones_own_is_one_file(tmp_path):
     ],
 )
 def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, found):
-    put(tmp_path, "w21.nii.gz", "w22.nii.gz")
+    touched(tmp_path, "w21.nii.gz", "w22.nii.gz")
     file = own_atlas(tmp_path, **changes)
     (named,) = problems(study("atlas.yaml", "mine-21"), tmp_path)
     assert named.startswith(f"{file}: ")

@@ -122,12 +122,7 @@ def test_starts_that_cannot_be_are_all_named():
 
 @pytest.mark.parametrize(
     ("end", "every", "weeks"),
-    [
-        (24, 1, [21, 22, 23, 24]),
-        (23.5, 1, [21, 22, 23, 23.5]),
-        (21.3, 0.1, [21, 21.1, 21.2, 21.3]),
-        (22, 5, [21, 22]),
-    ],
+    [(24, 1, [21, 22, 23, 24]), (23.5, 1, [21, 22, 23, 23.5]), (21.3, 0.1, [21, 21.1, 21.2, 21.3]), (22, 5, [21, 22])],
 )
 def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
     assert output_weeks(21, end, every) == pytest.approx(weeks)

@@ -19,10 +19,7 @@ from gyriflow.study import resolve
 pytestmark = pytest.mark.fault(28, 62)
 
 STUDY = {
-    "brains": [
-        {"id": "a", "week": 21, **LABELLED},
-        {"id": "b", "week": 22.5, "shape": {"semi_axes_mm": [23, 23, 23]}},
-    ],
+    "brains": [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22.5, "shape": {"semi_axes_mm": [23, 23, 23]}}],
     "start": "a",
     "surface": {"edge_length_mm": 2.0},
     "mesh": {"order": 2},

@@ -1,17 +1,12 @@
 """Maps and growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
-from configurations import LABELLED, problems, touched
+from configurations import LABELLED, both_kinds, problems
 
 from gyriflow.config import load
 from gyriflow.study import resolve
 
-BRAINS = [
-    {"id": "a", "week": 21, **LABELLED},
-    {"id": "b", "week": 22, **LABELLED},
-    {"id": "c", "week": 22, **LABELLED},
-]
-FOLDING = {"end_week": 24}
+BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, **LABELLED}, {"id": "c", "week": 22, **LABELLED}]
 
 
 def study(folding, **others):
@@ -51,14 +46,6 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     assert plain.parameters["thickness_mm"] == 1e-8
 
 
-def both_kinds(tmp_path, weeks):
-    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
-    touched(tmp_path, "pial.surf.gii")
-    made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
-    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
-    return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
-
-
 @pytest.mark.parametrize(
     ("growth", "found"),
     [
@@ -77,7 +64,7 @@ def both_kinds(tmp_path, weeks):
     ],
 )
 def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
-    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth, "folding": FOLDING}, tmp_path) == found
+    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth}, tmp_path) == found
 
 
 CURVE = {21: 99, 30: 252}

@@ -16,12 +16,7 @@ THICKNESS = {
     "compare_week": 25,
 }
 STIFFNESS = {"base": "reference", "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}, "compare_week": 25}
-CALIBRATION = {
-    "base": "reference",
-    "parameters": {"thickness_mm": [1, 3]},
-    "score": {"size": 1},
-    "compare_week": 25,
-}
+CALIBRATION = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 25}
 
 
 def config(**sections):

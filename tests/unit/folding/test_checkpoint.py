@@ -27,13 +27,6 @@ def some_state(steps=3):
     return state
 
 
-def test_growth_of_the_steps_is_summed():
-    state = some_state()
-    assert state.grown == pytest.approx(np.full((6, 4), 0.3))
-    assert state.grown_s == 300.0
-    assert State.at_start(np.zeros((4, 3)), 1.0).after(np.zeros((4, 3)), 1.0, {}).grown is None
-
-
 def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     # exact for positions that are quadratic in time, whatever the steps
     def at(t):

@@ -70,19 +70,6 @@ def test_normals_on_a_ball_point_outwards_and_have_length_one():
     assert np.einsum("ij,ij->i", normals, points / 9.0).min() > 0.97
 
 
-def test_ties_do_not_depend_on_the_order_of_points_or_vertices():
-    # the centre of a box is as far from all eight corners
-    mesh = box_mesh((1, 1, 1), (2.0, 2.0, 2.0))
-    facets = boundary_faces(mesh)[0]
-    order = np.random.default_rng(0).permutation(len(mesh.vertices))
-    place = np.argsort(order)
-    same = PialSearch(mesh.vertices[order], place[facets])
-    centre = np.zeros((1, 3))
-    np.testing.assert_array_equal(
-        PialSearch(mesh.vertices, facets).nearest_normals(centre), same.nearest_normals(centre)
-    )
-
-
 @pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 2), (2, 3), (2, 4), (2, 5)])
 def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights(order, degree):
     points = IntegrationPoints.of_degree(order, degree)

@@ -100,12 +100,6 @@ def test_the_sides_of_a_box_slide_in_their_planes():
     assert (zones.growth == 1).all()
 
 
-def test_a_free_brain_needs_no_clamps(brain):
-    zones = find_zones(brain, support="free")
-    assert not zones.fixed.any()
-    refuse_impossible(brain, zones)
-
-
 @pytest.mark.fault(26)
 def test_a_brain_without_clamped_facets_is_refused(brain):
     zones = find_zones(brain, no_growth={"semi_axes": (0.1, 0.1, 0.1)})

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gyriflow.geometry.alignment import (
-    CUBE_ROTATIONS,
-    Fit,
-    angle_deg,
-    fits_from_all_sides,
-    margin,
-    step_towards_planes,
-)
+from gyriflow.geometry.alignment import CUBE_ROTATIONS, Fit, angle_deg, fits_from_all_sides, margin, step_towards_planes
 
 RANDOM = np.random.default_rng(2)
 POINTS = RANDOM.normal(size=(200, 3)) * [3.0, 2.0, 1.0] + [10.0, -5.0, 2.0]

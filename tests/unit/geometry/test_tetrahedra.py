@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import box_mesh, ellipsoid_mesh
+from shapes import box_mesh
 
 from gyriflow.geometry.tetrahedra import (
     TetrahedralMesh,
@@ -24,13 +24,6 @@ def test_boundary_of_a_box_is_its_surface_outward():
     assert is_closed(surface)
     assert euler_number(surface) == 2
     np.testing.assert_array_equal(mesh.vertices[used], surface.vertices)
-
-
-def test_volumes_add_up_and_are_positive():
-    mesh = ellipsoid_mesh(6, (2.0, 3.0, 4.0))
-    volumes = signed_volumes(mesh)
-    assert (volumes > 0).all()
-    assert volumes.sum() == pytest.approx(signed_volume(boundary_surface(mesh)[0]))
 
 
 def test_a_quadratic_mesh_is_filled_by_eight_linear_pieces_of_each_element():

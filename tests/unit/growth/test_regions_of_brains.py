@@ -8,12 +8,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import surface_mask
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.growth.carried_regions import (
-    number_regions,
-    regions_from_surface,
-    regions_from_volume,
-    renumber,
-)
+from gyriflow.growth.carried_regions import number_regions, regions_from_surface, regions_from_volume, renumber
 from gyriflow.growth.carrying import carry_regions
 from gyriflow.growth.channels import channels
 from gyriflow.growth.diffeomorphic import register

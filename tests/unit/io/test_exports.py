@@ -2,12 +2,12 @@
 
 import json
 import shutil
-import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from processes import ran
 from shapes import hemisphere, sphere
 
 from gyriflow.errors import InputError
@@ -198,6 +198,6 @@ def test_the_bids_validator_finds_no_error(tmp_path, brain):
     scans = [replace(one, **more) for one in scans_of_two(brain)]
     simulated = replace(scans[0], white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path))
     export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": "cm2"})
-    done = subprocess.run([VALIDATOR, folder, "--format", "json"], capture_output=True, text=True, check=False)
+    done = ran(VALIDATOR, folder, "--format", "json")
     found = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in found if issue["severity"] == "error"] == []

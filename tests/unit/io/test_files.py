@@ -71,10 +71,7 @@ def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
 def test_cells_stay_below_their_heading(tmp_path, rows):
     path = tmp_path / "participants.tsv"
     path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
-    assert read_tab_separated(path) == [
-        {"id": "s1", "age": "24", "file": "a"},
-        {"id": "s2", "age": "25", "file": "b"},
-    ]
+    assert read_tab_separated(path) == [{"id": "s1", "age": "24", "file": "a"}, {"id": "s2", "age": "25", "file": "b"}]
 
 
 def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):

@@ -8,13 +8,7 @@ from shapes import ellipsoid, sphere
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, merged, transformed
 from gyriflow.metrics.laplace_beltrami import Modes, laplacian, lowest_modes
-from gyriflow.metrics.spangy import (
-    bands_of_modes,
-    first_eigenvalue,
-    modes_of,
-    spectral_distances,
-    spectrum,
-)
+from gyriflow.metrics.spangy import bands_of_modes, first_eigenvalue, modes_of, spectral_distances, spectrum
 
 
 @pytest.fixture(scope="module")

@@ -1,18 +1,10 @@
 """Which brains are the series that growth is measured on, and what they are called."""
 
 import pytest
-from configurations import LABELLED, labelled, series_for, series_of, study, touched
+from configurations import LABELLED, both_kinds, labelled, series_for, series_of, study, touched
 
 from gyriflow.config import load
 from gyriflow.study import resolve
-
-
-def both_kinds(folder, weeks):
-    """Return a configuration with labels and a closed surface of each of some weeks, the labels first."""
-    touched(folder, "pial.surf.gii")
-    made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
-    given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
-    return {"brains": [*made, *given], "start": "s21", "folding": {"end_week": 24}}
 
 
 @pytest.mark.parametrize(
