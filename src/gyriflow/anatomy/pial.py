@@ -138,12 +138,12 @@ def from_labels(
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
     A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say, or without these its shape. The
-    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel), freed of handles and turned into an isosurface,
-    which is smoothed, remeshed to `edge_length_mm` and turned so that the mid-sagittal plane is x = const, and set
-    outwards by what smoothing took of the volume. Where the scheme separates cortex from the tissue inside and cortex
-    labels of both sides touch, the fissure is opened there to 1.5 mm. It is half-way between the
-    labels of the two sides where the scheme has them. With `side` the volume holds that hemisphere only, which is posed
-    as `from_surface` does.
+    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel), freed of handles and turned into an isosurface, which is
+    smoothed, remeshed to `edge_length_mm`, freed of terraces, set outwards by what smoothing took of the volume and
+    turned so that the mid-sagittal plane is x = const. Where the scheme separates cortex from the tissue inside and
+    cortex labels of both sides touch, the fissure is opened there to 1.5 mm. It is half-way between the labels of the
+    two sides where the scheme has them. With `side` the volume holds that hemisphere only, which is posed as
+    `from_surface` does.
 
     InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
     whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
@@ -214,6 +214,7 @@ def from_labels(
         edge_length_mm,
         smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
+        voxels=grid,
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)

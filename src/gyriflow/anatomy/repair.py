@@ -35,6 +35,7 @@ from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks
 from .labels import REPORTED_LOSS
+from .terraces import without_terraces
 
 log = logging.getLogger(__name__)
 
@@ -277,18 +278,23 @@ def surface_of_mask(
     *,
     smallest: float = COMPARABLE_PARTS,
     taken_mm3: float = 0.0,
+    voxels: Floats | None = None,
 ) -> Sound:
-    """Return the even surface around a smoothed (i, j, k) mask, with the mask's volume.
+    """Return the even surface around a smoothed (i, j, k) mask, without terraces and with the mask's volume.
 
     `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
-    out. The report has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
+    out; `voxels` is the affine of the labels, where those of the field are finer. The report has the "topology" and the
+    "smoothing" too. MeshError where the surface stays tangled.
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)
     even = make_sound(rough, edge_length_mm)
-    voxels = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
-    repaired_mm3 = volume_mm3 + voxels * float(abs(np.linalg.det(affine[:3, :3])))
-    mesh, smoothing = with_volume(even.mesh, repaired_mm3 - taken_mm3, area(rough))
+    smooth = without_terraces(even.mesh, affine if voxels is None else voxels)
+    added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
+    repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
+    mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))
+    moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
+    smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
     warnings = list(even.warnings)
     if abs(change := smoothing["volume_change"]) > KEPT:
         warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels keep it")
