@@ -214,7 +214,8 @@ def from_labels(
         edge_length_mm,
         smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
-        voxels=grid,
+        # walls of slits are nearer to each other than voxels of the labels
+        voxels=affine if open_sulci else grid,
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)
