@@ -15,7 +15,7 @@ THREE_SIDES = ["left", "top", "bottom"]
 REAL_BRAIN = "real brain"
 ZONES = {"contact", "no_growth", "support"}
 """Settings of a run that decide its zones: runs alike in them have one figure of these."""
-FEWEST_FOR_NORMS = 5
+FEWEST_FOR_NORMS, MOST_SERIES = 5, 4
 
 Given = dict[str, Any]
 
@@ -186,7 +186,8 @@ def _of_brain(brain: Brain) -> Iterator[Figure]:
 
 
 def _of_growth(study: Study) -> Iterator[Figure]:
-    if not study.growing:
+    # of many subjects that are not folded, charts of metrics and change.csv tell growth; here each would have a panel
+    if not study.growing or (len(study.series.brains) > MOST_SERIES and not study.folded):
         return
     # runs that follow sizes or shapes have no rate of their own
     grown = [one.settings for one in study.simulations.values() if one.settings.growth.model == "rates"]
