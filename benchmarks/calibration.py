@@ -51,17 +51,17 @@ def study(edge_mm: float) -> dict[str, Any]:
     }
 
 
-def call(folder: Path, config: dict[str, Any], target: str, cores: int) -> None:
-    """Run a target in a folder; GyriflowError where it fails."""
+def call(folder: Path, config: dict[str, Any], cores: int, *targets: str) -> None:
+    """Run targets in a folder; GyriflowError where one fails."""
     write_yaml(folder / "study.yaml", config)
-    command = [sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(cores), target, "--snakefile"]
+    command = [sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(cores), *targets, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]
     path = os.pathsep.join(filter(None, [str(ROOT / "src"), os.environ.get("PYTHONPATH", "")]))
     outcome = subprocess.run(
         command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
     )
     if outcome.returncode:
-        raise GyriflowError(f"{target} failed", path=folder, found="\n".join(outcome.stderr.splitlines()[-15:]))
+        raise GyriflowError(f"{targets[0]} failed", path=folder, found="\n".join(outcome.stderr.splitlines()[-15:]))
 
 
 def main() -> None:
@@ -75,7 +75,7 @@ def main() -> None:
     folder, began = arguments.folder.resolve(), time.monotonic()
     known = study(arguments.edge) | {"runs": {"truth": TRUTH}}
     surface = f"results/runs/truth/{START}/surfaces/week-22.00/pial.surf.gii"
-    call(folder / "truth", known, surface, arguments.cores)
+    call(folder / "truth", known, arguments.cores, surface)
     # on triangles a quarter as long, smoothing leaves the shape as it is
     mesh = read_surface(folder / "truth" / surface)
     fine = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).subdivide().subdivide()
@@ -91,7 +91,7 @@ def main() -> None:
             "rounds": [arguments.runs, *[4] * arguments.rounds],
         },
     }
-    call(folder / "search", search, "calibrate", arguments.cores)
+    call(folder / "search", search, arguments.cores, "calibrate")
     found = folder / "search" / "results" / "study" / "calibration"
     optimum, runs = read_table(found / "optimum.csv").set_index("parameter"), read_table(found / "runs.csv")
     result: dict[str, Any] = {}

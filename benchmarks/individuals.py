@@ -1,0 +1,194 @@
+"""From which size of individuality on a predicted brain is nearer to the later one than the atlas' own brain is.
+
+    ./run python benchmarks/individuals.py FOLDER --volumes 'CRL/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
+        --growth crl CRL --accept-licence
+
+CRL is the folder of an atlas' files. The individuals are invented: its volumes, deformed by random smooth maps. `shape`
+has waves of 40 to 60 mm at the start, `sulci` of 15 to 25 mm; their size is the root mean square displacement in the
+start's cerebrum in mm. Maps follow the brain's centre and lengths along three axes over the weeks, so an individuality
+is `kept`; or it is `fading` as e^(−weeks/8), and another one of the same size takes its place.
+
+The starts are predicted by the growth of the atlas as it is, and laid rigidly onto the invented later brains, which
+have no part in that. The last line is one JSON object: `scores`, rows with `law`, `individual`, `horizon` (GW),
+`model`, `distance_mm`, `r_shape_index`. Models are the `run`, the `atlas`' own brain of the week, and, for values of
+OWN_MM and FADING_GW, the shape that a run grows towards, as `8 mm 1 GW`.
+"""
+
+import argparse
+import json
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from calibration import call
+from scipy.ndimage import map_coordinates
+
+from gyriflow.compare.placement import correlation, values_on
+from gyriflow.compare.prediction import distances
+from gyriflow.compare.shapes import Shape, ready, scaled_to
+from gyriflow.geometry.alignment import fit_onto, rigid_fit
+from gyriflow.geometry.deformations import between_moved, transform_points
+from gyriflow.geometry.diffusion import diffuse, vertex_sizes
+from gyriflow.geometry.matching import nearest_on
+from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces
+from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
+from gyriflow.growth.expected import FADING_GW, OWN_MM, carry_sharply
+from gyriflow.io.registrations import read_correspondence, read_weekly_shapes
+from gyriflow.io.surfaces import read_pose, read_surface
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.metrics.curvature import curvature
+from gyriflow.study.paths import MESH, PIAL, REGISTERED, TARGETS
+from gyriflow.units import week_tag
+
+WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
+MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
+KEPT_GW = {"kept": np.inf, "fading": 8.0}
+GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
+ALL, HERE = "0 mm", f"{OWN_MM:g} mm {FADING_GW:g} GW"
+RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
+INDIVIDUALS = ["shape-0-1", "shape-1-1", "shape-2-1", "shape-4-1", "sulci-1-1", "sulci-2-1"]
+
+
+def velocity(kind: str, seed: int, points: Floats) -> Floats:
+    """Return a random smooth field at (n, 3) points in mm, (n, 3)."""
+    random = np.random.default_rng([seed, list(WAVES_MM).index(kind)])
+    waves = random.normal(size=(3, MODES))
+    waves *= 2 * np.pi / random.uniform(*WAVES_MM[kind], MODES) / np.linalg.norm(waves, axis=0)
+    return np.asarray(np.cos(points @ waves + random.uniform(0, 2 * np.pi, MODES)) @ random.normal(size=(MODES, 3)))
+
+
+def cerebrum_of(volume: LabelVolume, scheme: str) -> tuple[Floats, Floats, Floats]:
+    """Return the cerebrum's centre, its standard deviations along the axes, and its voxels from there (n, 3), in mm."""
+    points = transform_points(np.argwhere(np.isin(volume.labels, SCHEMES[scheme].cerebrum)), volume.affine)
+    return points.mean(axis=0), points.std(axis=0), points - points.mean(axis=0)
+
+
+def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, kept: float) -> LabelVolume:
+    """Return the labels of an individual KIND-SIZE-SEED, of whose individuality at the start a part is kept."""
+    kind, size, seed = name.split("-")
+    (centre, lengths, _), (_, start_lengths, cerebrum) = cerebrum_of(volume, scheme), cerebrum_of(start, scheme)
+    parts = []
+    for part, number in ((kept, int(seed)), (np.sqrt(1 - kept**2), int(seed) + 1000)):
+        rms = np.sqrt((velocity(kind, number, cerebrum[::20]) ** 2).sum(axis=1).mean())
+        parts.append((part * float(size) / rms / FLOW_STEPS, number))
+    labels, affine = np.pad(volume.labels, PAD), volume.affine.copy()
+    affine[:3, 3] -= affine[:3, :3].sum(axis=1) * PAD
+    grid = np.stack(np.meshgrid(*(np.arange(0, n + COARSE, COARSE) for n in labels.shape), indexing="ij"))
+    points = began = (transform_points(grid.reshape(3, -1).T, affine) - centre) * start_lengths / lengths
+    # a flow is one to one, whatever its size
+    for _ in range(FLOW_STEPS):
+        points = points + sum(factor * velocity(kind, number, points) for factor, number in parts if factor)
+    moved = (points - began) * lengths / start_lengths @ np.linalg.inv(affine[:3, :3]).T
+    index = np.indices(labels.shape, dtype=np.float64)
+    index += [map_coordinates(axis.reshape(grid.shape[1:]), index / COARSE, order=1) for axis in moved.T]
+    largest, result = np.zeros(labels.shape, np.float32), np.zeros_like(labels)
+    for label in np.unique(labels):
+        share = map_coordinates((labels == label).astype(np.float32), index, order=1)
+        result[share > largest], largest = label, np.maximum(largest, share)
+    return LabelVolume(result, affine)
+
+
+def targets_of(folder: Path, brain: str, first: str) -> dict[float, dict[str, TriangleMesh]]:
+    """Return by week the shapes that a start would grow towards; `first` is the atlas' brain of its week."""
+
+    def of(pattern: str, name: str) -> Path:
+        return folder / pattern.format(brain=name, earlier=brain, later=first, origin="atlas")
+
+    mesh, targets = read_tetrahedral_mesh(of(MESH["mesh"], brain)), read_weekly_shapes(of(TARGETS, brain))
+    (boundary, used), pieces = boundary_surface(mesh), linear_pieces(mesh)
+    poses = [read_pose(of(PIAL["report"], name)).world for name in (brain, first)]
+    pair = between_moved(read_correspondence(of(REGISTERED, first)), *poses)
+    there = carry_sharply(mesh, [pair], [read_surface(of(PIAL["whole"], first))])[1]
+    sizes = vertex_sizes(mesh.vertices, pieces)
+    apart = mesh.vertices - transform_points(there, rigid_fit(there, mesh.vertices, sizes))
+    finer = {own: (apart - diffuse(mesh.vertices, pieces, apart, own))[used] for own, _ in GRID}
+    volumes = [signed_volume(TriangleMesh(places, boundary.faces)) for places in targets.surfaces["atlas"]]
+    result = {}
+    for week, volume, everything in zip(targets.weeks, volumes, targets.surfaces["atlas_deformed"], strict=True):
+        shapes = {ALL: everything}
+        for own, fading in GRID:
+            gone = -np.expm1((targets.weeks[0] - week) / fading) * (volume / volumes[0]) ** (1 / 3)
+            shapes[f"{own:g} mm {fading:g} GW"] = everything - gone * finer[own]
+        result[float(week)] = {name: TriangleMesh(places, boundary.faces) for name, places in shapes.items()}
+    return result
+
+
+def distance_mm(predicted: TriangleMesh, real: TriangleMesh) -> float:
+    """Return the mean symmetric distance of two surfaces, laid onto each other rigidly."""
+    both = transformed(predicted, fit_onto(predicted, real)), real
+    return distances([(one, nearest_on(one.vertices, other)[0]) for one, other in (both, both[::-1])])["distance_mm"]
+
+
+def shape_of(mesh: TriangleMesh, real: TriangleMesh) -> Shape:
+    """Return a surface made ready for the comparison with a real one, which may be itself."""
+    even = ready(mesh, real)
+    bend = curvature(even)
+    return Shape(even, bend.mean, bend.shape_index)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--volumes", required=True, help="label volumes to deform, with {week} in their path")
+    parser.add_argument("--scheme", default="spina-bifida-atlas", help="of their labels")
+    parser.add_argument("--growth", nargs=2, required=True, metavar=("NAME", "FILES"), help="the atlas that predicts")
+    parser.add_argument("--accept-licence", action="store_true", help="of that atlas")
+    parser.add_argument("--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS)
+    parser.add_argument("--weeks", type=int, nargs="+", default=[22, 26, 30], help="of the start, and later ones")
+    parser.add_argument("--no-folding", action="store_true", help="leave out the runs")
+    parser.add_argument("--cores", type=int, default=2)
+    given = parser.parse_args()
+    folder, weeks, start, scheme = given.folder.resolve(), sorted(given.weeks), min(given.weeks), given.scheme
+    folder.mkdir(parents=True, exist_ok=True)
+    volumes = {week: read_label_volume(given.volumes.format(week=week), cropped=True) for week in weeks}
+    brains, growing = [], list(range(start, weeks[-1] + 1))
+    for name, law, week in product(given.individuals, KEPT_GW, weeks):
+        if law == "kept" or week > start:
+            path, kept = folder / f"{name}-{law}-{week}.nii.gz", float(np.exp((start - week) / KEPT_GW[law]))
+            if not path.exists():
+                write_label_volume(path, deformed(volumes[week], volumes[start], scheme, name, kept))
+            brain = {"id": path.name[:-7], "week": week, "subject": f"{name}-{law}", "population": "invented"}
+            brains.append(brain | {"labels": str(path), "scheme": scheme})
+    starts = [f"{name}-kept-{start}" for name in given.individuals]
+    (atlas, data), accepted = given.growth, given.accept_licence
+    config = {
+        "atlas": {"name": atlas, "folder": data, "weeks": growing, "accept_licence": accepted},
+        "brains": brains,
+        "growth": {"brains": {"atlas": [f"{atlas}-{week}" for week in growing]}},
+        "start": starts,
+        "mesh": {"order": 1, "surface_edge_mm": 1.2, "max_surface_distance_mm": 0.3},
+        "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 10, "step_s": 172800, "ranks": 1},
+        "runs": {"expected": {}},
+    }
+    files = [PIAL["whole"].format(brain=brain["id"]) for brain in brains]
+    files += [TARGETS.format(brain=brain, origin="atlas") for brain in starts]
+    folded = [] if given.no_folding else product(starts, weeks[1:])
+    call(folder, config, given.cores, *files, *(RUN.format(brain=brain, week=week_tag(week)) for brain, week in folded))
+    rows = []
+    for name, brain in zip(given.individuals, starts, strict=True):
+        targets = targets_of(folder, brain, f"{atlas}-{start}")
+        for law, week in product(KEPT_GW, weeks[1:]):
+            real = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{law}-{week}"))
+            own = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
+            models = targets[week] | {"atlas": scaled_to(own, signed_volume(targets[week][HERE]))}
+            if not given.no_folding:
+                models["run"] = read_surface(folder / RUN.format(brain=brain, week=week_tag(week)))
+            folds = shape_of(real, real)
+            for model, surface in models.items():
+                row = {"law": law, "individual": name, "horizon": week - start, "model": model}
+                row["distance_mm"] = distance_mm(surface, real)
+                if model in ("run", "atlas", ALL, HERE):
+                    values = values_on(folds, shape_of(surface, real))[0]["shape_index"]
+                    row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
+                rows.append(row)
+    for value in ("distance_mm", "r_shape_index"):
+        table = pd.DataFrame(rows).pivot_table(value, ["law", "individual", "horizon"], "model")
+        print(value, table.to_string(float_format="%.3f"), sep="\n")
+    print(json.dumps({"scores": rows}))
+
+
+if __name__ == "__main__":
+    main()
