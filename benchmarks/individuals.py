@@ -16,7 +16,7 @@ OWN_MM and FADING_GW, the shape that a run grows towards, as `8 mm 1 GW`.
 
 import argparse
 import json
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -27,14 +27,13 @@ from scipy.ndimage import map_coordinates
 from gyriflow.compare.placement import correlation, values_on
 from gyriflow.compare.prediction import distances
 from gyriflow.compare.shapes import Shape, ready, scaled_to
-from gyriflow.geometry.alignment import fit_onto, rigid_fit
+from gyriflow.geometry.alignment import fit_onto
 from gyriflow.geometry.deformations import between_moved, transform_points
-from gyriflow.geometry.diffusion import diffuse, vertex_sizes
 from gyriflow.geometry.matching import nearest_on
-from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces
+from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
-from gyriflow.growth.expected import FADING_GW, OWN_MM, carry_sharply
-from gyriflow.io.registrations import read_correspondence, read_weekly_shapes
+from gyriflow.growth.expected import FADING_GW, OWN_MM, carry_sharply, expected_positions
+from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
@@ -49,6 +48,15 @@ KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
 ALL, HERE = "0 mm", f"{OWN_MM:g} mm {FADING_GW:g} GW"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
+MESH_SETTINGS = {
+    "order": 1,
+    "mesher": "tetgen",
+    "surface_edge_mm": 1.3,
+    "core_edge_mm": 3,
+    "max_surface_distance_mm": 0.5,
+}
+# flat elements of a coarse mesh of a detailed surface are let through
+MESH_SETTINGS |= {"min_radius_ratio": 0.005}
 INDIVIDUALS = ["shape-0-1", "shape-1-1", "shape-2-1", "shape-4-1", "sulci-1-1", "sulci-2-1"]
 
 
@@ -91,28 +99,28 @@ def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, ke
     return LabelVolume(result, affine)
 
 
-def targets_of(folder: Path, brain: str, first: str) -> dict[float, dict[str, TriangleMesh]]:
-    """Return by week the shapes that a start would grow towards; `first` is the atlas' brain of its week."""
-
-    def of(pattern: str, name: str) -> Path:
-        return folder / pattern.format(brain=name, earlier=brain, later=first, origin="atlas")
-
-    mesh, targets = read_tetrahedral_mesh(of(MESH["mesh"], brain)), read_weekly_shapes(of(TARGETS, brain))
-    (boundary, used), pieces = boundary_surface(mesh), linear_pieces(mesh)
-    poses = [read_pose(of(PIAL["report"], name)).world for name in (brain, first)]
-    pair = between_moved(read_correspondence(of(REGISTERED, first)), *poses)
-    there = carry_sharply(mesh, [pair], [read_surface(of(PIAL["whole"], first))])[1]
-    sizes = vertex_sizes(mesh.vertices, pieces)
-    apart = mesh.vertices - transform_points(there, rigid_fit(there, mesh.vertices, sizes))
-    finer = {own: (apart - diffuse(mesh.vertices, pieces, apart, own))[used] for own, _ in GRID}
-    volumes = [signed_volume(TriangleMesh(places, boundary.faces)) for places in targets.surfaces["atlas"]]
-    result = {}
-    for week, volume, everything in zip(targets.weeks, volumes, targets.surfaces["atlas_deformed"], strict=True):
-        shapes = {ALL: everything}
-        for own, fading in GRID:
-            gone = -np.expm1((targets.weeks[0] - week) / fading) * (volume / volumes[0]) ** (1 / 3)
-            shapes[f"{own:g} mm {fading:g} GW"] = everything - gone * finer[own]
-        result[float(week)] = {name: TriangleMesh(places, boundary.faces) for name, places in shapes.items()}
+def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float, dict[str, TriangleMesh]]:
+    """Return by week the shapes that a start would grow towards along the brains of an atlas."""
+    chain = [brain, *atlas.values()]
+    mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
+    poses = [read_pose(folder / PIAL["report"].format(brain=name)).world for name in chain]
+    registered = [folder / REGISTERED.format(earlier=one, later=other) for one, other in pairwise(chain)]
+    pairs = [
+        between_moved(read_correspondence(file), *pair) for file, pair in zip(registered, pairwise(poses), strict=True)
+    ]
+    surfaces = [read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]]
+    carried, start = carry_sharply(mesh, pairs, surfaces)[1:], min(atlas)
+    places = {own: expected_positions(mesh, start, carried, list(atlas), own_mm=own) for own in (0.0, *dict(GRID))}
+    (boundary, used), (weeks, everything) = boundary_surface(mesh), places[0.0]
+    result: dict[float, dict[str, TriangleMesh]] = {}
+    for number, week in enumerate(weeks):
+        shapes = {ALL: everything[number]}
+        for own, fading in GRID if week > start else []:
+            # linear in the part of what is finer that has faded
+            gone, gone_here = (-np.expm1((start - week) / time) for time in (fading, FADING_GW))
+            fades = places[own][1][number] - everything[number]
+            shapes[f"{own:g} mm {fading:g} GW"] = everything[number] + gone / gone_here * fades
+        result[week] = {name: TriangleMesh(at[used], boundary.faces) for name, at in shapes.items()}
     return result
 
 
@@ -159,7 +167,7 @@ def main() -> None:
         "brains": brains,
         "growth": {"brains": {"atlas": [f"{atlas}-{week}" for week in growing]}},
         "start": starts,
-        "mesh": {"order": 1, "surface_edge_mm": 1.2, "max_surface_distance_mm": 0.3},
+        "mesh": MESH_SETTINGS,
         "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 10, "step_s": 172800, "ranks": 1},
         "runs": {"expected": {}},
     }
@@ -169,7 +177,7 @@ def main() -> None:
     call(folder, config, given.cores, *files, *(RUN.format(brain=brain, week=week_tag(week)) for brain, week in folded))
     rows = []
     for name, brain in zip(given.individuals, starts, strict=True):
-        targets = targets_of(folder, brain, f"{atlas}-{start}")
+        targets = targets_of(folder, brain, {float(week): f"{atlas}-{week}" for week in growing})
         for law, week in product(KEPT_GW, weeks[1:]):
             real = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{law}-{week}"))
             own = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
@@ -180,7 +188,7 @@ def main() -> None:
             for model, surface in models.items():
                 row = {"law": law, "individual": name, "horizon": week - start, "model": model}
                 row["distance_mm"] = distance_mm(surface, real)
-                if model in ("run", "atlas", ALL, HERE):
+                if model in ("run", "atlas", HERE):
                     values = values_on(folds, shape_of(surface, real))[0]["shape_index"]
                     row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
                 rows.append(row)
