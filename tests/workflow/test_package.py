@@ -57,7 +57,7 @@ def test_the_command_works_in_an_empty_folder(installed, tmp_path):
         return ran(command, *arguments, cwd=tmp_path, env=environment)
 
     assert gyriflow("--version").stdout.startswith("gyriflow 0.")
-    target = "results/brains/spina-bifida-unoperated-21/surface/pial.surf.gii"
+    target = "results/brains/spina-bifida-operated-25/surface/pial.surf.gii"
     # where there is no configuration, it is told where the demo's is
     demo = re.search(r"The demo's is (\S+)\.$", gyriflow("run").stderr)[1]
     outcome = gyriflow("run", demo, "--cores", "1", target)
