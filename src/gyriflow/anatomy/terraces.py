@@ -1,6 +1,7 @@
 """Terraces, the steps that voxels leave on a surface, taken out as far as the voxels allow."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
@@ -8,7 +9,7 @@ from ..geometry.deformations import transform_points
 from ..geometry.diffusion import stiffness_matrix
 from ..geometry.matching import nearest_on
 from ..geometry.remeshing import self_intersecting_faces
-from ..geometry.triangles import Floats, TriangleMesh, face_normals, vertex_areas, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, vertex_areas, vertex_normals
 
 # how far a vertex may move at most, in voxels
 FARTHEST_VOXELS = 0.7
@@ -19,8 +20,9 @@ ROUNDS = 20
 GIVEN_BACK_VOXELS2 = 0.75
 # pivots on the diagonal keep the factors sparse: 60 times faster
 SYMMETRIC = {"SymmetricMode": True}
-# how many times vertices of faces that would cut others are put back, with their neighbours
-PUT_BACK = 4
+# how many times vertices of faces that would cut others, turn by 60° or become needles are put back, with neighbours
+PUT_BACK = 8
+LEAST_COSINE, LEAST_SHAPE = 0.5, 0.75
 
 
 def without_terraces(mesh: TriangleMesh, voxels: Floats) -> TriangleMesh:
@@ -29,8 +31,8 @@ def without_terraces(mesh: TriangleMesh, voxels: Floats) -> TriangleMesh:
     Of all surfaces that leave the centre of each voxel on the side of the surface on which it is, that of least
     roughness ∫ |Δ²x|² dA is approached by the alternating direction method of multipliers (Boyd et al. 2011, doi
     10.1561/2200000016), each round of which is an implicit step (1 + t² Δ⁴) x = z. Then a step against diffusion gives
-    back what this and the Gaussian took of the height of folds. Where faces would cut others, vertices stay where they
-    were.
+    back what this and the Gaussian took of the height of folds. Where faces would cut others or become poor ones,
+    vertices stay where they were.
     """
     size = float(np.cbrt(abs(np.linalg.det(voxels[:3, :3]))))
     mass, stiffness = vertex_areas(mesh), stiffness_matrix(mesh.vertices, mesh.faces)
@@ -63,11 +65,21 @@ def without_terraces(mesh: TriangleMesh, voxels: Floats) -> TriangleMesh:
     way *= np.minimum(1.0, size / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9))
     for _ in range(PUT_BACK):
         moved = TriangleMesh(start + way, mesh.faces)
-        if not (cutting := self_intersecting_faces(moved)).any():
+        if not (bad := self_intersecting_faces(moved) | _spoilt(mesh, moved)).any():
             return moved
-        near = np.isin(mesh.faces, mesh.faces[cutting]).any(axis=1)
+        near = np.isin(mesh.faces, mesh.faces[bad]).any(axis=1)
         way[mesh.faces[near]] = 0.0
     return mesh
+
+
+def _spoilt(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:
+    """Return the faces (m,) that have turned far, or become much thinner for their edges."""
+    turned = np.einsum("ij,ij->i", face_normals(before), face_normals(after)) < LEAST_COSINE
+    shapes = [
+        face_areas(mesh) / (np.diff(corners(mesh), axis=1, append=corners(mesh)[:, :1]) ** 2).sum(axis=(1, 2))
+        for mesh in (before, after)
+    ]
+    return turned | (shapes[1] < LEAST_SHAPE * shapes[0])
 
 
 def _room(mesh: TriangleMesh, voxels: Floats, farthest_mm: float) -> tuple[Floats, Floats]:
