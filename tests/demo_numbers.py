@@ -6,12 +6,12 @@ from pathlib import Path
 import pandas as pd
 
 EXPECTED = {
-    ("reference", 23): {"area_cm2": 108.9, "volume_ml": 55.56, "r_shape_index": 0.529},
-    ("reference", 25): {"area_cm2": 136.1, "volume_ml": 67.27, "r_shape_index": 0.339},
-    ("measured", 23): {"area_cm2": 111.7, "volume_ml": 63.47, "r_shape_index": 0.830},
-    ("measured", 25): {"area_cm2": 137.8, "volume_ml": 85.36, "r_shape_index": 0.804},
+    ("reference", 27): {"area_cm2": 172.1, "volume_ml": 105.8, "r_shape_index": 0.464},
+    ("reference", 29): {"area_cm2": 211.2, "volume_ml": 128.2, "r_shape_index": 0.276},
+    ("measured", 27): {"area_cm2": 181.3, "volume_ml": 125.8, "r_shape_index": 0.935},
+    ("measured", 29): {"area_cm2": 245.0, "volume_ml": 181.8, "r_shape_index": 0.940},
 }
-REAL = {23: {"real_area_cm2": 112.1, "real_volume_ml": 63.48}, 25: {"real_area_cm2": 139.9, "real_volume_ml": 85.27}}
+REAL = {27: {"real_area_cm2": 182.0, "real_volume_ml": 125.8}, 29: {"real_area_cm2": 249.7, "real_volume_ml": 181.9}}
 RELATIVE, ABSOLUTE_R = 0.01, 0.03
 
 

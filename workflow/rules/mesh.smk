@@ -7,6 +7,7 @@ rule tetrahedralise:
         PIAL["whole"],
     output:
         **MESH,
+    priority: 1
     resources:
         mem_mb=6000,
     params:

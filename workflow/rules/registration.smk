@@ -25,6 +25,7 @@ rule register:
         images=lambda w: [image for name in (w.earlier, w.later) if (image := study.brains[name].given.image)],
     output:
         REGISTERED,
+    priority: 1
     params:
         brains=lambda w: [study.brains[name].registered for name in (w.earlier, w.later)],
     script:
@@ -62,6 +63,7 @@ rule targets:
         TARGETS,
     wildcard_constraints:
         origin="self|atlas",
+    priority: 1
     resources:
         mem_mb=8000,
     params:
