@@ -26,7 +26,9 @@ LIFETIME = 8
 """Tangents that a coarse level serves."""
 REGULARISED = 1e-6
 """Part of its mean diagonal that is added to the coarse matrix."""
-INDEFINITE = (PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT, PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC)
+_REASONS = PETSc.KSP.ConvergedReason
+INDEFINITE = (_REASONS.DIVERGED_INDEFINITE_MAT, _REASONS.DIVERGED_INDEFINITE_PC, _REASONS.DIVERGED_DTOL)
+"""What ends the solve of a tangent that is not positive definite; its residual may also grow before that is seen."""
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 """Parts of its diagonal that are added to a tangent until it is positive definite."""
 
