@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 EXPECTED = {
-    ("reference", 27): {"area_cm2": 172.1, "volume_ml": 105.8, "r_shape_index": 0.464},
-    ("reference", 29): {"area_cm2": 211.2, "volume_ml": 128.2, "r_shape_index": 0.276},
+    ("reference", 27): {"area_cm2": 173.1, "volume_ml": 106.9, "r_shape_index": 0.464},
+    ("reference", 29): {"area_cm2": 214.2, "volume_ml": 131.1, "r_shape_index": 0.271},
     ("measured", 27): {"area_cm2": 181.3, "volume_ml": 125.8, "r_shape_index": 0.935},
     ("measured", 29): {"area_cm2": 245.0, "volume_ml": 181.8, "r_shape_index": 0.940},
 }

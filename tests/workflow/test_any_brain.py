@@ -94,7 +94,7 @@ GOOD = {
     "polyp": labelled(odd_brains.with_fourth_ventricle),
     "agenesis": labelled(odd_brains.without_callosum),
     "holoprosencephaly": labelled(odd_brains.holoprosencephaly),
-    "wide": labelled(lambda labels, affine: odd_brains.wide_hemisphere(labels, affine, ventricle=True)),
+    "wide": labelled(lambda labels, affine: odd_brains.wide_hemisphere(labels, affine, 1.35, ventricle=True)),
     "hypoplasia": labelled(
         lambda labels, affine: odd_brains.add_sides(odd_brains.small_hemisphere(labels, affine), affine), "dhcp-19"
     ),
@@ -202,7 +202,7 @@ def test_missing_tissues_are_named_and_a_missing_fissure_is_cut(study):
 @pytest.mark.parametrize("name", ["wide", "cropped"])
 def test_all_of_the_cerebrum_that_is_there_counts(study, name):
     made = {
-        "wide": lambda: odd_brains.wide_hemisphere(LABELS, AFFINE, ventricle=True),
+        "wide": lambda: odd_brains.wide_hemisphere(LABELS, AFFINE, 1.35, ventricle=True),
         "cropped": lambda: odd_brains.crop(LABELS, AFFINE)[0],
     }
     assert study.report(name)["volume_mL"] == pytest.approx(cerebrum_ml(made[name]()), rel=0.01)
