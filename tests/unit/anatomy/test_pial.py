@@ -291,7 +291,8 @@ def test_real_fissure_hidden_by_cortex_is_opened():
     # the example hemispheres of this week, cut apart and closed, have 98.8 cm²; left shut, the brain would have 75
     assert 85 < opened.report["area_cm2"]["whole"] < 98
     wall = opened.left.vertices[np.abs(opened.left.vertices[:, 0] - opened.fissure_x_mm) < 1.5]
-    assert np.median(wall[:, 0]) == pytest.approx(-0.75, abs=0.1)
+    # walls 1.5 mm apart come a little nearer where terraces are taken out
+    assert np.median(wall[:, 0]) == pytest.approx(-0.75, abs=0.15)
 
 
 @pytest.mark.parametrize("deep", [False, True])
