@@ -3,6 +3,7 @@
 With `domain` and `tangent`, the only files that use dolfinx: what differs between its versions is kept to them.
 """
 
+from functools import cached_property
 from typing import Literal
 
 import basix.ufl
@@ -97,12 +98,8 @@ class Problem:
             # ε/2 ⟨penetration⟩² per area: the left hemisphere stays below its plane, the right one above
             for beyond, tag in ((x - planes[0], LEFT_CONTACT), (planes[1] - x, RIGHT_CONTACT)):
                 energy += penalty / 2 * ufl.max_value(beyond, 0) ** 2 * ds(tag)
-        forms = [ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * dx]
-        if energy:
-            residual = ufl.derivative(energy, self.u)
-            forms += [energy, residual, ufl.derivative(residual, self.u)]
-        with form_compiler(domain.comm) as options:
-            coupling, *self._forms = (dolfinx.fem.form(form, jit_options=options) for form in forms)
+        self._energy = energy
+        (coupling,) = self._compiled(ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * dx)
 
         fixed = domain.local(zones.fixed)[: domain.owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
@@ -113,6 +110,18 @@ class Problem:
         self._elastic = KeptTangent(ElasticMatrix(coupling, self._add_stiffness, fixed), self.vector)
         self._tangent = Tangent(self._elastic, self.vector)
         self.mesh_moved(domain.part)
+
+    def _compiled(self, *forms: ufl.Form) -> list[dolfinx.fem.Form]:
+        with form_compiler(self.domain.comm) as options:
+            return [dolfinx.fem.form(form, jit_options=options) for form in forms]
+
+    @cached_property
+    def _forms(self) -> list[dolfinx.fem.Form]:
+        """The energy, its residual and its tangent, as far as the form compiler has a part in them."""
+        if not self._energy:
+            return []
+        residual = ufl.derivative(self._energy, self.u)
+        return self._compiled(self._energy, residual, ufl.derivative(residual, self.u))
 
     def _field_at_points(self, shape: tuple[int, ...]) -> dolfinx.fem.Function:
         element = basix.ufl.quadrature_element("tetrahedron", shape, points=self._rule[0], weights=self._rule[1])

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import ufl
 from ufl.core.expr import Expr
+from ufl.variable import Label, Variable
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Material(ABC):
         stress in its equilibrium is smaller by the factor det Fg: by less than 2 % in a step of the reference
         parameters.
         """
-        Fe = ufl.variable(Fe)
+        # with a number of its own it would be compiled anew in each process
+        Fe = Variable(Fe, Label(0))
         return ufl.diff(self.energy_density(Fe, mu, K), Fe) * Fe.T / ufl.det(Fe)
 
 
