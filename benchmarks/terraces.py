@@ -87,7 +87,7 @@ def surface_of_voxels(mask: np.ndarray, affine: Floats, edge_mm: float) -> Trian
 
 def surface_with_terraces(mask: np.ndarray, affine: Floats, edge_mm: float) -> TriangleMesh:
     """Return the same surface with its terraces."""
-    with patch.object(repair, "without_terraces", lambda mesh, _: mesh):
+    with patch.object(repair, "without_terraces", lambda mesh, *_: mesh):
         return surface_of_voxels(mask, affine, edge_mm)
 
 

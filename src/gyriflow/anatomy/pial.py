@@ -191,6 +191,7 @@ def from_labels(
         voxels, points, _ = fissure.near(mask.shape, affine, FISSURE_REACH_MM)
         left_shut[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
     field, report["slit_voxels_reopened"] = remove_bridges(mask, field, left_shut)
+    shut = field, grid
     if scheme.cortex:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
@@ -214,8 +215,7 @@ def from_labels(
         edge_length_mm,
         smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
-        # walls of slits are nearer to each other than voxels of the labels
-        voxels=affine if open_sulci else grid,
+        shut=shut,
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)

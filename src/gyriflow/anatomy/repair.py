@@ -34,6 +34,7 @@ from ..parameters.terms import MOST_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks
+from .fissure import sample
 from .labels import REPORTED_LOSS
 from .terraces import without_terraces
 
@@ -62,6 +63,8 @@ SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
 # how many times walls that would cut each other are held back, with their neighbours
 HELD_BACK = 4
+# walls where the field before an opening was above this are walls of what was opened
+WITHIN = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,18 +281,19 @@ def surface_of_mask(
     *,
     smallest: float = COMPARABLE_PARTS,
     taken_mm3: float = 0.0,
-    voxels: Floats | None = None,
+    shut: tuple[NDArray[np.float32], Floats] | None = None,
 ) -> Sound:
     """Return the even surface around a smoothed (i, j, k) mask, without terraces and with the mask's volume.
 
     `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
-    out; `voxels` is the affine of the labels, where those of the field are finer. The report has the "topology" and the
-    "smoothing" too. MeshError where the surface stays tangled.
+    out; `shut` is the field before it was opened, with its affine: walls that were not there are no terraces. The report
+    has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)
     even = make_sound(rough, edge_length_mm)
-    smooth = without_terraces(even.mesh, affine if voxels is None else voxels)
+    before, grid = shut or (simple, affine)
+    smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > WITHIN)
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))

@@ -31,7 +31,7 @@ def surface(mask, affine):
 def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels():
     centres, affine = voxels(18.0)
     mask = np.linalg.norm(centres, axis=-1) < 18.0
-    with patch.object(repair, "without_terraces", lambda mesh, _: mesh):
+    with patch.object(repair, "without_terraces", lambda mesh, *_: mesh):
         before = surface(mask, affine).mesh
     found = surface(mask, affine)
     errors = [
