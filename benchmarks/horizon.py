@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from calibration import call
 
 from gyriflow.config.atlas import ATLASES
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
+from workflow import call
 
 WEEKS = range(22, 35)
 GROWN_BY = {"crl": "chinese", "chinese": "crl"}
@@ -77,7 +77,7 @@ def main() -> None:
     for start in GROWN_BY:
         folder = arguments.folder.resolve() / start
         folder.mkdir(parents=True, exist_ok=True)
-        call(folder, study(start, folders, arguments.edge), "results/study/prediction.csv", arguments.cores)
+        call(folder, study(start, folders, arguments.edge), arguments.cores, "results/study/prediction.csv")
         found += rows(folder, start)
         summary = read_json(folder / f"results/runs/{RUN}/{start}-{WEEKS[0]}/folding/summary.json")
         elements.append(int(summary["tets"]))

@@ -21,7 +21,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from calibration import call
 from scipy.ndimage import map_coordinates
 
 from gyriflow.compare.placement import correlation, values_on
@@ -41,6 +40,7 @@ from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.curvature import curvature
 from gyriflow.study.paths import MESH, PIAL, REGISTERED, TARGETS
 from gyriflow.units import week_tag
+from workflow import call
 
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14

@@ -356,7 +356,7 @@ def to_the_right(labels: NDArray[np.integer], scheme: LabelScheme, affine: Float
     return np.asarray(left - right)
 
 
-def sample(field: Floats, affine: Floats, points: Floats) -> Floats:
+def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Floats:
     """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
     return ndimage.map_coordinates(field, voxel_index(points, affine), order=1, mode="nearest")
 

@@ -286,8 +286,8 @@ def surface_of_mask(
     """Return the even surface around a smoothed (i, j, k) mask, without terraces and with the mask's volume.
 
     `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
-    out; `shut` is the field before it was opened, with its affine: walls that were not there are no terraces. The report
-    has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
+    out; `shut` is the field before it was opened, with its affine: walls that were not there have no terraces. The
+    report has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)

@@ -16,8 +16,10 @@ FARTHEST_VOXELS = 0.7
 # of a round: weight of roughness against distance, √t in voxels², which halves waves of 11 voxels; and the rounds
 ROUGHNESS_VOXELS2 = 3.2
 ROUNDS = 16
-# what is given back of the height of folds, in voxels²: 0.5 of it the Gaussian takes, the rest the rounds
-GIVEN_BACK_VOXELS2 = 0.75
+# with coarse voxels it would take folds of 8 mm
+MOST_ROUGHNESS_MM2 = 2.05
+# what is given back of the height of folds: what the Gaussian takes, in voxels², and the rounds by their roughness
+GAUSSIAN_VOXELS2, OF_ROUGHNESS = 0.35, 0.14
 # pivots on the diagonal keep the factors sparse: 60 times faster
 SYMMETRIC = {"SymmetricMode": True}
 # how many times vertices of faces that would cut others, turn by 60° or become needles are put back, with neighbours
@@ -41,7 +43,9 @@ def without_terraces(mesh: TriangleMesh, voxels: Floats, kept: NDArray[np.bool_]
         return mesh
     # partial fractions: 1/(1 + x⁴) is the real part of −½ ∑ p/(x − p) over the two poles p above the real axis
     poles = np.exp(1j * np.pi * np.array([0.25, 0.75]))
-    weighted = ROUGHNESS_VOXELS2 * size**2 * stiffness
+    roughness = min(ROUGHNESS_VOXELS2 * size**2, MOST_ROUGHNESS_MM2)
+    given_back = GAUSSIAN_VOXELS2 * size**2 + OF_ROUGHNESS * roughness
+    weighted = roughness * stiffness
     matrices = [sparse.csc_matrix(weighted - pole * sparse.diags(mass)) for pole in poles]
     solvers = [splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=SYMMETRIC) for matrix in matrices]
 
@@ -60,7 +64,7 @@ def without_terraces(mesh: TriangleMesh, voxels: Floats, kept: NDArray[np.bool_]
         height = np.einsum("ij,ij->i", smooth + error - start, normals)
         allowed = start + np.clip(height, lowest, highest)[:, None] * normals
         error += smooth - allowed
-    sharpened = smooth + GIVEN_BACK_VOXELS2 * size**2 * (stiffness @ smooth) / mass[:, None]
+    sharpened = smooth + given_back * (stiffness @ smooth) / mass[:, None]
     way = np.where(np.reshape(kept, (-1, 1)), 0.0, sharpened - start)
     way *= np.minimum(1.0, size / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9))
     for _ in range(PUT_BACK):
