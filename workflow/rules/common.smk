@@ -55,9 +55,8 @@ def validated_study():
 study, CONTENTS = validated_study()
 CONFIG = study.config
 # brains that an earlier pass of this call has refused, and why; without them it finishes the study
-REFUSED = {
-    brain: cause for brain, cause in refused_brains().items() if brain in [known.id for known in CONFIG.brains]
-}
+KNOWN = {brain.id for brain in CONFIG.brains}
+REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
 if REFUSED and workflow.is_main_process:
     # each has told its cause
     rest = "finishing the study without" if study.brains else "no brain is left"

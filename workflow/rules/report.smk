@@ -109,7 +109,6 @@ rule html_report:
         "../scripts/html_report.py"
 
 
-# the report of one brain
 rule brain_page:
     input:
         lambda w: [path for _, path, _ in figures_on_page(w.brain)],

@@ -21,13 +21,13 @@ def surface_settings(*names):
 
 def pial_settings(wildcards):
     """Return the surface settings that the data of a brain needs."""
-    given = study.brains[wildcards.brain].given
-    if given.source == "shape":
+    brain = study.brains[wildcards.brain]
+    if brain.given.source == "shape":
         return {}
-    names = ["edge_length_mm", "open_sulci" if given.has_labels else "max_hole_mm"]
+    if not brain.given.has_labels:
+        return surface_settings("edge_length_mm", "max_hole_mm")
     # elements are wider than slits, and contact keeps walls apart by the smallest gap of the start's mesh
-    folded = study.brains[wildcards.brain] in study.starts
-    return surface_settings(*names) | ({"open_sulci": False} if folded and given.has_labels else {})
+    return surface_settings("edge_length_mm", *([] if brain in study.starts else ["open_sulci"]))
 
 
 # a simple shape in the place of a brain

@@ -17,8 +17,7 @@ with step(snakemake.log[0]):
     contents |= {path: read_body(path) for _, path, _ in figures if path not in contents}
     small = None if params.pictured is None else picture_addresses(files.small, PICTURE_BYTES)
     prediction = params.get("prediction")
-    if prediction:
-        prediction |= {"worth": read_yaml(files.worth)}
+    prediction = prediction and prediction | {"worth": read_yaml(files.worth)}
     content = page_content(
         prediction=prediction,
         brains=params.brains,
