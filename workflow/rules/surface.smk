@@ -10,8 +10,7 @@ LIMITS = (
 def surface_memory(wildcards):
     """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
     brain = study.brains[wildcards.brain]
-    labelled = brain.given.has_labels
-    return surface_memory_mib(brain.given.label_volume, brain.week) if labelled else 4000
+    return surface_memory_mib(brain.given.label_volume, brain.week) if brain.given.has_labels else 4000
 
 
 def surface_settings(*names):
