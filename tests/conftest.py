@@ -9,7 +9,9 @@ import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
 
-LONGEST_FIRST = ("tests/mpi/test_ranks.py", "tests/mpi/", "tests/workflow/", "tests/")
+LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/")
+RANKS = "tests/mpi/test_ranks.py"
+"""Comes after the same cases on one rank, which compile their forms while no other rank waits for them."""
 MOST_WORKERS = 8
 """Some tests start three ranks, or a workflow of two cores, of their own."""
 
@@ -42,7 +44,8 @@ def pytest_collection_modifyitems(items):
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 
     def place(item):
-        return next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)), item.path not in slow
+        folder = next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start))
+        return folder, item.nodeid.startswith(RANKS), item.path not in slow
 
     items.sort(key=place)
 
