@@ -188,9 +188,8 @@ def main() -> None:
             for model, surface in models.items():
                 row = {"law": law, "individual": name, "horizon": week - start, "model": model}
                 row["distance_mm"] = distance_mm(surface, real)
-                if model in ("run", "atlas", HERE):
-                    values = values_on(folds, shape_of(surface, real))[0]["shape_index"]
-                    row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
+                values = values_on(folds, shape_of(surface, real))[0]["shape_index"]
+                row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
                 rows.append(row)
     for value in ("distance_mm", "r_shape_index"):
         table = pd.DataFrame(rows).pivot_table(value, ["law", "individual", "horizon"], "model")

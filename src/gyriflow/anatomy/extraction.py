@@ -28,7 +28,15 @@ COMPARABLE = 0.2
 # voxels inside are joined through faces only, voxels outside through edges and corners as well
 INSIDE = ndimage.generate_binary_structure(3, 1)
 OUTSIDE = ndimage.generate_binary_structure(3, 3)
-EDGE_NEIGHBOURS = ndimage.generate_binary_structure(3, 2)
+# the 27 places around and in a voxel, and as bits of a number those that share a corner, an edge or a face with it
+CELLS = np.array(list(np.ndindex(3, 3, 3)))
+AROUND, BESIDE, FACING = (
+    sum(1 << place for place, cell in enumerate(CELLS) if 0 < np.abs(cell - 1).sum() <= most) for most in (3, 2, 1)
+)
+BY_CORNERS, BY_FACES = (
+    [sum(1 << place for place, cell in enumerate(CELLS) if 0 < distance(cell - one) <= 1) for one in CELLS]
+    for distance in (lambda way: np.abs(way).max(), lambda way: np.abs(way).sum())
+)
 # radii in voxels of the openings and closings that find what joins or pierces the mask
 REACHES = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
 # how far around a change its effect on parts is looked for, in voxels: at last in the whole volume
@@ -335,12 +343,24 @@ def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask
 
 @lru_cache(maxsize=2**16)
 def is_simple(around: bytes) -> bool:
-    voxels = np.frombuffer(around, dtype=bool).reshape(3, 3, 3)
-    inside, outside = voxels & EDGE_NEIGHBOURS, ~voxels
-    inside[1, 1, 1] = outside[1, 1, 1] = False
-    number, _ = ndimage.label(inside, INSIDE)
-    touching = np.unique(number[INSIDE & inside])
-    return len(touching) == 1 and ndimage.label(outside, OUTSIDE)[1] == 1
+    """Return whether the middle one of 3 × 3 × 3 voxels can change sides without a change of topology."""
+    voxels = sum(1 << place for place, value in enumerate(around) if value)
+    inside, outside = voxels & BESIDE, ~voxels & AROUND
+    facing = inside & FACING
+    if not facing or not outside:
+        return False
+    return not facing & ~_joined(inside, facing, BY_FACES) and not outside & ~_joined(outside, outside, BY_CORNERS)
+
+
+def _joined(places: int, beginning: int, neighbours: list[int]) -> int:
+    """Return those of the places, bits of a number, that neighbours join to the lowest bit of the beginning."""
+    reached = new = beginning & -beginning
+    while new:
+        lowest = new & -new
+        found = neighbours[lowest.bit_length() - 1] & places & ~reached
+        reached |= found
+        new = (new ^ lowest) | found
+    return reached
 
 
 def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:

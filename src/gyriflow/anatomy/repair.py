@@ -61,8 +61,8 @@ MOST_GIVEN_BACK = 0.05
 # of Taubin smoothing
 SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
-# how many times walls that would cut each other are held back, with their neighbours
-HELD_BACK = 4
+# how many times walls that would cut each other are held back, and after smoothing with how many rings of neighbours
+HELD_BACK, HELD_RINGS = 4, 3
 # walls where the field before an opening was above this are walls of what was opened
 WITHIN = 0.8
 
@@ -137,13 +137,31 @@ def faults(mesh: TriangleMesh) -> str:
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
     """Return the surface smoothed, remeshed and untangled, and the number of faces that cut others before that.
 
-    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53).
+    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53). Walls of a narrow slit that stay
+    tangled are not smoothed.
     """
     document = in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
-    even = remesh(from_meshlab(document), edge_length_mm)
+    smooth = from_meshlab(document)
+    even = remesh(smooth, edge_length_mm)
     cutting = int(self_intersecting_faces(even).sum())
-    return untangle(even) if cutting else even, cutting
+    if cutting and self_intersecting_faces(even := untangle(even)).any():
+        even = untangle(remesh(_held_back(mesh, smooth), edge_length_mm))
+    return even, cutting
+
+
+def _held_back(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
+    """Return the smoothed surface with faces that cut others, and some rings around these, as they were before."""
+    for _ in range(HELD_BACK):
+        held = self_intersecting_faces(smooth)
+        if not held.any():
+            break
+        for _ in range(HELD_RINGS):
+            held[:] = np.isin(mesh.faces, mesh.faces[held]).any(axis=1)
+        places = smooth.vertices.copy()
+        places[mesh.faces[held]] = mesh.vertices[mesh.faces[held]]
+        smooth = TriangleMesh(places, mesh.faces)
+    return smooth
 
 
 def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:

@@ -24,8 +24,10 @@ FINE_MM = 0.5
 APART = 1.4
 # the cortex of a bank has at least this part of its usual thickness
 LEAST_BANK = 0.75
-# smaller sheets are roughness of the labels
+# smaller sheets are roughness of the labels; those that reach less deep below the surface, in cortical thicknesses, are
+# an open sulcus' own bottom, rounded by voxels
 LEAST_MM2 = 8.0
+DEEP = 1.5
 # the field in a slit: with 1 beside it, a slit one voxel wide comes out 0.9 voxels wide
 IN_SLIT = 0.1
 # cortex further from white matter than so many thicknesses lacks white matter; more than this share of it is too much
@@ -62,7 +64,9 @@ def open_shut_sulci(
     number, count = ndimage.label(apart > 0, OUTSIDE)
     reached = np.bincount(number[beside], minlength=count + 1) > 0
     large = np.bincount(number.ravel(), minlength=count + 1) * size.prod() ** (2 / 3) >= LEAST_MM2
-    kept = reached & large & (np.arange(count + 1) > 0)
+    depth = ndimage.distance_transform_edt(inside, sampling=size)
+    deep = ndimage.maximum(depth, number, np.arange(count + 1)) > DEEP * thickness
+    kept = reached & large & deep & (np.arange(count + 1) > 0)
     slit = _grown(inside, kept[number], cortex, apart)
     opened = np.where(slit, np.minimum(whole, np.float32(IN_SLIT)), whole)
     taken = float((whole - opened).sum(dtype=float) * size.prod() * ML_PER_MM3)

@@ -39,7 +39,7 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
     """
     vertices, faces = moving.vertices, moving.faces
     normals, areas = vertex_normals(surface), vertex_areas(surface)
-    for length in PULL_MM:
+    for spread in PULL_MM:
         now = TriangleMesh(vertices, faces)
         areas_now = vertex_areas(now)
         there = match_points(vertices, vertex_normals(now), surface)
@@ -51,9 +51,12 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
         np.add.at(weight, back.corners, shares)
         np.add.at(pull, back.corners, shares[..., None] * missing[:, None])
         smooth = diffuse(
-            vertices, faces, np.column_stack([pull, weight]) / np.maximum(areas_now, 1e-9)[:, None], length
+            vertices, faces, np.column_stack([pull, weight]) / np.maximum(areas_now, 1e-9)[:, None], spread
         )
-        vertices = vertices + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
+        move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
+        # a mean of pulls is no longer than these; beside obtuse faces, smoothed weights may come out as zero or less
+        length = np.linalg.norm(move, axis=1, keepdims=True)
+        vertices = vertices + move * np.minimum(1.0, REACH_MM / np.maximum(length, 1e-9))
     return np.asarray(vertices)
 
 

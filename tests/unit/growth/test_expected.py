@@ -49,6 +49,28 @@ def test_a_smoothed_surface_is_fitted_onto_the_folded_one():
     assert bend(fitted) == pytest.approx(bend(folded), rel=0.05)
 
 
+def test_needles_do_not_throw_vertices_off_the_surface():
+    bands, around = 6, 60
+    heights, angles = np.cos(np.linspace(0, np.pi, bands)[1:-1]), np.linspace(0, 2 * np.pi, around, endpoint=False)
+    # rings turned against each other: faces along them have angles of almost 180°
+    rings = [(np.sqrt(1 - z * z), angles + 8 * z, z) for z in heights]
+    points = [np.column_stack([r * np.cos(a), r * np.sin(a), np.full(around, z)]) for r, a, z in rings]
+    one = np.arange(around) + 1
+    faces = [np.column_stack([0 * one, one, np.roll(one, -1)])]
+    for ring in range(bands - 3):
+        low, high = one + around * ring, one + around * (ring + 1)
+        faces += [
+            np.column_stack([low, high, np.roll(high, -1)]),
+            np.column_stack([low, np.roll(high, -1), np.roll(low, -1)]),
+        ]
+    last, end = one + around * (bands - 3), around * (bands - 2) + 1
+    faces.append(np.column_stack([last, 0 * one + end, np.roll(last, -1)]))
+    ball = TriangleMesh(20.0 * np.vstack([[[0, 0, 1]], *points, [[0, 0, -1]]]), np.vstack(faces))
+    half = sphere(21.0, 4)
+    half = TriangleMesh(half.vertices, half.faces[half.vertices[half.faces].mean(axis=1)[:, 2] > 0])
+    assert np.linalg.norm(fit_onto_surface(ball, half) - ball.vertices, axis=1).max() < 15
+
+
 def shift_map(factor, shift=(0.0, 0.0, 0.0)):
     """Return a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
     matrix = np.diag([factor] * 3 + [1.0])
