@@ -6,7 +6,13 @@ from boxes import distorted_box, everywhere_known, problem_on, set_layers, smoot
 from shapes import box_mesh
 
 from gyriflow.folding import linear_solver
-from gyriflow.folding.linear_solver import SHIFTED, NotConvergedError, TwoLevelPreconditioner, positive_inverses
+from gyriflow.folding.linear_solver import (
+    SHIFTED,
+    NotConvergedError,
+    TwoLevelPreconditioner,
+    inverse_blocks,
+    inverse_matrix,
+)
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 
@@ -68,11 +74,10 @@ def test_rigid_motions_of_the_parts_are_solved_by_the_coarse_level(monkeypatch):
 def test_blocks_that_are_not_positive_definite_are_made_so():
     turn = np.linalg.qr(np.array([[2.0, 1.0, 0.0], [0.3, 1.0, 1.0], [0.0, 0.2, 3.0]]))[0]
     blocks = np.stack([turn @ np.diag(values) @ turn.T for values in ([4.0, 2.0, 1.0], [4.0, 2.0, -1.0])])
-    assert positive_inverses(blocks[:1])[0] @ blocks[0] == pytest.approx(np.eye(3), abs=1e-12)
-    inverses = positive_inverses(blocks)
     expected = turn @ np.diag([0.25, 0.5, 1.0]) @ turn.T
-    assert inverses[0] == pytest.approx(expected, abs=1e-12)
-    assert inverses[1] == pytest.approx(expected, abs=1e-12)
+    assert inverse_blocks(blocks) == pytest.approx(np.stack([expected, expected]), abs=1e-12)
+    for block in blocks:
+        assert inverse_matrix(block) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_tangent_that_is_not_positive_definite_is_shifted():

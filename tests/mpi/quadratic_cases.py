@@ -105,4 +105,5 @@ def test_the_diagonal_has_the_blocks_of_contact():
         tangent.matrix.mult(unit, product)
         if 0 <= node - first < problem.domain.owned:
             expected = product.array.reshape(-1, 3)[node - first]
-            assert blocks[node - first, :, 1] == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(blocks).max())
+            # products are in single precision
+            assert blocks[node - first, :, 1] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(blocks).max())

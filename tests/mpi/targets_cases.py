@@ -11,11 +11,12 @@ from shapes import ellipsoid_mesh, rigid
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.simulation import Folding
+from gyriflow.folding.stretches import Stretches
 from gyriflow.folding.targets import inverse_exponential, log_growth
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.geometry.diffusion import MovingStiffness, Share, cell_sizes, vertex_sizes
+from gyriflow.geometry.diffusion import Share, cell_sizes, vertex_sizes
 from gyriflow.geometry.tetrahedra import linear_pieces
 from gyriflow.parameters.folding import parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
@@ -102,19 +103,19 @@ def test_a_step_across_a_target_goes_on_towards_the_next_one():
 
 
 @pytest.mark.one_rank
-@pytest.mark.parametrize("stretches", [[1.05, 0.98, 1.1], [1.02, 0.99, 1.04]])
-def test_growth_of_an_even_stretch_is_that_stretch(stretches):
+@pytest.mark.parametrize("lengths", [[1.05, 0.98, 1.1], [1.02, 0.99, 1.04]])
+def test_growth_of_an_even_stretch_is_that_stretch(lengths):
     axes = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    U = axes @ np.diag(stretches) @ axes.T
+    U = axes @ np.diag(lengths) @ axes.T
     turn = rigid(30, 40, 50)[:3, :3]
-    stiffness = MovingStiffness(linear_pieces(BODY), len(BODY.vertices))
-    logs = log_growth(BODY.vertices, stiffness, BODY.vertices @ (turn @ U).T - BODY.vertices, 3.0)
-    expected = axes @ np.diag(np.log(stretches)) @ axes.T
+    stretches = Stretches(linear_pieces(BODY), len(BODY.vertices))
+    logs = log_growth(BODY.vertices, stretches, BODY.vertices @ (turn @ U).T - BODY.vertices, 3.0)
+    expected = axes @ np.diag(np.log(lengths)) @ axes.T
     at = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
     assert logs == pytest.approx(np.tile(expected[at], (len(logs), 1)), abs=1e-6)
     assert inverse_exponential(expected) == pytest.approx(np.linalg.inv(U), abs=1e-6)
     # what a rigid motion alone leaves is none
-    assert log_growth(BODY.vertices, stiffness, BODY.vertices @ turn.T - BODY.vertices, 3.0) == pytest.approx(
+    assert log_growth(BODY.vertices, stretches, BODY.vertices @ turn.T - BODY.vertices, 3.0) == pytest.approx(
         0, abs=1e-9
     )
 
@@ -122,8 +123,8 @@ def test_growth_of_an_even_stretch_is_that_stretch(stretches):
 def test_shared_growth_is_that_of_one_rank():
     count, pieces = len(BODY.vertices), linear_pieces(BODY)
     domain = Domain(COMM, BODY)
-    shares = MovingStiffness(pieces, count), MovingStiffness(pieces, count, Share(COMM.rank, COMM.size, domain.summed))
-    alone, shared = (log_growth(BODY.vertices, stiffness, bent(1) - BODY.vertices, 3.0) for stiffness in shares)
+    shares = Stretches(pieces, count), Stretches(pieces, count, Share(COMM.rank, COMM.size, domain.summed))
+    alone, shared = (log_growth(BODY.vertices, stretches, bent(1) - BODY.vertices, 3.0) for stretches in shares)
     assert shared == pytest.approx(alone, rel=1e-12, abs=1e-12 * np.abs(alone).max())
     assert (COMM.bcast(shared) == shared).all()
 

@@ -26,11 +26,17 @@ class LinearElements:
         self.G_inverse: Floats = np.tile(np.eye(3), (len(domain.cells), 1, 1))
 
     def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
-        """Return the energy in J at displacements (k, 3) in m; add forces in N, stiffness in N/m to what is given."""
+        """Return the energy in J at displacements (k, 3) in m; add forces in N, stiffness in N/m to what is given.
+
+        Of the stiffness between two owned nodes there is the block above the diagonal only.
+        """
         cells, nodes = self._domain.cells, self._domain.local(self._domain.positions)
         if matrix is not None and self._places is None:
             places = sparse.csr_array((np.arange(len(matrix.indices), dtype=np.int32), matrix.indices, matrix.indptr))
-            self._places = places[np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, 4).ravel()]
+            rows, columns = np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, 4).ravel()
+            # of two blocks that mirror each other one is enough, but where ghosts are among their nodes
+            needed = (columns >= rows) | (columns >= self._domain.owned) | (rows >= self._domain.owned)
+            self._places = np.where(needed, places[rows, columns], -1)
         arrays = cells, nodes, u, self.G_inverse, self.mu, forces, self._places, None if matrix is None else matrix.data
         pointers = [self._interface.NULL if x is None else self._interface.from_buffer(x) for x in arrays]
         return float(self._code.assemble(len(cells), self._bulk_to_shear, *pointers))

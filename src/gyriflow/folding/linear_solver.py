@@ -10,13 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..errors import SolverError
 from ..geometry.triangles import Floats
 from .domain import Domain
 from .problem import Problem
+from .products import PartMotions, multiply_blocks
 from .surface_parts import shared_out
-from .tangent import Tangent, rigid_motions
+from .tangent import Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
 PLAIN, SHIFTED = range(2)
@@ -61,8 +63,10 @@ class TwoLevelPreconditioner:
         self._part_of_vertex = shared_out(domain.positions, count)
         self._part = self._part_of_vertex[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
+        self._parts = int(self._part.max()) + 1
         # the motions of parts that have nodes of this rank: it needs no other rows of the coarse inverse
         self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
+        self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
         self._made_at = -LIFETIME
 
     def renew(self) -> None:
@@ -74,53 +78,65 @@ class TwoLevelPreconditioner:
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the preconditioned x."""
-        coarse = self._domain.summed(self._restriction @ x.array_r)
-        coarse[self._moved] = self._inverse_coarse @ coarse
-        y.array_w[:] = self._inverse_diagonal @ x.array_r + self._prolongation @ coarse
+        coarse = self._domain.summed(self._motions.restrict(x.array_r, self._parts))
+        coarse[self._moved] = self._inverse_coarse @ coarse.astype(np.float32)
+        multiply_blocks(self._inverse_diagonal, x.array_r, y.array_w)
+        self._motions.add(coarse, y.array_w)
+        y.array_w[self._fixed] = 0.0
         if self._tangent.motions is not None:
             self._tangent.motions.remove(y.array_w)
 
     def _set_diagonal(self) -> None:
-        inverse = positive_inverses(self._tangent.diagonal())
-        count = len(inverse)
-        self._inverse_diagonal = sparse.bsr_matrix((inverse, np.arange(count), np.arange(count + 1)))
+        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(np.float32)
 
     def _set_coarse_level(self) -> None:
         matrix = self._tangent.elastic.matrix
-        modes = rigid_motions(self._domain.positions, self._part_of_vertex, self._vertex)
+        arms = part_arms(self._domain.positions, self._part_of_vertex)[self._vertex]
+        self._motions = PartMotions(self._part[self._own], arms[self._own])
+        modes = rigid_motions(arms)
         modes[matrix.fixed] = 0.0
-        size = 6 * (int(self._part.max()) + 1)
-        all_nodes = np.arange(len(modes) + 1)
-        prolongation = sparse.bsr_matrix((modes, self._part, all_nodes), shape=(3 * len(modes), size))
-        rows = sparse.bsr_matrix(
-            (matrix.values, matrix.columns, matrix.row_ends), shape=(3 * self._domain.owned, 3 * len(modes))
-        )
-        own_nodes = all_nodes[: self._domain.owned + 1]
-        self._prolongation = sparse.bsr_matrix(
-            (modes[self._own], self._part[self._own], own_nodes), shape=(3 * self._domain.owned, size)
-        )
-        self._restriction = self._prolongation.T.tobsr((6, 3))
-        coarse = self._domain.summed((self._restriction @ (rows @ prolongation)).toarray())
+        size, nodes = 6 * self._parts, np.arange(len(modes) + 1)
+        prolongation = sparse.bsr_matrix((modes, self._part, nodes), shape=(3 * len(modes), size))
+        own = modes[self._own], self._part[self._own], nodes[: self._domain.owned + 1]
+        restriction = sparse.bsr_matrix(own, shape=(3 * self._domain.owned, size)).T.tobsr((6, 3))
+        coarse = self._domain.summed((restriction @ (matrix.half() @ prolongation)).toarray())
+        coarse += coarse.T
         scale = np.trace(coarse) / size
         coarse[np.diag_indices(size)] += REGULARISED * scale
         motions = self._tangent.motions
         if motions is not None:
             # stiff against what is taken out of all products, and would make it singular
-            held = self._domain.summed(self._restriction @ motions.modes)
+            held = self._domain.summed(restriction @ motions.modes)
             coarse += 10 * scale / np.linalg.norm(held, 2) ** 2 * held @ held.T
-        self._inverse_coarse = positive_inverses((coarse + coarse.T) / 2)[self._moved]
+        self._inverse_coarse = inverse_matrix(coarse)[self._moved].astype(np.float32)
+
+
+def inverse_blocks(blocks: Floats) -> Floats:
+    """Return the inverses of (n, 3, 3) symmetric blocks, made positive definite."""
+    a, b, c = blocks.swapaxes(0, 1)
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    determinants = np.einsum("ni,ni->n", a, cofactors[:, 0])
+    definite = (blocks[:, 0, 0] > 0) & (cofactors[:, 2, 2] > 0) & (determinants > 0)
+    inverses = cofactors / np.where(definite, determinants, 1.0)[:, None, None]
+    inverses[~definite] = positive_inverses(blocks[~definite])
+    return np.asarray(inverses)
+
+
+def inverse_matrix(matrix: Floats) -> Floats:
+    """Return the inverse of a (k, k) symmetric matrix, made positive definite."""
+    factor, failed = dpotrf(matrix, lower=1)
+    if failed:
+        return positive_inverses(matrix)
+    inverse = np.tril(dpotri(factor, lower=1)[0])
+    return np.asarray(inverse + np.tril(inverse, -1).T)
 
 
 def positive_inverses(matrices: Floats) -> Floats:
-    """Return inverses of (..., k, k) symmetric matrices, made positive definite: eigenvalues below 0 change sign."""
-    try:
-        np.linalg.cholesky(matrices)
-    except np.linalg.LinAlgError:
-        values, directions = np.linalg.eigh(matrices)
-        sizes = np.abs(values)
-        sizes = np.maximum(sizes, REGULARISED * sizes.max(axis=-1, keepdims=True))
-        return (directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2)
-    return np.asarray(np.linalg.inv(matrices), dtype=float)
+    """Return inverses of (..., k, k) symmetric matrices of which eigenvalues below 0 have changed sign."""
+    values, directions = np.linalg.eigh(matrices)
+    sizes = np.abs(values)
+    sizes = np.maximum(sizes, REGULARISED * sizes.max(axis=-1, keepdims=True))
+    return np.asarray((directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2))
 
 
 class LinearSolver:

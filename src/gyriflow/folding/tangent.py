@@ -9,89 +9,85 @@ from collections.abc import Callable, Sequence
 import dolfinx
 import numpy as np
 from dolfinx.la import BlockMode, MatrixCSR
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 
 from ..geometry.triangles import Floats
 from .domain import Domain
+from .products import PartMotions, SymmetricProducts
 
 
-def rigid_motions(positions: Floats, part: NDArray[np.int64], chosen: NDArray[np.int64]) -> Floats:
-    """Return the (k, 3, 6) translations and rotations of k `chosen` ones of points at (n, 3) positions.
-
-    Rotations are about the centres of the parts that the (n,) numbers name, scaled by the size of the largest one.
-    """
+def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return (n, 3) places from the centres of the parts that (n,) numbers name, over the size of the largest part."""
     counts = np.bincount(part)
     centres = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1) / np.maximum(counts, 1)[:, None]
-    arm = positions - centres[part]
-    arm = arm[chosen] / np.abs(arm).max()
-    motions = np.zeros((len(chosen), 3, 6))
+    arms = positions - centres[part]
+    return np.asarray(arms / np.abs(arms).max(), dtype=np.float32)
+
+
+def rigid_motions(arms: NDArray[np.float32]) -> Floats:
+    """Return the (n, 3, 6) translations of points, and their rotations about centres from which (n, 3) arms lead."""
+    motions = np.zeros((len(arms), 3, 6))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         motions[:, i, i] = 1.0
-        motions[:, j, 3 + i], motions[:, k, 3 + i] = -arm[:, k], arm[:, j]
+        motions[:, j, 3 + i], motions[:, k, 3 + i] = -arms[:, k], arms[:, j]
     return motions
 
 
 class RigidMotions:
-    """The translations and rotations, orthonormal, of the parts of the present mesh that vertices belong to by (n,)
-    numbers."""
+    """The translations and rotations of the parts of the present mesh that vertices belong to by (n,) numbers."""
 
     def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
-        self.comm = domain.comm
         vertices = domain.vertex_of_node[: domain.owned]
-        motions, of_part = rigid_motions(domain.positions, part, vertices), part[vertices]
-        modes = []
-        for number in range(int(part.max()) + 1):
-            motion = np.where((of_part == number)[:, None, None], motions, 0.0).reshape(-1, 6)
-            modes.append(np.linalg.solve(np.linalg.cholesky(domain.summed(motion.T @ motion)), motion.T).T)
-        self.modes: Floats = np.concatenate(modes, axis=1)
+        arms, of_part = part_arms(domain.positions, part)[vertices], part[vertices]
+        self._domain, self._motions, self._parts = domain, PartMotions(of_part, arms), int(part.max()) + 1
+        motions = rigid_motions(arms)
+        of_number = [np.where((of_part == number)[:, None, None], motions, 0.0) for number in range(self._parts)]
+        self.modes: Floats = np.concatenate(of_number, axis=2).reshape(-1, 6 * self._parts)
+        self._inverse_gram = np.linalg.inv(domain.summed(self.modes.T @ self.modes))
 
     def remove(self, values: Floats) -> None:
         """Take the rigid motions out of the owned components of a vector, in place."""
-        amounts = self.comm.allreduce(self.modes.T @ values, op=MPI.SUM)
-        values -= self.modes @ amounts
+        amounts = self._domain.summed(self._motions.restrict(values, self._parts))
+        self._motions.add(-self._inverse_gram @ amounts, values)
 
 
 class ElasticMatrix:
-    """The elastic tangent as 3 × 3 blocks, which dolfinx holds and PETSc multiplies with.
+    """The elastic tangent as 3 × 3 blocks, which dolfinx holds.
 
-    dolfinx' own block matrices are filled about twice as fast as PETSc's. Products go to the blocks on and above the
-    diagonal: half of the memory to read, three fifths of the time.
+    dolfinx' own block matrices are filled about twice as fast as PETSc's.
 
     `coupling` is a form with the same places of entries, which `add` adds at the present displacement, `fixed` (owned,
     3) the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is (all
-    nodes, 3), by global nodes. `products` is the matrix for products. Of the (b,) blocks of the owned rows, row by row,
-    `nodes` are the owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) says where
-    each row begins and ends.
+    nodes, 3), by global nodes. `products` multiplies. Of the (b,) blocks of the owned rows, row by row, `nodes` are the
+    owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) says where each row begins
+    and ends.
     """
 
     def __init__(self, coupling: dolfinx.fem.Form, add: Callable[[MatrixCSR], None], fixed: NDArray[np.bool_]) -> None:
         self._add = add
         self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)
         row_map, column_map = self._blocks.index_map(0), self._blocks.index_map(1)
-        owned, (first, end) = row_map.size_local, row_map.local_range
+        owned, first = row_map.size_local, row_map.local_range[0]
         self.row_ends = self._blocks.indptr[: owned + 1]
         self.nodes = np.repeat(np.arange(owned), np.diff(self.row_ends))
-        self.columns = column_map.local_to_global(self._blocks.indices[: len(self.nodes)])
+        local_columns = self._blocks.indices[: len(self.nodes)]
+        self.columns = column_map.local_to_global(local_columns)
         # by global numbers, since the columns reach nodes that no local element has
         self.fixed = np.concatenate(row_map.comm.allgather(fixed))
         rows = first + self.nodes
         self._diagonal = np.flatnonzero(rows == self.columns)
-        self._crossed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
-        self._crossed_diagonal = np.einsum("bii->bi", self._crossed)[self._diagonal]
-        self._upper = np.flatnonzero(self.columns >= rows)
-        upper_nodes, upper_columns = self.nodes[self._upper], self.columns[self._upper]
-        counts = [
-            np.bincount(upper_nodes[part], minlength=owned) for part in (upper_columns < end, upper_columns >= end)
-        ]
-        self._upper_ends = np.concatenate([[0], np.cumsum(counts[0] + counts[1])]).astype(PETSc.IntType)
-        self._upper_columns = upper_columns.astype(PETSc.IntType)
-        size = (3 * owned, 3 * row_map.size_global)
-        self.products = PETSc.Mat().createSBAIJ(
-            (size, size), bsize=3, nnz=[count.astype(PETSc.IntType) for count in counts], comm=row_map.comm
-        )
+        crossed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
+        self._crossed = np.flatnonzero(crossed)
+        self._crossed_diagonal = np.einsum("bii->bi", crossed)[self._diagonal]
+        # one of two blocks that mirror each other is enough, but where they belong to different ranks
+        self._kept = np.flatnonzero((self.columns >= rows) | (local_columns >= owned)).astype(np.int32)
+        of_kept = self.nodes[self._kept], local_columns[self._kept]
+        self.products = SymmetricProducts(column_map, *of_kept)
+        # that and its transpose are the whole
+        self._share_of_half = np.where((rows == self.columns) | (local_columns >= owned), 0.5, 1.0)[self._kept]
 
     def assemble(self) -> None:
         """Assemble the tangent at the present displacement."""
@@ -99,10 +95,16 @@ class ElasticMatrix:
         self._add(self._blocks)
         self._blocks.scatter_reverse()
         values = self.values
-        values[self._crossed] = 0.0
+        values.reshape(-1)[self._crossed] = 0.0
         np.einsum("bii->bi", values)[self._diagonal] += self._crossed_diagonal
-        self.products.setValuesBlockedIJV(self._upper_ends, self._upper_columns, values[self._upper].ravel())
-        self.products.assemble()
+        self.products.take(values, self._kept)
+
+    def half(self) -> sparse.bsr_matrix:
+        """Return the owned rows of a matrix that is the whole one together with its transpose."""
+        ends = np.searchsorted(self.nodes[self._kept], np.arange(len(self.row_ends)))
+        blocks = self.values[self._kept] * self._share_of_half[:, None, None]
+        shape = 3 * (len(self.row_ends) - 1), 3 * len(self.fixed)
+        return sparse.bsr_matrix((blocks, self.columns[self._kept], ends), shape=shape)
 
     @property
     def values(self) -> Floats:
@@ -157,7 +159,7 @@ class KeptTangent:
         if not self._valid:
             return False
         self._change.waxpy(-1.0, self._at_u, displacement)
-        self.matrix.products.mult(self._change, self._product)
+        self.matrix.products.multiply(self._change.array_r, self._product.array_w)
         predicted = self._product.norm()
         self._product.axpy(1.0, self._at_forces)
         self._product.axpy(-1.0, self._forces)
@@ -187,7 +189,7 @@ class Tangent:
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the product with x."""
-        self.elastic.matrix.products.mult(x, y)
+        self.elastic.matrix.products.multiply(x.array_r, y.array_w)
         for part in self.parts:
             part.multAdd(x, y, y)
         if self._shift is not None:

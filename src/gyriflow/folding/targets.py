@@ -13,18 +13,14 @@ from scipy import sparse
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
-from ..geometry.diffusion import MovingStiffness, Share, conjugate_gradients, vertex_sizes
+from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
-from ..geometry.tetrahedra import gradients
 from ..parameters.folding import AXES, FoldingParameters
 from .growth import Floats, Growth, GrowthInputs, Size, StepStart
 from .layers import Tissue
-from .stress import packed, unpacked
+from .stress import unpacked
+from .stretches import Stretches
 
-MOST_STRAIN = 0.3
-"""Largest logarithmic growth in any direction in a step: more belongs to elements that the target folds over."""
-SMALL = 0.12
-"""Largest entry of FᵀF − 1 for which the logarithm is taken by its series."""
 SMOOTHING_MM = 1.5
 """Standard deviation that growth is smoothed with in space."""
 SMOOTHED_TO = 1e-3
@@ -62,12 +58,12 @@ class TargetGrowth(Growth):
 class GrowthToTargets:
     """The model of growth towards shapes of the whole mesh at later weeks.
 
-    The run's maps hold the shapes, of which the pose does not count; growth is smoothed with `stiffness`.
+    The run's maps hold the shapes, of which the pose does not count; `stretches` are those of the moving mesh.
     """
 
     parameters: FoldingParameters
     inputs: GrowthInputs
-    stiffness: MovingStiffness
+    stretches: Stretches
 
     @classmethod
     def of(cls, p: FoldingParameters, inputs: GrowthInputs, share: Share) -> "GrowthToTargets":
@@ -78,7 +74,7 @@ class GrowthToTargets:
                 found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, MovingStiffness(inputs.pieces, len(inputs.zones.growth), share))
+        return cls(p, inputs, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> Growth:
         """Return the growth of a step: its part of what is left to the next target.
@@ -102,54 +98,26 @@ class GrowthToTargets:
             before = laid(since, places)
         part = min(1.0, (end - since) / max(ahead[0] - since, SOON_GW))
         aim = before + part * (laid(ahead[0], before) - before)
-        strain = log_growth(places, self.stiffness, aim - places, SMOOTHING_MM)
+        strain = log_growth(places, self.stretches, aim - places, SMOOTHING_MM)
         away = float(np.sqrt(np.average((missing**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(self.parameters, start, (strain * growing).T, away)
 
 
-def log_growth(positions: Floats, stiffness: MovingStiffness, displacement: Floats, smoothing_mm: float) -> Floats:
+def log_growth(positions: Floats, stretches: Stretches, displacement: Floats, smoothing_mm: float) -> Floats:
     """Return the (n, 6) logarithm ln U of the stretch of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
-    Positions and displacement are (n, 3) in mm. Ranks share elements, then components, as `stiffness` is shared.
+    Positions and displacement are (n, 3) in mm. Ranks share elements, then components, as `stretches` are shared.
     """
-    tets, share = stiffness.tets, stiffness.share
-    # the last of the seven is the size
-    after, parts = positions + displacement, np.empty((len(tets), 7))
-    for chunk in chunks(len(tets)):
-        corners = tets[chunk]
-        slopes, volumes = gradients(positions, corners)
-        edges = np.swapaxes(after[corners[:, 1:]] - after[corners[:, :1]], 1, 2)
-        parts[chunk, :6], parts[chunk, 6] = packed(log_stretch(edges @ slopes)), 1.0
-        parts[chunk] *= (volumes / 4)[:, None]
-    sums = [np.bincount(tets.ravel(), np.repeat(part, 4), minlength=len(positions)) for part in parts.T]
-    means = share.summed(np.stack(sums, axis=1))
-    means, sizes = means[:, :6], np.where(means[:, 6:] > 0, means[:, 6:], 1.0)
+    sums, sizes, stiffness = stretches.of(positions, displacement)
+    sizes = np.where(sizes > 0, sizes, 1.0)[:, None]
     if smoothing_mm == 0:
-        return means / sizes
+        return sums / sizes
     # as `diffuse` does, but in one step, whose tails are longer than a Gaussian's
-    matrix = sparse.csr_matrix(sparse.diags(sizes[:, 0]) + smoothing_mm**2 / 2 * stiffness.at(positions))
-    smooth, columns = np.zeros_like(means), share.of(6)
-    smooth[:, columns] = conjugate_gradients(matrix, means[:, columns], (means / sizes)[:, columns], SMOOTHED_TO)
-    return share.summed(smooth)
-
-
-def log_stretch(F: Floats) -> Floats:
-    """Return the (m, 3, 3) logarithms ln U of the right stretch of (m, 3, 3) gradients, none above `MOST_STRAIN`.
-
-    Where all of FᵀF − 1 is below `SMALL`, six terms of the series of ln(1 + x) give it to 3e-8.
-    """
-    squares = np.swapaxes(F, 1, 2) @ F
-    x = squares - np.eye(3)
-    series = np.eye(3) / 6
-    for order in range(5, 0, -1):
-        series = np.eye(3) / order - x @ series
-    logs = 0.5 * (x @ series)
-    large = np.abs(x).max(axis=(1, 2)) > SMALL
-    values, axes = np.linalg.eigh(squares[large])
-    stretches = np.clip(0.5 * np.log(np.maximum(values, 1e-12)), -MOST_STRAIN, MOST_STRAIN)
-    logs[large] = (axes * stretches[:, None, :]) @ np.swapaxes(axes, 1, 2)
-    return np.asarray(logs)
+    matrix = sparse.csr_matrix(sparse.diags(sizes[:, 0]) + smoothing_mm**2 / 2 * stiffness)
+    smooth, columns = np.zeros_like(sums), stretches.share.of(6)
+    smooth[:, columns] = conjugate_gradients(matrix, sums[:, columns], (sums / sizes)[:, columns], SMOOTHED_TO)
+    return stretches.share.summed(smooth)
 
 
 def inverse_exponential(logs: Floats) -> Floats:

@@ -95,15 +95,6 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
     return volumes
 
 
-def gradients(vertices: Floats, tets: Ints) -> tuple[Floats, Floats]:
-    """Return the (m, 3, 3) gradients of the barycentric coordinates of the last three corners, and (m,) volumes."""
-    a, b, c, d = (vertices[corner] for corner in tets.T)
-    p, q, r = b - a, c - a, d - a
-    normals = np.stack([np.cross(q, r), np.cross(r, p), np.cross(p, q)], axis=1)
-    volumes6 = np.einsum("ij,ij->i", p, normals[:, 0])
-    return normals / volumes6[:, None, None], volumes6 / 6
-
-
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
     """Return the (m,) volumes in mm³, negative for inverted elements."""
     return volumes_between(mesh.vertices, mesh.tets)

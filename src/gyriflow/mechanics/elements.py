@@ -15,7 +15,8 @@ DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, 
 """Returns the energy of `count` elements, and adds their forces and stiffness unless these are NULL.
 
 Of the nodes there are (·, 3) positions X, displacements u and forces; of each element the nodes `cells` (·, 4), the
-inverse growth tensor, the shear modulus, and the `places` (·, 4, 4) of its pairs of nodes among the blocks (·, 3, 3).
+inverse growth tensor, the shear modulus, and the `places` (·, 4, 4) of its pairs of nodes among the blocks (·, 3, 3),
+negative where there is none.
 """
 CODE = """
 #include <math.h>
@@ -78,9 +79,10 @@ double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], con
                 K[i][j] = f[a][i] * (4 * of_II * f[d][j] + 2 * of_IJ * c[d][j])
                     + c[a][i] * (2 * of_IJ * f[d][j] + (of_JJ + exchanged) * c[d][j]) - exchanged * c[d][i] * c[a][j];
             EACH(i, 3) K[i][i] += 2 * of_I * dot(b[a], b[d]);
-            EACH(l, lanes) EACH(i, 3) EACH(j, 3) {
-                blocks[places[first + l][a][d]][i][j] += K[i][j][l];
-                if (a != d) blocks[places[first + l][d][a]][j][i] += K[i][j][l];
+            EACH(l, lanes) {
+                int32_t here = places[first + l][a][d], mirrored = places[first + l][d][a];
+                if (here >= 0) EACH(i, 3) EACH(j, 3) blocks[here][i][j] += K[i][j][l];
+                if (a != d && mirrored >= 0) EACH(i, 3) EACH(j, 3) blocks[mirrored][j][i] += K[i][j][l];
             }
         }
     }

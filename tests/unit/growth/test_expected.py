@@ -8,10 +8,11 @@ from scipy.spatial.transform import Rotation
 from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, sphere
 
 from gyriflow.errors import InputError
+from gyriflow.folding.stretches import Stretches
 from gyriflow.folding.targets import log_growth
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, transform_points
-from gyriflow.geometry.diffusion import MovingStiffness, diffuse, vertex_sizes
+from gyriflow.geometry.diffusion import diffuse, vertex_sizes
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
@@ -203,7 +204,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     axes = np.array([30.0, 36.0, 27.0])
     mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
     pieces, x = linear_pieces(mesh), mesh.vertices
-    stiffness = MovingStiffness(pieces, len(x))
+    stretches = Stretches(pieces, len(x))
 
     # the atlas' place of each point of the brain
     def psi(p):
@@ -220,7 +221,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     surfaces = [TriangleMesh(at, fine.faces) for at in (first, grows(first))]
     pairs = [sampled(psi, fine.vertices), sampled(grows, first)]
     carried = carry_sharply(mesh, pairs, surfaces)[1:]
-    known = tensors(log_growth(psi(x), stiffness, grows(psi(x)) - psi(x), 0.0))
+    known = tensors(log_growth(psi(x), stretches, grows(psi(x)) - psi(x), 0.0))
     h = 1e-4 * np.eye(3)
     u, _, vt = np.linalg.svd(np.stack([(psi(x + e) - psi(x - e)) / 2e-4 for e in h], axis=2))
     R = u @ vt
@@ -233,7 +234,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     assert size(known - wanted) > 0.5 * size(wanted)
     for own_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.1, 0.2)):
         _, positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], own_mm=own_mm)
-        found = tensors(log_growth(x, stiffness, positions[1] - x, 0.0))
+        found = tensors(log_growth(x, stretches, positions[1] - x, 0.0))
         assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
 
 
