@@ -8,6 +8,7 @@ from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.growth import Growth, layered_inverse
+from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
@@ -50,6 +51,10 @@ def zones_of(mesh, clamped=lambda x: np.zeros(len(x), bool), left=None, right=No
     return Zones(facets, zone, np.ones(len(mesh.vertices)), 0.0, planes)
 
 
+def at_the_bottom(centre):
+    return centre[:, 2] < -2.99
+
+
 def set_layers(problem, mu, dg, dr, normals):
     """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
     points = problem.points
@@ -86,6 +91,15 @@ def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None
     normal = np.tile([0.0, 0.0, 1.0], (len(centres), 1)) if normals is None else normals(centres)
     set_layers(problem, nodal(mu), nodal(dg), nodal(dr), normal)
     return problem
+
+
+def solver_of(problem, **settings):
+    return NewtonSolver(problem, NewtonSettings(**settings), residual_floor=0.0)
+
+
+def solved(problem, **settings):
+    """Return what Newton's method has taken from the start to the end, where the displacement then is."""
+    return solver_of(problem, **settings).solve(np.zeros_like(problem.displacement))
 
 
 def smooth_displacement(domain, size=1e-3):

@@ -3,7 +3,7 @@
 import ipctk
 import numpy as np
 import pytest
-from boxes import COMM, everywhere_known, smooth_displacement
+from boxes import COMM, everywhere_known, smooth_displacement, solved
 from contact_bodies import (
     GAP_MM,
     HEIGHT_MM,
@@ -21,7 +21,6 @@ from shapes import ellipsoid_mesh
 from gyriflow.errors import MeshError
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -71,8 +70,7 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_clo
     zones = in_a_tube(mesh)
     for distance in (0.2, 0.1, 0.05):
         problem, contact = problem_with_contact(mesh, zones, distance, growth_along_z=growth)
-        solver = NewtonSolver(problem, NewtonSettings(1e-9, 1e-6, max_newton=60), residual_floor=0.0)
-        solver.solve(np.zeros_like(problem.displacement))
+        solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-6, max_newton=60)
         place = mesh.vertices + everywhere_known(problem) * MM_PER_M
         on_top = np.isclose(mesh.vertices[:, 2], -GAP_MM / 2)
         below = np.isclose(mesh.vertices[:, 2], GAP_MM / 2)

@@ -2,20 +2,15 @@
 
 import numpy as np
 import pytest
-from boxes import COMM, curved_box, everywhere_known, problem_on, zones_of
+from boxes import COMM, at_the_bottom, curved_box, everywhere_known, problem_on, solved, zones_of
 from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
 from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
 from gyriflow.units import M_PER_MM, MM_PER_M
-
-
-def at_the_bottom(centre):
-    return centre[:, 2] < -2.9
 
 
 def test_volumes_and_facets_are_those_of_the_curved_elements():
@@ -35,9 +30,7 @@ def test_iterations_do_not_grow_with_the_mesh():
     for cells in (2, 4, 8):
         mesh = quadratic(box_mesh((cells,) * 3, (6.0, 6.0, 6.0)))
         problem = problem_on(mesh, zones_of(mesh, at_the_bottom), dg=lambda x: 0.01 + x[:, 2])
-        count = NewtonSolver(problem, NewtonSettings(1e-9, krylov_tolerance=1e-8), residual_floor=0.0).solve(
-            np.zeros_like(problem.displacement)
-        )
+        count = solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-8)
         taken.append(count.krylov / count.newton)
     assert taken[2] <= 1.5 * taken[1]
 
@@ -72,8 +65,7 @@ def test_pressed_blocks_have_the_pressure_of_the_closed_answer_on_any_number_of_
     places = []
     for comm in (COMM, MPI.COMM_SELF):
         problem, contact, mesh = pressed_blocks(comm, growth=0.1, distance=0.1)
-        solver = NewtonSolver(problem, NewtonSettings(1e-10, 1e-8, max_newton=80), residual_floor=0.0)
-        solver.solve(np.zeros_like(problem.displacement))
+        solved(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8, max_newton=80)
         assert contact.pair_count() > 10
         places.append(mesh.vertices + everywhere_known(problem) * MM_PER_M)
     assert np.abs(places[0] - places[1]).max() <= 1e-6 * np.abs(places[1] - mesh.vertices).max()

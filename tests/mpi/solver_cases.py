@@ -4,15 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, curved_box, distorted_box, problem_on, zones_of
+from boxes import COMM, at_the_bottom, curved_box, distorted_box, problem_on, solved, solver_of, zones_of
 from shapes import box_mesh
+from verification_cases.consistency import patch_residual, slopes_of_remainders
 
 from gyriflow.folding.linear_solver import PLAIN, NotConvergedError
-from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-
-
-def at_the_bottom(centre):
-    return centre[:, 2] < -2.99
+from gyriflow.folding.newton import NewtonSettings
 
 
 def growing_problem(contact=False, mesh=None, **changes):
@@ -26,6 +23,17 @@ def growing_problem(contact=False, mesh=None, **changes):
         "dr": 0.002,
     } | changes
     return problem_on(mesh, zones, **layers)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_taylors_remainders_fall_with_the_square_of_the_step(order):
+    # with layers, remembered stress, clamped facets and contact at once
+    assert slopes_of_remainders(COMM, order) == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_uniform_body_is_in_equilibrium_under_an_affine_displacement(order):
+    assert patch_residual(COMM, order) <= 1e-12
 
 
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
@@ -45,9 +53,7 @@ def test_contact_pushes_back_with_the_penalty_pressure(mesh):
 
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
 def test_newton_converges_quadratically_with_tight_linear_solves(mesh):
-    problem = growing_problem(mesh=mesh)
-    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-12, krylov_tolerance=1e-10), residual_floor=0.0)
-    count = solver.solve(np.zeros_like(problem.displacement))
+    count = solved(growing_problem(mesh=mesh), newton_tolerance=1e-12, krylov_tolerance=1e-10)
     assert count.newton <= 7
     assert count.residual <= 1e-12
     assert count.rung == PLAIN
@@ -58,7 +64,7 @@ def test_newton_converges_quadratically_with_tight_linear_solves(mesh):
 @pytest.mark.parametrize("contact", [False, True])
 def test_the_energy_never_rises_from_one_iterate_to_the_next(contact):
     problem = growing_problem(contact, dg=lambda x: 0.05 + 5 * x[:, 2])
-    solver = NewtonSolver(problem, NewtonSettings(newton_tolerance=1e-10, krylov_tolerance=1e-8), residual_floor=0.0)
+    solver = solver_of(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8)
     energies = []
     advance = solver._advance
 
@@ -77,8 +83,7 @@ def test_an_inverting_first_guess_is_dropped():
     problem = growing_problem()
     guess = np.zeros_like(problem.displacement)
     guess[:, 2] = -2.0 * problem.domain.local(problem.domain.positions)[:, 2]
-    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
-    assert solver.solve(guess).residual <= NewtonSettings().newton_tolerance
+    assert solver_of(problem).solve(guess).residual <= NewtonSettings().newton_tolerance
     assert problem.smallest_volume_ratio() > 0
 
 
@@ -86,7 +91,7 @@ def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
     # a long bar clamped over most of its length: some rank has clamped nodes only
     mesh = box_mesh((24, 1, 1), (48.0, 2.0, 2.0))
     problem = problem_on(mesh, zones_of(mesh, lambda c: c[:, 0] < 12.0), dg=0.01, dr=0.01)
-    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    solver = solver_of(problem)
     solver.solve(np.zeros_like(problem.displacement))
     again = problem.displacement.copy()
     assert solver.solve(again).residual <= NewtonSettings().newton_tolerance
@@ -94,7 +99,7 @@ def test_a_rank_on_which_nothing_moves_does_not_stop_the_others():
 
 def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monkeypatch):
     problem = growing_problem()
-    solver = NewtonSolver(problem, NewtonSettings(), residual_floor=0.0)
+    solver = solver_of(problem)
     monkeypatch.setattr(solver, "_advance", lambda iterate, convex: replace(iterate, exhausted=True))
     count = solver.solve(np.zeros_like(problem.displacement))
     assert count.newton == 1
@@ -108,7 +113,7 @@ def test_a_step_with_nothing_left_to_gain_ends_and_is_not_called_converged(monke
 @pytest.mark.parametrize(("gain", "newton"), [(1e-3, 50), (0.0, 5)])
 def test_iterations_that_lower_the_energy_do_not_count_towards_their_limit(gain, newton, monkeypatch):
     problem = growing_problem()
-    solver = NewtonSolver(problem, NewtonSettings(max_newton=5), residual_floor=0.0)
+    solver = solver_of(problem, max_newton=5)
     monkeypatch.setattr(solver, "_advance", lambda iterate, convex: replace(iterate, gain=gain))
     with pytest.raises(NotConvergedError, match=f"after {newton} iterations"):
         solver.solve(np.zeros_like(problem.displacement))

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 from folding_program import TIGHT, WEEK, command, failing_after, fold, kill
 from mpi4py import MPI
-from shapes import ellipsoid_mesh
-from trimesh.creation import icosphere
+from shapes import ellipsoid, ellipsoid_mesh
 from written_frames import element_field
 
 from gyriflow.errors import SolverError
@@ -17,7 +16,7 @@ from gyriflow.folding.run import run
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, is_closed
+from gyriflow.geometry.triangles import is_closed
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
@@ -29,18 +28,10 @@ pytestmark = pytest.mark.slow
 MANY_STEPS = 4000.0
 
 
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("mesh") / "brain.xdmf"
-    write_tetrahedral_mesh(path, ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
-    return path
-
-
 def curved_brain(path):
     """Write an ellipsoid of quadratic elements that follow it."""
-    ball = icosphere(subdivisions=4)
-    surface = TriangleMesh(ball.vertices * [20.0, 26.0, 18.0], ball.faces)
-    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, (20.0, 26.0, 18.0)), surface))
+    axes = (20.0, 26.0, 18.0)
+    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
     return path
 
 
@@ -97,6 +88,7 @@ def killed_after(step, arguments):
 
 @pytest.mark.fault(33, 35)
 @pytest.mark.promise(3)
+@pytest.mark.promise(11)
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
 def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, long_run, tmp_path, first, then):
     out = tmp_path / "out"

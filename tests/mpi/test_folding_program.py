@@ -18,17 +18,10 @@ from gyriflow.folding.__main__ import require_space
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
-from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps, write_tetrahedral_mesh
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
 from gyriflow.parameters.folding import parameters_from
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory):
-    path = tmp_path_factory.mktemp("mesh") / "brain.xdmf"
-    write_tetrahedral_mesh(path, ellipsoid_mesh(8, (20.0, 26.0, 18.0)))
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -69,15 +62,6 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
     ]
     assert summary["radius_ratio_01"] == pytest.approx(ratios)
     assert len(set(ratios)) == 3
-
-
-@pytest.mark.promise(11)
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_the_result_does_not_depend_on_the_number_of_ranks(mesh, tight_run, tmp_path, ranks):
-    assert fold(mesh, tmp_path / "out", ranks, solver=TIGHT).returncode == 0
-    one, more = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, tmp_path / "out"))
-    largest = np.linalg.norm(one - read_positions(tight_run / "frames.h5", 21.0), axis=1).max()
-    assert np.linalg.norm(more - one, axis=1).max() <= 1e-8 * largest
 
 
 def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, default_run):
