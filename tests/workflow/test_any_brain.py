@@ -1,5 +1,6 @@
 """Brains of clinics and labs in the real program: each ends right, or is refused with its true cause."""
 
+import nibabel as nib
 import numpy as np
 import odd_brains
 import pandas as pd
@@ -51,6 +52,22 @@ def labelled(change=lambda labels, affine: labels, scheme="spina-bifida-atlas", 
         return {"labels": f"{name}.nii.gz", "scheme": scheme}
 
     return made
+
+
+def stored_oddly(folder, name):
+    """Write labels as floats with a fourth axis and two matrices, of which the configuration names one."""
+    image = nib.Nifti1Image(LABELS[..., None].astype(np.float32), AFFINE)
+    image.header.set_xyzt_units("mm")
+    image.set_sform(AFFINE, code=1)
+    image.set_qform(np.diag([2.0, 2.0, 2.0, 1.0]), code=2)
+    nib.save(image, folder / f"{name}.nii.gz")
+    return {"labels": f"{name}.nii.gz", "scheme": "spina-bifida-atlas", "affine_from": "sform"}
+
+
+def in_flat_voxels(*_):
+    """Return the same brain in slices of 2.4 mm, three times the voxels' edge in the other directions."""
+    labels, affine = phantom(voxel_mm=0.8)
+    return labels[1::3], affine @ np.array([[3, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
 def whole(mesh, suffix="surf.gii"):
@@ -105,7 +122,12 @@ GOOD = {
     "freesurfer": both_sides(LEFT, RIGHT, white_mm=1.5),
     "bent": whole(cerebrum_surface(odd_brains.bent_midline(APART, AFFINE), AFFINE)),
     "posed": both_sides(*POSED, coordinates="auto"),
+    # what else is read as it is meant, or refused: tests/unit/io/test_volumes.py
+    "stored_oddly": stored_oddly,
+    "flat": labelled(in_flat_voxels),
+    "own_scheme": lambda folder, name: labelled(scheme="mine")(folder, name) | {"week": 24.5},
 }
+MINE = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
 BAD = {
     "small_half": (labelled(odd_brains.small_hemisphere), "the volume seems to hold one hemisphere only"),
     "whole_as_half": (alone("right", lambda labels, affine: labels), "this is no single hemisphere"),
@@ -128,8 +150,10 @@ def study(checkout_copy, tmp_path_factory):
     brains = [{"id": name, "week": 24} | make(workflow.directory, name) for name, make in makers.items()]
     surface = {"edge_length_mm": 2.5, "asymmetric": True}
     metrics = {"curvature_radius_mm": 7.0, "spangy_modes": 50}
-    config = {"brains": brains, "start": "plain", "surface": surface, "metrics": metrics, "folding": {"end_week": 25}}
-    thickness = [f"results/brains/{name}/surface/thickness.shape.gii" for name in ("freesurfer", "crossing")]
+    config = {"schemes": {"mine": MINE}, "brains": brains, "start": "plain", "folding": {"end_week": 25}}
+    config |= {"surface": surface, "metrics": metrics}
+    measured = ("freesurfer", "crossing", "own_scheme")
+    thickness = [f"results/brains/{name}/surface/thickness.shape.gii" for name in measured]
     return workflow.surfaces(config, *thickness)
 
 
@@ -149,8 +173,11 @@ WARNED = {
     "cropped": "the cerebrum touches the border of the volume",
     "upside_down": "the brain was turned by 180°",
     "hypoplasia": "the hemispheres' areas differ by",
+    "flat": "flat.nii.gz: voxels of 2.4 x 0.8 x 0.8 mm are used as they are",
 }
-WARNINGS = trying({"polyp": 46, "pial_ply": 46, "wide": 52, "cropped": 48, "upside_down": 49, "hypoplasia": 52})
+WARNINGS = trying(
+    {"polyp": 46, "pial_ply": 46, "wide": 52, "cropped": 48, "upside_down": 49, "hypoplasia": 52, "flat": 5}
+)
 
 
 def cerebrum_ml(labels):
@@ -176,6 +203,23 @@ def test_what_is_doubtful_is_told(study, name):
     assert any(WARNED[name] in warning for warning in study.report(name)["warnings"])
     assert WARNED[name] in study.log(name)
     assert not any(WARNED[name] in warning for warning in study.report("plain")["warnings"])
+
+
+@pytest.mark.parametrize("name", trying({"stored_oddly": (2, 6), "flat": 5}))
+def test_a_brain_is_the_same_however_it_is_stored(study, name):
+    sizes, expected = (
+        [*report["area_cm2"].values(), report["volume_mL"]] for report in map(study.report, (name, "plain"))
+    )
+    np.testing.assert_allclose(sizes, expected, rtol=0.06 if name == "flat" else 0.005)
+
+
+@pytest.mark.fault(16)
+def test_labels_of_a_scheme_of_ones_own_give_a_surface_with_its_thickness_at_its_week(study):
+    report = study.report("own_scheme")
+    assert (report["week"], report["scheme"], report["euler_number"]) == (24.5, "mine", 2)
+    assert abs(report["smoothing"]["volume_change"]) < 0.01
+    (thickness,) = nib.load(study.results / "own_scheme" / "surface" / "thickness.shape.gii").darrays
+    assert len(thickness.data) == report["vertices"]
 
 
 @pytest.mark.fault(46)
@@ -256,3 +300,16 @@ def test_pathologies_go_through_to_metrics(study, measuring, name):
     assert found["whole", "area"] == pytest.approx(study.report(name)["area_cm2"]["whole"], rel=1e-6)
     ratio = {"hypoplasia": 0.51, "hemispherectomy": 0.49, "wide": 1.16}.get(name, 1.0)
     assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(ratio, abs=0.04)
+
+
+@pytest.mark.fault(12)
+def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
+    save_labels(workflow.directory / "whole.nii.gz", LABELS, AFFINE)
+    whole = (workflow.directory / "whole.nii.gz").read_bytes()
+    (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
+    brain = {"id": "a", "week": 21, "labels": "torn.nii.gz", "scheme": "binary"}
+    name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 23}})
+    outcome = workflow.run("--keep-going", "--cores", "1", "--configfile", name)
+    assert outcome.returncode == 2
+    assert "torn.nii.gz: cannot be read as an image" in outcome.stderr
+    assert "ValueError" not in outcome.stdout + outcome.stderr

@@ -11,7 +11,7 @@ from processes import all_end, below, command_of, kill
 
 from gyriflow.io.files import read_json
 
-from .conftest import SMALL_STUDY, Workflow
+from .conftest import SMALL_STUDY
 
 pytestmark = pytest.mark.slow
 
@@ -23,14 +23,6 @@ STUDY = SMALL_STUDY | {
 }
 SUMMARY = "results/runs/reference/a/folding/summary.json"
 LOG = "results/runs/reference/a/logs/simulate.log"
-
-
-@pytest.fixture
-def meshed(checkout_copy, tmp_path_factory):
-    """A study whose surface and mesh count as made: an ellipsoid."""
-    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("meshed"))
-    workflow.count_ellipsoid_as_meshed(STUDY, cells=10)
-    return workflow
 
 
 def started(workflow, until):
@@ -48,33 +40,33 @@ def started(workflow, until):
     return process
 
 
+@pytest.mark.fault(33)
 @pytest.mark.fault(38)
-def test_a_killed_rank_is_reported_as_memory_that_ran_out(meshed):
-    process = started(meshed, until="step    2")
+@pytest.mark.promise(3)
+def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(workflow):
+    # an ellipsoid's
+    workflow.count_ellipsoid_as_meshed(STUDY, cells=10)
+    process = started(workflow, until="step    2")
     ranks = [pid for pid in below(process.pid) if command_of(pid)[1:3] == ["-m", "gyriflow.folding"]]
     kill(ranks[-1:])
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 137, printed
     assert re.search(r"\d+ elements, .* about \d+ MiB", printed)
     assert "most probably because memory ran out" in printed
-    assert "most probably because memory ran out" in (meshed.directory / LOG).read_text()
-    assert not (meshed.directory / SUMMARY).exists()
+    assert "most probably because memory ran out" in (workflow.directory / LOG).read_text()
+    assert not (workflow.directory / SUMMARY).exists()
 
-
-@pytest.mark.fault(33)
-@pytest.mark.promise(3)
-def test_an_interrupted_folding_goes_on_with_the_same_command(meshed):
-    process = started(meshed, until="step    3")
+    process = started(workflow, until="step   12")
     started_by_it = below(process.pid)
     os.killpg(process.pid, signal.SIGINT)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
     assert "interrupted; the same command resumes from here" in printed
     assert all_end(started_by_it)
-    assert list((meshed.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
-    again = meshed.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
+    assert list((workflow.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
+    again = workflow.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
     assert again.returncode == 0, again.stdout + again.stderr
-    assert "going on from the checkpoint after step" in (meshed.directory / LOG).read_text()
-    summary = read_json(meshed.directory / SUMMARY)
-    assert summary["resumed_after_step"] >= 3
+    assert "going on from the checkpoint after step" in (workflow.directory / LOG).read_text()
+    summary = read_json(workflow.directory / SUMMARY)
+    assert summary["resumed_after_step"] >= 12
     assert summary["steps"] == 84

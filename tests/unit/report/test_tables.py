@@ -7,7 +7,15 @@ import pandas as pd
 import pytest
 
 from gyriflow.report.labels import SIMPLER_WAYS
-from gyriflow.report.tables import html_table, metrics_table, predicted_table, resources, runs_table, worth_table
+from gyriflow.report.tables import (
+    html_table,
+    mesh_quality_table,
+    metrics_table,
+    predicted_table,
+    resources,
+    runs_table,
+    worth_table,
+)
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 
@@ -97,6 +105,16 @@ def test_parameters_that_one_run_lacks_and_another_leaves_off_are_no_difference_
     table = runs_table({name: run | {"growth_rate_per_s": 2e-7} for name, run in runs.items()})
     assert table.index.tolist() == ["growth area (cm²)", "growth rate (s⁻¹)"]
     assert table["measured"].tolist() == ["89.92 at 21.0 GW to 143.3 at 25.25 GW", "2·10⁻⁷"]
+
+
+@pytest.mark.fault(23)
+def test_the_quality_of_a_mesh_stands_beside_its_limits():
+    quality = {"tets": 3072, "min_radius_ratio": 0.125, "surface_distance_mm": {"hausdorff99": 0.0625}}
+    html = html_table(mesh_quality_table({"a": quality}, {"min_radius_ratio": 0.02, "max_surface_distance_mm": 0.1}))
+    rows = dict(
+        re.findall(r"<tr><td[^>]*>[^<]*</td><td[^>]*>(.*?)</td><td[^>]*>(.*?)</td></tr>", html.replace("\n", ""))
+    )
+    assert {"3072": "–", "0.125": "0.02", "0.0625": "0.1"}.items() <= rows.items()
 
 
 def test_html_is_escaped_and_marks_numbers_and_verdicts():
