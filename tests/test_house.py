@@ -1,6 +1,7 @@
 """The house rules, checked on the source itself: import arrows, open files, names, and lists that must agree."""
 
 import ast
+import importlib.util
 import json
 import re
 import tomllib
@@ -49,6 +50,7 @@ OF_PROGRAMS = {"io", "step"}
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+PROGRAMS = [*SCRIPTS, *(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "atlases").rglob("*.py")]
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
 OPENING_ROOMS = {"io", "folding", "cli", "step"}
@@ -148,6 +150,28 @@ def test_scripts_are_thin():
     # draw.py is that of all figures
     lengths = {short(path): len(path.read_text().splitlines()) for path in SCRIPTS if path.name != "draw.py"}
     assert {name: lines for name, lines in lengths.items() if not 5 <= lines <= 45} == {}
+
+
+def test_every_script_is_used_and_there():
+    text = "\n".join(path.read_text() for path in RULE_FILES)
+    assert set(re.findall(r"\.\./scripts/(\w+\.py)", text)) == {path.name for path in SCRIPTS}
+
+
+def test_what_scripts_and_benchmarks_import_is_there():
+    # imports within functions too, which only a job would otherwise try
+    imported = [
+        (path.name, node.module, alias.name)
+        for path in PROGRAMS
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gyriflow")
+        for alias in node.names
+    ]
+    gone = [row for row in imported if not hasattr(importlib.import_module(row[1]), row[2]) and not is_module(*row[1:])]
+    assert gone == []
+
+
+def is_module(package: str, name: str) -> bool:
+    return importlib.util.find_spec(f"{package}.{name}") is not None
 
 
 def test_no_vague_names():

@@ -4,10 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from phantoms import CORTEX, phantom_labels
-from shapes import LPS, hemisphere, save_gifti
+from scripts import run_script
+from shapes import LPS, hemisphere, rigid
 
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
+from gyriflow.anatomy.pial import from_surface
+from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.io.files import write_json
+from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps, write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 
@@ -110,27 +113,24 @@ def test_regions_of_phantoms_are_where_they_are_known_to_be(made):
     assert (white / measured).between(0.6, 0.95).all()
 
 
-@pytest.mark.slow
-def test_a_volume_of_regions_fits_a_pial_surface_in_lps(workflow):
+def test_a_volume_of_regions_fits_a_pial_surface_in_lps(tmp_path):
     """The volume is in RAS+ whatever the axes of the surface; taken as they are, front and back would change places."""
-    halves, world = [hemisphere(side) for side in (-1, 1)], np.array([0.0, 6.0, 3.0])
-    points = np.concatenate([half.vertices for half in halves]) + world
-    brain = TriangleMesh(points, np.concatenate([halves[0].faces, halves[1].faces + len(halves[0].vertices)]))
-    save_gifti(workflow.directory / "lps.surf.gii", transformed(brain, LPS))
-    affine = np.eye(4)
-    affine[:3, 3] = np.floor(points.min(axis=0)) - 2
-    index = np.ceil(points.max(axis=0) - affine[:3, 3]).astype(int) + 2
-    y = affine[1, 3] + np.arange(index[1])
-    regions = np.broadcast_to(np.where(y > middle(points), 1, 3)[None, :, None], index).copy()
-    write_label_volume(workflow.directory / "regions.nii.gz", LabelVolume(regions, affine))
-    given = {"id": "given", "week": 21, "pial": "lps.surf.gii", "coordinates": "lps"}
-    metrics = {"regions": {"given": STUDY["metrics"]["regions"]["p22"]}}
-    study = STUDY | {"brains": [given], "start": "given", "metrics": metrics}
-    made = "results/brains/given/metrics/left.regions.label.gii"
-    outcome = workflow.run(made, "--cores", "2", "--configfile", workflow.write("study.yaml", study))
-    assert outcome.returncode == 0, outcome.stderr[-2000:]
+    brain = merged(*(transformed(hemisphere(side), rigid(shift=(0.0, 6.0, 3.0))) for side in (-1, 1)))
+    surface = from_surface(transformed(brain, LPS), week=21.0, coordinates="lps", edge_length_mm=2.5)
+    write_json(tmp_path / "surface.json", surface.report)
     for side in SIDES:
-        found, _ = read_vertex_labels(workflow.directory / f"results/brains/given/metrics/{side}.regions.label.gii")
-        y = read_surface(workflow.directory / f"results/brains/given/surface/{side}.pial.surf.gii").vertices[:, 1]
-        clear = np.abs(y - world[1]) > 2.0
-        np.testing.assert_array_equal(found[clear], np.where(y[clear] > world[1], 1, 2))
+        write_surface(tmp_path / f"{side}.gii", getattr(surface, side))
+    low = np.floor(brain.vertices.min(axis=0)) - 2
+    index = np.ceil(brain.vertices.max(axis=0) - low).astype(int) + 2
+    y = low[1] + np.arange(index[1])
+    regions = np.broadcast_to(np.where(y > 6.0, 1, 3)[None, :, None], index).copy()
+    write_label_volume(tmp_path / "regions.nii.gz", LabelVolume(regions, rigid(shift=low)))
+    files = {"report": "surface.json", "volume": "regions.nii.gz"} | {side: f"{side}.gii" for side in SIDES}
+    labels = {f"{side}_regions": f"{side}.label.gii" for side in SIDES}
+    params = {"names": STUDY["metrics"]["regions"]["p22"]["names"], "affine_from": "auto"}
+    run_script("given_regions.py", tmp_path, files, labels, params)
+    for side in SIDES:
+        found, _ = read_vertex_labels(tmp_path / f"{side}.label.gii")
+        y = getattr(surface, side).vertices[:, 1]
+        clear = np.abs(y - 6.0) > 2.0
+        np.testing.assert_array_equal(found[clear], np.where(y[clear] > 6.0, 1, 2))

@@ -1,5 +1,7 @@
-"""What the commands hand on to Snakemake, and what they tell to type next."""
+"""What the commands hand on to Snakemake, what they tell to type next, and in which code they end."""
 
+import shutil
+from collections import namedtuple
 from pathlib import Path
 
 import pytest
@@ -151,3 +153,19 @@ def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until
     assert done.exit_code == 2
     assert told in done.output
     assert not (tmp_path / "gyriflow.yaml").exists()
+
+
+Usage = namedtuple("Usage", "total used free")
+
+
+@pytest.mark.fault(36)
+@pytest.mark.parametrize(
+    ("code", "recorded", "free", "expected"),
+    [(0, None, 0, 0), (1, None, 2**20, 5), (1, 1, 2**20, 5), (1, 2, 2**20, 2), (1, None, 2**30, 1), (1, 3, 2**30, 3)],
+)
+def test_a_full_disk_is_the_cause_where_no_step_has_told_another(
+    tmp_path, monkeypatch, capsys, code, recorded, free, expected
+):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(2**31, 2**31 - free, free))
+    assert launch.exit_code(code, recorded, tmp_path) == expected
+    assert ("the disk is full" in capsys.readouterr().err) == (expected == 5)

@@ -114,13 +114,6 @@ def test_folders_of_results_are_no_names_of_studies():
     assert "rename one" in refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}})
 
 
-def test_a_calibration_knows_its_runs_beforehand():
-    found = config(calibrate=CALIBRATION | {"rounds": [3, 1, 1]}).calibrate.runs
-    assert found == {
-        "calibration-00": 0, "calibration-01": 0, "calibration-02": 0, "calibration-03": 1, "calibration-04": 2
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -1,23 +1,19 @@
 """Hemispheres of a folded brain whose fissure is bent: those of the measured brain, carried along by the scripts."""
 
-import runpy
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import trimesh
 import yaml
 from ellipsoid import RUN, SEMI_AXES
-from shapes import ellipsoid_mesh
+from scripts import run_script
+from shapes import ellipsoid, ellipsoid_mesh
 
-from gyriflow.geometry.triangles import TriangleMesh, corners, submesh
+from gyriflow.geometry.triangles import corners, submesh
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import read_regions, write_tetrahedral_mesh
 from gyriflow.parameters.terms import LEFT, RIGHT
-
-SCRIPTS = Path(__file__).parents[3] / "workflow" / "scripts"
 
 
 def beyond_fissure(points):
@@ -30,32 +26,10 @@ def folded(points):
     return 1.3 * points + [40.0, 0.0, 0.01] * (1 + points[:, 1:2] ** 2 / 100)
 
 
-class Named(dict):
-    """Files of a job, which Snakemake hands over by name and as attributes."""
-
-    __getattr__ = dict.__getitem__
-
-
-def run(script, folder, inputs, outputs, **more):
-    """Run a script of the workflow on files of a folder, as Snakemake would."""
-    inputs, outputs = (
-        Named(
-            {
-                name: [str(folder / f) for f in file] if isinstance(file, list) else file and str(folder / file)
-                for name, file in files.items()
-            }
-        )
-        for files in (inputs, outputs)
-    )
-    job = SimpleNamespace(input=inputs, output=outputs, log=[str(folder / "log")], **more)
-    runpy.run_path(str(SCRIPTS / script), init_globals={"snakemake": job})
-
-
 @pytest.fixture(scope="module")
 def measured():
     """The hemispheres of a measured brain, in triangles of their own."""
-    ball = trimesh.creation.icosphere(subdivisions=5)
-    surface = TriangleMesh(ball.vertices * SEMI_AXES, ball.faces)
+    surface = ellipsoid(SEMI_AXES, 5)
     on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
     return submesh(surface, on_left)[0], submesh(surface, ~on_left)[0]
 
@@ -70,13 +44,13 @@ def made(measured, tmp_path_factory):
         write_surface(folder / f"start.{side}.gii", surface)
     (folder / "params.yaml").write_text(yaml.safe_dump(RUN))
     start = {"mesh": "brain.xdmf", "params": "params.yaml", "sides": ["start.left.gii", "start.right.gii"]}
-    run("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})
+    run_script("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})
     join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])
     parts = {part: f"{part}.gii" for part in ("whole", "left", "right", "thickness")}
     frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
-    run("folded_surface.py", folder, frames, parts, wildcards=SimpleNamespace(week="22.00"))
+    run_script("folded_surface.py", folder, frames, parts, wildcards=SimpleNamespace(week="22.00"))
     return folder
 
 

@@ -3,12 +3,113 @@ import pytest
 from shapes import ellipsoid_mesh, rigid, sphere
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.deformations import Deformation, carry
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.growth.carrying import carry_over_weeks, maps_on_template
+from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, carry
+from gyriflow.geometry.tetrahedra import quadratic
+from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
+from gyriflow.growth.carrying import carry_mesh, carry_over_weeks, carry_regions, carry_surface, maps_on_template
+from gyriflow.growth.matched_surfaces import follow_surfaces, match_surfaces, outward
+from gyriflow.io.registrations import (
+    WeeklyShapes,
+    read_correspondence,
+    read_weekly_shapes,
+    write_correspondence,
+    write_weekly_shapes,
+)
 
-GRID = np.diag([4.0, 4.0, 4.0, 1.0])
-GRID[:3, 3] = -30.0
+ATLAS = sphere()
+STRETCH = np.array([1.2, 1.1, 1.0])
+GROWN = MatchedSurfaces(ATLAS, ATLAS.vertices * STRETCH)
+TURN = rigid(10, 20, 150)[:3, :3]
+BALL = ellipsoid_mesh(10, (10.0, 10.0, 10.0))
+GRID = rigid(shift=(-30.0, -30.0, -30.0)) @ np.diag([4.0, 4.0, 4.0, 1.0])
+
+
+def own_surface() -> TriangleMesh:
+    """Return another mesh of the same brain."""
+    ball = sphere(10.1, 3)
+    return TriangleMesh(ball.vertices @ np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1.0]]), ball.faces)
+
+
+def test_surfaces_are_matched_whatever_the_order_of_their_triangles():
+    later = TriangleMesh(GROWN.second, ATLAS.faces[::-1, [1, 2, 0]])
+    found, report = match_surfaces(flipped(ATLAS), flipped(later))
+    assert np.array_equal(found.second, GROWN.second)
+    assert outward(found.first) is found.first
+    assert report["vertices"] == len(ATLAS.vertices)
+    assert report["turn_deg"] == pytest.approx(0, abs=1e-3)
+    assert 0 < report["scatter"] < 0.1
+    assert report["area_ratio"] == pytest.approx(1.21, abs=0.01)
+
+
+def test_other_triangles_and_other_places_are_refused():
+    with pytest.raises(InputError, match="642 vertices and 1280 triangles"):
+        match_surfaces(ATLAS, sphere(subdivisions=3))
+    wrong = ATLAS.faces.copy()
+    wrong[0] = wrong[0, 0], wrong[0, 1], wrong[400, 2]
+    with pytest.raises(InputError, match="other vertices or triangles"):
+        match_surfaces(ATLAS, TriangleMesh(GROWN.second, wrong))
+    shuffled = np.random.default_rng(0).permutation(GROWN.second)
+    with pytest.raises(InputError, match="not the same place in both"):
+        match_surfaces(ATLAS, TriangleMesh(shuffled, ATLAS.faces))
+    with pytest.raises(InputError, match="a turn of 149° between them"):
+        match_surfaces(ATLAS, TriangleMesh(GROWN.second @ TURN.T, ATLAS.faces))
+
+
+def test_another_mesh_of_the_brain_goes_along_in_any_pose():
+    own = own_surface()
+    turned = MatchedSurfaces(ATLAS, GROWN.second @ TURN.T + [5.0, 0, 0])
+    back = MatchedSurfaces(TriangleMesh(turned.second, ATLAS.faces), GROWN.second)
+    found = follow_surfaces(own, [turned, back])
+    assert found[0] == pytest.approx(own.vertices)
+    assert found[1] == pytest.approx(own.vertices * STRETCH @ TURN.T + [5.0, 0, 0], abs=0.05)
+    assert found[2] == pytest.approx(own.vertices * STRETCH, abs=0.05)
+    assert np.array_equal(carry_surface(own, [turned, back]), found[2])
+    assert carry_surface(own, []) is own.vertices
+    with pytest.raises(InputError, match="is not that of the first matched surface"):
+        follow_surfaces(TriangleMesh(own.vertices * 1.5, own.faces), [turned])
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_inside_goes_along_smoothly(order):
+    solid = ellipsoid_mesh(8, (10.0, 10.0, 10.0))
+    if order == 2:
+        solid = quadratic(solid)
+    found = carry_mesh(solid, [GROWN])
+    # a linear displacement is harmonic
+    assert found[1] == pytest.approx(solid.vertices * STRETCH, abs=0.05)
+
+
+def test_regions_are_carried_along_matched_surfaces():
+    own, later = own_surface(), transformed(own_surface(), np.diag([*STRETCH, 1.0]))
+    found = carry_regions((own.vertices[:, 0] > 0).astype(int), own, later, GROWN)
+    clear = np.abs(later.vertices[:, 0]) > 1.0
+    assert np.array_equal(found[clear], (later.vertices[clear, 0] > 0).astype(int))
+
+
+def test_matched_surfaces_are_read_as_written(tmp_path):
+    write_correspondence(tmp_path / "a.h5", GROWN, {"vertices": 3})
+    read = read_correspondence(tmp_path / "a.h5")
+    assert isinstance(read, MatchedSurfaces)
+    assert np.array_equal(read.first.vertices, ATLAS.vertices)
+    assert np.array_equal(read.first.faces, ATLAS.faces)
+    assert np.array_equal(read.second, GROWN.second)
+    with pytest.raises(ValueError, match="matched vertices"):
+        MatchedSurfaces(ATLAS, GROWN.second[1:])
+
+
+def test_carried_meshes_are_read_as_written(tmp_path):
+    solid = ellipsoid_mesh(4, (10.0, 10.0, 10.0))
+    carried = WeeklyShapes(np.array([21.0, 22.5]), np.stack([solid.vertices, 1.1 * solid.vertices]))
+    write_weekly_shapes(tmp_path / "carried.h5", carried)
+    read = read_weekly_shapes(tmp_path / "carried.h5")
+    assert read.weeks.tolist() == [21.0, 22.5]
+    assert read.positions == pytest.approx(carried.positions, abs=1e-5)
+    (tmp_path / "torn.h5").write_bytes(b"torn")
+    with pytest.raises(InputError, match=r"torn\.h5: cannot be read as shapes of a mesh"):
+        read_weekly_shapes(tmp_path / "torn.h5")
+
+
+# along deformations
 
 
 def affine_map(matrix: np.ndarray) -> Deformation:
@@ -16,12 +117,7 @@ def affine_map(matrix: np.ndarray) -> Deformation:
 
 
 def scaled(factor: float, shift: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
-    matrix = np.diag([factor] * 3 + [1.0])
-    matrix[:3, 3] = shift
-    return matrix
-
-
-BALL = ellipsoid_mesh(10, (10.0, 10.0, 10.0))
+    return rigid(shift=shift) @ np.diag([factor] * 3 + [1.0])
 
 
 def test_points_are_carried_in_turn():

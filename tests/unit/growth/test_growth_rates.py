@@ -1,12 +1,9 @@
 """Growth rates of areas and volumes made with known rates."""
 
-import runpy
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
+from scripts import run_script
 from shapes import sphere
 
 from gyriflow.growth.rates import growth_rates, rates_of_series
@@ -14,7 +11,6 @@ from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 
 WEEK_S = 604_800.0
-SCRIPT = Path(__file__).parents[3] / "workflow" / "scripts" / "growth_rates.py"
 
 
 def test_rates_are_those_the_areas_were_made_with() -> None:
@@ -68,24 +64,19 @@ def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean(
 
 
 def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
-    files = []
-    for number, radius_mm in enumerate((20.0, 22.0, 20.0, 21.0)):
-        files.append(tmp_path / f"{number}.gii")
-        write_surface(files[-1], sphere(radius_mm, 2))
-    thickness = tmp_path / "thickness.json"
-    thickness.write_text('{"mean_mm": 1.8}')
-    reports = [tmp_path / f"{name}.json" for name in "abcd"]
-    for report, tissue_ml in zip(reports, (30.0, 40.0, None, None), strict=True):
-        write_json(report, {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
-    job = SimpleNamespace(
-        input=SimpleNamespace(whole=files, reports=reports, thickness=[thickness]),
-        output=SimpleNamespace(**{name: tmp_path / f"{name}.csv" for name in ("areas", "rates")}),
-        params=SimpleNamespace(
-            series=["mine", "mine", "atlas", "atlas"], brains=[*"abcd"], weeks=[21, 22, 21, 22], with_thickness=["b"]
-        ),
-        log=[str(tmp_path / "log")],
+    for name, radius_mm, tissue_ml in zip("abcd", (20.0, 22.0, 20.0, 21.0), (30.0, 40.0, None, None), strict=True):
+        write_surface(tmp_path / f"{name}.gii", sphere(radius_mm, 2))
+        write_json(tmp_path / f"{name}.json", {"label_volumes_mL": {"tissue": tissue_ml}} if tissue_ml else {})
+    write_json(tmp_path / "thickness.json", {"mean_mm": 1.8})
+    inputs = {"whole": [f"{name}.gii" for name in "abcd"], "reports": [f"{name}.json" for name in "abcd"]}
+    known = {"series": ["mine", "mine", "atlas", "atlas"], "brains": [*"abcd"], "weeks": [21, 22, 21, 22]}
+    run_script(
+        "growth_rates.py",
+        tmp_path,
+        inputs | {"thickness": ["thickness.json"]},
+        {"areas": "areas.csv", "rates": "rates.csv"},
+        known | {"with_thickness": ["b"]},
     )
-    runpy.run_path(str(SCRIPT), init_globals={"snakemake": job})
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]
     assert areas["thickness_mm"].isna().tolist() == [True, False, True, True]

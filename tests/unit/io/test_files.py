@@ -1,4 +1,4 @@
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and configurations are read strictly."""
 
 import errno
 import hashlib
@@ -7,9 +7,10 @@ import os
 import numpy as np
 import pytest
 
-from gyriflow.errors import StorageError
+from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
 from gyriflow.io.files import contents, read_json, read_tab_separated, replaced, write_json
+from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
 
 
 @pytest.mark.promise(1)
@@ -91,3 +92,26 @@ def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monk
     second = contents([one, other], first)
     assert read == [str(one)]
     assert (second[str(one)][0], second[str(other)]) == ("new", first[str(other)])
+
+
+def test_what_is_written_is_read(tmp_path):
+    content = {"b": 1.5, "a": [1, "ν"], "c": {"d": None, "e": True}}
+    write_yaml(tmp_path / "new" / "x.yaml", content)
+    assert read_yaml(tmp_path / "new" / "x.yaml") == content
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("runs:\n  thick: {}\n  thin: {}\n  thick: {}\n", "line 4: the key 'thick' of line 2 is there again"),
+        ("a: [1\nb: 2\n", "not valid YAML, line 2"),
+        (None, "cannot be read"),
+        ("# a comment\n", "holds no keys; found nothing; expected keys"),
+        ("- a\n", "holds no keys; found a list; expected keys"),
+    ],
+)
+def test_what_is_no_configuration_is_refused(tmp_path, text, said):
+    if text is not None:
+        (tmp_path / "x.yaml").write_text(text)
+    with pytest.raises(InputError, match=rf"x\.yaml: .*{said}"):
+        read_keys(tmp_path / "x.yaml")

@@ -1,16 +1,14 @@
 """The registry of figures: what each is drawn by takes what it gives, and what the workflow works out for it."""
 
 import inspect
-import runpy
 from importlib import import_module
-from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 import yaml
 from matplotlib.figure import Figure as Drawing
+from scripts import SCRIPTS, run_script
 from shapes import box
 
 from gyriflow.config import load
@@ -19,9 +17,7 @@ from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, figures_of
 from gyriflow.units import SECONDS_PER_GW
 
-CHECKOUT = Path(__file__).parents[3]
-DRAW = CHECKOUT / "workflow" / "scripts" / "draw.py"
-WORDS = yaml.safe_load((CHECKOUT / "workflow" / "report" / "figures.yaml").read_text())
+WORDS = yaml.safe_load((SCRIPTS.parent / "report" / "figures.yaml").read_text())
 SHAPE = {"semi_axes_mm": [20, 26, 18]}
 BRAINS = [{"id": name, "week": week, "shape": SHAPE} for name, week in (("a", 21), ("b", 22), ("c", 23))]
 STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
@@ -45,7 +41,7 @@ def rows_of(rule):
 def test_a_figure_gives_its_function_what_that_takes(rule):
     (row, *_) = rows_of(rule)
     given = {**row.inputs, **row.options}
-    code = DRAW.read_text()
+    code = (SCRIPTS / "draw.py").read_text()
     if f"\ndef {rule}(" in code:
         names = code.partition(f"\ndef {rule}(")[2].partition(")")[0].split(", ")
         assert {name for name in names if not name.startswith("**")} <= set(given)
@@ -101,10 +97,8 @@ def drawn(monkeypatch, tmp_path, rule, draw, inputs, **options):
         return Drawing()
 
     monkeypatch.setattr(import_module(f"gyriflow.report.{module}"), function, noted)
-    params = SimpleNamespace(draw=draw, inputs=inputs, options=options)
-    output = [str(tmp_path / "a.png"), str(tmp_path / "a.pdf")]
-    job = SimpleNamespace(params=params, output=output, log=[str(tmp_path / "log")], rule=rule)
-    runpy.run_path(str(DRAW), init_globals={"snakemake": job})
+    params = {"draw": draw, "inputs": inputs, "options": options}
+    run_script("draw.py", tmp_path, {}, {0: "a.png", 1: "a.pdf"}, params, rule=rule)
     return given
 
 

@@ -5,16 +5,14 @@ from base64 import b64decode
 import numpy as np
 import pytest
 import pyvista as pv
+from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.report.labels import DISPLACEMENT
 from gyriflow.report.view3d import surfaces_view, thin_out
 
-
-def ball(radius: float = 20.0, count: int = 40) -> TriangleMesh:
-    body = pv.Sphere(radius=radius, theta_resolution=count, phi_resolution=count)
-    return TriangleMesh(np.asarray(body.points, dtype=float), body.regular_faces)
+BALL = sphere(20.0)
 
 
 def shorts(text: str) -> np.ndarray:
@@ -28,12 +26,12 @@ def positions(data: dict, frame: dict) -> np.ndarray:
 
 def growing(values: np.ndarray | None = None) -> list:
     """Return a ball of 21 GW that is a fifth larger at 22 GW, each as one half with a map."""
-    mesh, maps = ball(), {} if values is None else {"curvedness": values}
+    mesh, maps = BALL, {} if values is None else {"curvedness": values}
     return [(21.0, [(mesh, maps)]), (22.0, [(TriangleMesh(1.2 * mesh.vertices, mesh.faces), maps)])]
 
 
 def test_thinning_keeps_vertices_and_the_shape():
-    mesh = ball()
+    mesh = BALL
     kept, faces = thin_out(mesh, 400)
     assert len(kept) == pytest.approx(400, rel=0.1)
     assert faces.max() == len(kept) - 1
@@ -53,8 +51,7 @@ def test_a_run_has_one_triangulation_and_its_positions_each_week():
 
 
 def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
-    count = len(ball().vertices)
-    values = np.linspace(0.0, 0.2, count)
+    values = np.linspace(0.0, 0.2, len(BALL.vertices))
     values[0] = np.nan
     data = surfaces_view({"thin": growing(values)}, [], measured="real brain")
     described, _ = data["maps"]
@@ -78,4 +75,4 @@ def test_displacement_is_measured_from_the_first_week():
 
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, match="differ in their vertices"):
-        surfaces_view({"thin": [growing()[0], (22.0, [(ball(count=20), {})])]}, [], measured="real brain")
+        surfaces_view({"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]}, [], measured="real brain")
