@@ -1,6 +1,7 @@
 """Configurations to change in tests, and the messages with which they are refused."""
 
 import pytest
+import yaml
 
 from gyriflow.config import load
 from gyriflow.errors import InputError
@@ -34,6 +35,15 @@ def both_kinds(folder, weeks):
     made = [{"id": f"v{week}", "week": week, **LABELLED} for week in weeks]
     given = [{"id": f"s{week}", "week": week, "pial": "pial.surf.gii"} for week in weeks]
     return study([*made, *given], start="s21")
+
+
+def write_atlas(folder, /, series=None, **changes):
+    """Write the description of an atlas of two weeks, with changes on its top level or in its series."""
+    one = {"population": "sheep", "scheme": "binary", "files": {"labels": "w{week}.nii.gz"}, "weeks": [21, 22]}
+    licence = {"name": "CC0", "terms": "Do what you like."}
+    atlas = {"name": "mine", "title": "An atlas", "licence": licence, "series": {"all": one | (series or {})}}
+    (folder / "atlas.yaml").write_text(yaml.safe_dump(atlas | changes))
+    return folder / "atlas.yaml"
 
 
 def refusal(raw, folder="."):

@@ -30,6 +30,14 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
     return matrix
 
 
+def scaling(factors, shift=0.0) -> np.ndarray:
+    """Return the (4, 4) matrix of one factor or three, and a shift in mm after it: the affine of a grid of voxels."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= factors
+    matrix[:3, 3] = shift
+    return matrix
+
+
 def moved(mesh: TriangleMesh, *shift: float) -> TriangleMesh:
     """Return a surface shifted by mm along x, or x, y and z."""
     return TriangleMesh(mesh.vertices + [*shift, 0.0, 0.0][:3], mesh.faces)
@@ -55,6 +63,17 @@ def ellipsoid(half_axes, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> Trian
 def _icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
     ball = trimesh.creation.icosphere(subdivisions=subdivisions)
     return np.array(ball.vertices), np.array(ball.faces)
+
+
+def octasphere(radius: float, subdivisions: int = 5) -> TriangleMesh:
+    """Return a sphere made of an octahedron, with edges in the planes x = 0, y = 0 and z = 0."""
+    shape = trimesh.Trimesh(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]],
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
+    )
+    for _ in range(subdivisions):
+        shape = shape.subdivide()
+    return TriangleMesh(radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
 
 
 def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:

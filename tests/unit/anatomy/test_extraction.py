@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import rigid
 
 from gyriflow.anatomy.extraction import isosurface, main_parts, make_simple, refine, remove_bridges, smooth_mask
 from gyriflow.errors import MeshError
@@ -19,9 +19,7 @@ def ball():
 
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1)])
 def test_ball_has_its_area_volume_and_place(ball, signs):
-    affine = np.eye(4)
-    affine[:3, :3] = Rotation.from_euler("xyz", [10, 35, -20], degrees=True).as_matrix() @ np.diag(signs) * 0.8
-    affine[:3, 3] = 5, -7, 11
+    affine = rigid(10, 35, -20, shift=(5, -7, 11)) @ np.diag([*np.multiply(signs, 0.8), 1.0])
     surface = isosurface(smooth_mask(ball, 1.0), affine)
     radius = 0.8 * RADIUS
     assert is_closed(surface)

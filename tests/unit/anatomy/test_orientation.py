@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from phantoms import CENTRE_MM
-from scipy.spatial.transform import Rotation
-from shapes import cerebrum_surface, ellipsoid, phantom
+from shapes import cerebrum_surface, ellipsoid, phantom, rigid
 
 from gyriflow.anatomy.fissure import mid_plane, upright
 from gyriflow.geometry.remeshing import remesh
@@ -18,22 +17,15 @@ def brain():
     return TriangleMesh(mesh.vertices - CENTRE_MM, mesh.faces)
 
 
-def moved(brain, linear, shift=(0.0, 0.0, 0.0)):
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = linear, shift
-    return transformed(brain, matrix), matrix
-
-
 def angle_to(plane, normal):
     return np.degrees(np.arccos(np.clip(plane.normal @ normal / np.linalg.norm(normal), -1, 1)))
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 45), (30, 20, -30), (90, 0, 0)])
 def test_turned_and_shifted_brain(brain, turn):
-    rotation = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
-    mesh, matrix = moved(brain, rotation, (31.0, -4.0, 9.0))
-    plane = mid_plane(mesh)
-    assert angle_to(plane, rotation[:, 0]) < 1.0
+    matrix = rigid(*turn, shift=(31.0, -4.0, 9.0))
+    plane = mid_plane(transformed(brain, matrix))
+    assert angle_to(plane, matrix[:3, 0]) < 1.0
     # the origin of the unmoved brain lies in its fissure
     assert plane.offset - plane.normal @ matrix[:3, 3] == pytest.approx(0.0, abs=0.4)
     assert plane.fissure_points > 500
@@ -41,10 +33,9 @@ def test_turned_and_shifted_brain(brain, turn):
 
 @pytest.mark.parametrize("shear", [(0.0, 0.15), (-0.1, 0.1)])
 def test_sheared_brain_where_symmetry_and_fissure_differ(brain, shear):
-    linear = np.eye(3)
-    linear[0, 1:] = shear
-    mesh, _ = moved(brain, linear)
-    plane = mid_plane(mesh)
+    matrix = np.eye(4)
+    matrix[0, 1:3] = shear
+    plane = mid_plane(transformed(brain, matrix))
     assert angle_to(plane, np.array([1.0, *(-s for s in shear)])) < 1.5
     assert plane.offset == pytest.approx(0.0, abs=0.4)
 
@@ -62,8 +53,8 @@ def test_brain_with_a_larger_right_hemisphere(brain, stretch):
 
 
 def test_upright_turns_the_plane_to_constant_x_and_little_else(brain):
-    rotation = Rotation.from_euler("xyz", [0, 15, -25], degrees=True).as_matrix()
-    mesh, _ = moved(brain, rotation)
+    rotation = rigid(0, 15, -25)
+    mesh = transformed(brain, rotation)
     centre = mesh.vertices.mean(axis=0)
     plane = mid_plane(mesh)
     matrix, angle = upright(plane, centre)
@@ -71,13 +62,12 @@ def test_upright_turns_the_plane_to_constant_x_and_little_else(brain):
     assert angle == pytest.approx(np.degrees(np.arccos(rotation[0, 0])), abs=1.0)
     assert matrix[:3, :3] @ centre + matrix[:3, 3] == pytest.approx(centre, abs=1e-9)
     # anterior and superior keep their sense
-    assert (matrix @ [*rotation[:, 1], 0])[1] > 0.9
-    assert (matrix @ [*rotation[:, 2], 0])[2] > 0.9
+    assert (matrix @ rotation)[1, 1] > 0.9
+    assert (matrix @ rotation)[2, 2] > 0.9
 
 
 def test_tiny_tilt_is_left_alone(brain):
-    mesh, _ = moved(brain, Rotation.from_euler("z", 0.2, degrees=True).as_matrix())
-    matrix, angle = upright(mid_plane(mesh), np.zeros(3))
+    matrix, angle = upright(mid_plane(transformed(brain, rigid(0, 0, 0.2))), np.zeros(3))
     assert angle == 0.0
     assert np.array_equal(matrix, np.eye(4))
 
@@ -87,5 +77,5 @@ def test_named_coordinates_are_kept_by_a_body_with_many_mirror_planes(brain):
     for body in (ellipsoid((24.0, 24.0, 33.0)), remesh(ellipsoid((30.0, 36.0, 30.0)), 2.5)):
         assert angle_to(mid_plane(body, named=True), np.array([1.0, 0, 0])) == pytest.approx(0.0, abs=1e-6)
     # a brain has one plane, in whatever coordinates
-    rotation = Rotation.from_euler("xyz", [0, 15, -25], degrees=True).as_matrix()
-    assert angle_to(mid_plane(moved(brain, rotation)[0], named=True), rotation[:, 0]) < 1.0
+    rotation = rigid(0, 15, -25)
+    assert angle_to(mid_plane(transformed(brain, rotation), named=True), rotation[:3, 0]) < 1.0

@@ -61,47 +61,51 @@ def test_one_long_face_does_not_fill_the_memory_of_a_rebuilt_surface():
     assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.1)
 
 
-@pytest.mark.fault(19)
+WHOLE = ball()
+COUNT = len(WHOLE.faces)
+SOUP = WHOLE.vertices[WHOLE.faces].reshape(-1, 3), np.arange(3 * COUNT).reshape(-1, 3)
+FIN = [[*WHOLE.faces[0, :2], len(WHOLE.vertices)]]
+WITH_FIN = np.vstack([WHOLE.vertices, WHOLE.vertices[WHOLE.faces[0, 0]] * 1.02]), np.vstack([WHOLE.faces, FIN])
+TWICE = np.vstack([WHOLE.faces, WHOLE.faces[:5], [[7, 7, 8]]])
+SOME_TURNED = np.concatenate([WHOLE.faces[:100], WHOLE.faces[100:300, ::-1], WHOLE.faces[300:]])
+
+
 @pytest.mark.parametrize(
-    ("turned", "counts"), [(slice(None), (1, 0)), (slice(100, 300), (0, 200))], ids=["all", "some"]
+    ("vertices", "faces", "counts"),
+    [
+        pytest.param(
+            WHOLE.vertices,
+            WHOLE.faces[:, ::-1],
+            {"faces_turned_to_agree": 0, "pieces_turned_outward": 1},
+            marks=pytest.mark.fault(19),
+        ),
+        pytest.param(
+            WHOLE.vertices,
+            SOME_TURNED,
+            {"faces_turned_to_agree": 200, "pieces_turned_outward": 0},
+            marks=pytest.mark.fault(19),
+        ),
+        pytest.param(
+            *SOUP,
+            {"duplicate_vertices_joined": 3 * COUNT - len(WHOLE.vertices), "faces_that_cut_others": 0},
+            marks=pytest.mark.fault(22),
+        ),
+        pytest.param(
+            WHOLE.vertices,
+            TWICE,
+            {"double_faces_removed": 5, "degenerate_faces_removed": 1},
+            marks=pytest.mark.fault(22),
+        ),
+        pytest.param(*WITH_FIN, {"non_manifold_edges_opened": 1}, marks=pytest.mark.fault(18)),
+    ],
+    ids=["all inside out", "some inside out", "separate triangles", "degenerate and double faces", "a fin"],
 )
-def test_faces_inside_out_are_turned(turned, counts):
-    faces = ball().faces.copy()
-    faces[turned] = faces[turned, ::-1]
-    mesh, report = clean(TriangleMesh(ball().vertices, faces), 3.0)
+def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, counts):
+    mesh, report = clean(TriangleMesh(vertices, faces), 3.0)
     assert is_closed(mesh)
-    assert signed_volume(mesh) == pytest.approx(signed_volume(ball()))
-    assert (report["pieces_turned_outward"], report["faces_turned_to_agree"]) == counts
-
-
-@pytest.mark.fault(22)
-def test_soup_of_separate_triangles_is_joined():
-    whole = ball()
-    soup = TriangleMesh(whole.vertices[whole.faces].reshape(-1, 3), np.arange(3 * len(whole.faces)).reshape(-1, 3))
-    mesh, report = clean(soup, 3.0)
-    assert len(mesh.vertices) == len(whole.vertices)
-    assert report["duplicate_vertices_joined"] == 3 * len(whole.faces) - len(whole.vertices)
-    assert report["faces_that_cut_others"] == 0
-
-
-@pytest.mark.fault(22)
-def test_degenerate_and_double_faces_are_removed():
-    whole = ball()
-    faces = np.vstack([whole.faces, whole.faces[:5], [[7, 7, 8]]])
-    mesh, report = clean(TriangleMesh(whole.vertices, faces), 3.0)
-    assert len(mesh.faces) == len(whole.faces)
-    assert (report["double_faces_removed"], report["degenerate_faces_removed"]) == (5, 1)
-
-
-@pytest.mark.fault(18)
-def test_non_manifold_fin_is_removed():
-    whole = ball()
-    vertices = np.vstack([whole.vertices, whole.vertices[whole.faces[0, 0]] * 1.02])
-    fin = [[whole.faces[0, 0], whole.faces[0, 1], len(whole.vertices)]]
-    mesh, report = clean(TriangleMesh(vertices, np.vstack([whole.faces, fin])), 3.0)
-    assert is_closed(mesh)
-    assert report["non_manifold_edges_opened"] == 1
-    assert signed_volume(mesh) == pytest.approx(VOLUME, rel=0.01)
+    assert signed_volume(mesh) == pytest.approx(signed_volume(WHOLE), rel=1e-6)
+    assert (len(mesh.vertices), len(mesh.faces)) == (len(WHOLE.vertices), COUNT)
+    assert counts.items() <= report.items()
 
 
 @pytest.mark.fault(21)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import ndimage
+from shapes import scaling
 
 from gyriflow.anatomy.extraction import handles, smooth_mask
 from gyriflow.anatomy.fissure import Fissure, MidPlane
@@ -17,11 +18,9 @@ VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 12.0, 2.0
 def ball():
     """Return a ball's mask, the (i, j, k, 3) places in mm, their depth below its surface, and the affine."""
     axis = np.arange(-22, 23) * VOXEL_MM + 0.13
-    affine = np.diag([VOXEL_MM] * 3 + [1.0])
-    affine[:3, 3] = axis[0]
     places = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth = RADIUS_MM - np.linalg.norm(places, axis=-1)
-    return depth > 0, places, depth, affine
+    return depth > 0, places, depth, scaling(VOXEL_MM, axis[0])
 
 
 def with_sulcus(depth_mm):

@@ -4,7 +4,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from shapes import moved, rigid, sphere
+from shapes import moved, rigid, scaling, sphere
 
 from gyriflow.anatomy import repair
 from gyriflow.anatomy.extraction import smooth_mask
@@ -19,8 +19,7 @@ VOXEL_MM = 0.8
 def voxels(half):
     """Return the centres (i, j, k, 3) of voxels around the origin and their affine; none lies at the origin."""
     count = int(np.ceil(half / VOXEL_MM)) + 6
-    affine = np.diag([VOXEL_MM] * 3 + [1.0])
-    affine[:3, 3] = VOXEL_MM * (np.array([0.1, 0.3, 0.2]) - count)
+    affine = scaling(VOXEL_MM, VOXEL_MM * (np.array([0.1, 0.3, 0.2]) - count))
     return np.moveaxis(np.indices((2 * count + 1,) * 3), 0, -1) * VOXEL_MM + affine[:3, 3], affine
 
 

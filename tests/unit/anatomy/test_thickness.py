@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from shapes import rigid, scaling
 from skimage.measure import marching_cubes
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, smooth_mask
@@ -37,8 +37,7 @@ def layered(folds_mm, voxel_mm):
     axis = np.arange(-25, 25, voxel_mm) + 0.13
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth, inside = depth_below(points, folds_mm)
-    affine = np.diag([voxel_mm] * 3 + [1.0])
-    affine[:3, 3] = axis[0]
+    affine = scaling(voxel_mm, axis[0])
     pial, _ = make_even(isosurface(make_simple(smooth_mask(inside, 1.0))[0], affine), 1.0)
     return pial, depth, inside, affine
 
@@ -79,9 +78,7 @@ def test_a_folded_layer_is_measured_to_a_tenth_of_a_voxel_on_average(folded, thi
 def test_a_turned_volume_gives_the_same(ball):
     pial, depth, inside, affine = ball
     cortex = inside & (depth < 2.4)
-    turn = np.eye(4)
-    turn[:3, :3] = Rotation.from_euler("xyz", [20, -30, 10], degrees=True).as_matrix()
-    turn[:3, 3] = 5, -7, 2
+    turn = rigid(20, -30, 10, shift=(5, -7, 2))
     straight = cortical_thickness(pial, inside, cortex, affine)
     turned = cortical_thickness(transformed(pial, turn), inside, cortex, turn @ affine)
     np.testing.assert_allclose(turned.values_mm, straight.values_mm, atol=1e-4)

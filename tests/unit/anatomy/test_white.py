@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import sphere
+from shapes import scaling, sphere
 
 from gyriflow.anatomy.fissure import split
 from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
@@ -26,9 +26,7 @@ def pial():
 def spheres_labels():
     axis = np.arange(-24, 24, VOXEL_MM) + 0.13
     radius = np.sqrt(sum(np.square(np.meshgrid(axis, axis, axis, indexing="ij"))))
-    affine = np.diag([VOXEL_MM] * 3 + [1.0])
-    affine[:3, 3] = axis[0]
-    return np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0)), affine
+    return np.where(radius < WHITE_MM, 1, np.where(radius < PIAL_MM, 2, 0)), scaling(VOXEL_MM, axis[0])
 
 
 @pytest.mark.parametrize("source", ["labels", "whole", "sides"])

@@ -95,6 +95,13 @@ def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
     assert (first.entry["scheme"], other.entry["scheme"], other.notes) == (UNSET, "spina-bifida-atlas", [])
 
 
+def configured(folder):
+    """Return the configuration that is written for a folder, in it."""
+    path = folder / "gyriflow.yaml"
+    list(write_configuration(folder, path, force=False))
+    return load(yaml.safe_load(path.read_text()), folder)
+
+
 def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     for side in ("left", "right"):
         touched(
@@ -150,9 +157,7 @@ def test_surfaces_lead_a_run_only_where_their_vertices_match(tmp_path, finer, ru
     for week, levels in ((21, 2), (22, 2 + finer)):
         for side, x in (("left", -12.0), ("right", 12.0)):
             write_surface(tmp_path / f"week{week}.{side}.pial.surf.gii", sphere(week / 2, levels, (x, 0, 0)))
-    path = tmp_path / "gyriflow.yaml"
-    list(write_configuration(tmp_path, path, force=False))
-    config = load(yaml.safe_load(path.read_text()), tmp_path)
+    config = configured(tmp_path)
     assert list(config.runs) == runs
     # what `check` asks for first
     assert {run for run, _ in resolve(config).simulations} == set(runs)
@@ -164,11 +169,11 @@ def test_a_folder_without_brains_says_what_is_expected(tmp_path):
         recognise(tmp_path)
 
 
-def bids_folder(folder):
-    for session in ("ses-1", "ses-2"):
-        place = folder / "derivatives" / "seg" / "sub-01" / session / "anat"
+def bids_folder(folder, second="sub-01"):
+    for subject, session in (("sub-01", "ses-1"), (second, "ses-2")):
+        place = folder / "derivatives" / "seg" / subject / session / "anat"
         place.mkdir(parents=True)
-        (place / f"sub-01_{session}_desc-brain_dseg.nii.gz").write_bytes(LABELS.read_bytes())
+        (place / f"{subject}_{session}_desc-brain_dseg.nii.gz").write_bytes(LABELS.read_bytes())
     (folder / "participants.tsv").write_text("participant_id\tsex\nsub-01\tF\nsub-02\tM\n")
     (folder / "sub-01").mkdir()
     (folder / "sub-02").mkdir()
@@ -187,25 +192,15 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     assert (first["id"], first["week"], first["subject"]) == ("sub-01_ses-1", 21.29, "sub-01")
     assert (second["id"], second["week"], second["subject"]) == ("sub-01_ses-2", 24.43, "sub-01")
     assert first["covariates"] == {"sex": "F", "tesla": "3.0"}
-    path = tmp_path / "gyriflow.yaml"
-    list(write_configuration(tmp_path, path, force=False))
-    config = load(yaml.safe_load(path.read_text()), tmp_path)
-    assert [brain.subject for brain in config.brains] == ["sub-01", "sub-01"]
+    assert [brain.subject for brain in configured(tmp_path).brains] == ["sub-01", "sub-01"]
 
 
 def test_only_scans_of_one_subject_are_led_to_each_other(tmp_path):
-    bids_folder(tmp_path)
-    place = tmp_path / "derivatives" / "seg" / "sub-01" / "ses-2" / "anat"
-    place.rename(tmp_path / "derivatives" / "seg" / "sub-02")
-    (tmp_path / "derivatives" / "seg" / "sub-02" / "sub-01_ses-2_desc-brain_dseg.nii.gz").rename(
-        tmp_path / "derivatives" / "seg" / "sub-02" / "sub-02_ses-2_desc-brain_dseg.nii.gz"
-    )
-    path = tmp_path / "gyriflow.yaml"
-    list(write_configuration(tmp_path, path, force=False))
-    written = yaml.safe_load(path.read_text())
-    assert [brain["subject"] for brain in written["brains"]] == ["sub-01", "sub-02"]
-    assert list(written["runs"]) == ["reference"]
-    assert not resolve(load(written, tmp_path)).growing
+    bids_folder(tmp_path, second="sub-02")
+    config = configured(tmp_path)
+    assert [brain.subject for brain in config.brains] == ["sub-01", "sub-02"]
+    assert list(config.runs) == ["reference"]
+    assert not resolve(config).growing
 
 
 @pytest.fixture

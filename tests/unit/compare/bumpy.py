@@ -1,7 +1,7 @@
 """Spheres with bumps whose curvature is known where it is needed."""
 
 import numpy as np
-import trimesh
+from shapes import sphere
 
 from gyriflow.compare.shapes import Shape
 from gyriflow.geometry.triangles import Floats, TriangleMesh
@@ -20,10 +20,9 @@ def field(directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 4
 
 def bumpy(seed: int, height: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
     """Return a sphere with bumps and dents of a height in mm."""
-    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
-    directions = np.asarray(ball.vertices)
-    radius = RADIUS + height * field(directions, seed)
-    return TriangleMesh(directions * radius[:, None], ball.faces)
+    ball = sphere(1.0, subdivisions)
+    radius = RADIUS + height * field(ball.vertices, seed)
+    return TriangleMesh(ball.vertices * radius[:, None], ball.faces)
 
 
 def shaped(mesh: TriangleMesh, pattern: Floats | None = None) -> Shape:

@@ -1,15 +1,15 @@
 import numpy as np
 import pandas as pd
 import pytest
-import trimesh
+from shapes import sphere
 
 from gyriflow.compare.onset import named, onset, relief, sulcal_regions
 from gyriflow.compare.validation import displacement_table, vector_agreement
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 
-BALL = trimesh.creation.icosphere(subdivisions=4, radius=20.0)
-POINTS, FACES = np.asarray(BALL.vertices), np.asarray(BALL.faces)
+BALL = sphere(20.0)
+POINTS, FACES = BALL.vertices, BALL.faces
 TURN = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]])
 
 

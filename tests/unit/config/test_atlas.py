@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import pytest
-import yaml
-from configurations import LABELLED, problems, series_for, series_of, touched
+from configurations import LABELLED, problems, series_for, series_of, touched, write_atlas
 
 from gyriflow.config import load
 from gyriflow.config.atlas import ATLASES, Atlas, retrieval_note, shipped_atlases
@@ -15,6 +14,7 @@ from gyriflow.study import resolve
 from gyriflow.study.figures import measured_name
 
 UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
+HERE = {"folder": "."}
 SURFACES = "atlas/fetal.week{}.{}.pial.surf.gii"
 
 
@@ -24,20 +24,6 @@ def surfaces(*weeks, inside=""):
 
 def study(atlas, start, **changes):
     return {"atlas": atlas, "start": start, "folding": {"end_week": 26}} | changes
-
-
-def own_atlas(folder, **changes):
-    """Write an atlas of two weeks and return its description."""
-    series = {"population": "sheep", "scheme": "binary", "files": {"labels": "w{week}.nii.gz"}, "weeks": [21, 22]}
-    content = {
-        "name": "mine",
-        "title": "An atlas",
-        "licence": {"name": "own", "terms": "Mine."},
-        "folder": ".",
-        "series": {"all": series | changes.pop("series", {})},
-    }
-    (folder / "atlas.yaml").write_text(yaml.safe_dump(content | changes))
-    return folder / "atlas.yaml"
 
 
 @pytest.fixture(autouse=True)
@@ -186,7 +172,7 @@ def test_a_week_between_is_used_where_it_is_and_never_rounded(tmp_path):
 
 def test_an_atlas_of_ones_own_is_one_file(tmp_path):
     touched(tmp_path / "mine", "w21.nii.gz", "w22.nii.gz")
-    file = own_atlas(tmp_path / "mine")
+    file = write_atlas(tmp_path / "mine", **HERE)
     for given in ("mine/atlas.yaml", str(file), {"name": "mine/atlas.yaml", "series": ["all"]}):
         config = load(study(given, "mine-21", folding={"end_week": 22}), tmp_path)
         assert [(brain.id, brain.population) for brain in config.brains] == [("mine-21", "sheep"), ("mine-22", "sheep")]
@@ -208,7 +194,7 @@ def test_an_atlas_of_ones_own_is_one_file(tmp_path):
 )
 def test_mistakes_in_a_description_are_named_with_its_file(tmp_path, changes, found):
     touched(tmp_path, "w21.nii.gz", "w22.nii.gz")
-    file = own_atlas(tmp_path, **changes)
+    file = write_atlas(tmp_path, **HERE | changes)
     (named,) = problems(study("atlas.yaml", "mine-21"), tmp_path)
     assert named.startswith(f"{file}: ")
     assert found in named

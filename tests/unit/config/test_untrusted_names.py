@@ -3,8 +3,7 @@
 import os
 
 import pytest
-import yaml
-from configurations import LABELLED, labelled, refusal, study
+from configurations import LABELLED, labelled, refusal, study, write_atlas
 
 from gyriflow.config.loading import load
 from gyriflow.errors import InputError
@@ -49,23 +48,9 @@ def test_a_file_between_braces_is_refused_instead_of_another_one(tmp_path):
     assert f"brains[0].labels: found {tmp_path}/{{brain}}/l.nii.gz; braces in a path" in said
 
 
-ATLAS = {
-    "name": "mine",
-    "title": "Mine",
-    "licence": {"name": "CC0", "terms": "None."},
-    "url": "https://example.org/atlas",
-    "series": {"all": {"population": "sheep", "scheme": "feta-7", "weeks": [21, 22], "files": {}}},
-}
-
-
 def with_atlas(folder, **changes):
-    (folder / "atlas.yaml").write_text(yaml.safe_dump(ATLAS | changes))
+    write_atlas(folder, **{"url": "https://example.org/atlas"} | changes)
     return {"atlas": "atlas.yaml", "start": "mine-21", "folding": {"end_week": 22}}
-
-
-def with_file(folder, pattern):
-    series = ATLAS["series"]["all"] | {"files": {"labels": pattern}}
-    return with_atlas(folder, series={"all": series})
 
 
 @pytest.mark.fault(59)
@@ -86,14 +71,14 @@ def with_file(folder, pattern):
     ],
 )
 def test_files_of_an_atlas_stay_in_its_folder(tmp_path, pattern):
-    said = refusal(with_file(tmp_path, pattern), tmp_path)
+    said = refusal(with_atlas(tmp_path, series={"files": {"labels": pattern}}), tmp_path)
     assert "be paths below the folder" in said or "have {week} in each path" in said
 
 
 @pytest.mark.fault(59)
 def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    config = load(with_file(tmp_path, "sub folder/$(x) {week:05.2f}.nii.gz"), tmp_path)
+    config = load(with_atlas(tmp_path, series={"files": {"labels": "sub folder/$(x) {week:05.2f}.nii.gz"}}), tmp_path)
     folder = tmp_path / "resources" / "atlases" / "mine"
     assert [brain.labels for brain in config.brains] == [
         str(folder / "sub folder" / f"$(x) {week}.00.nii.gz") for week in (21, 22)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from shapes import box, box_mesh, rigid, sphere
+from shapes import box, box_mesh, rigid, scaling, sphere
 
 from gyriflow.geometry.deformations import (
     Deformation,
@@ -15,8 +15,7 @@ from gyriflow.geometry.matching import labels_at, layer_labels, match_points, va
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
 
-GRID = np.diag([2.0, 2.0, 2.0, 1.0])
-GRID[:3, 3] = -30.0
+GRID = scaling(2.0, -30.0)
 
 
 def bent(amplitude: float) -> Deformation:
@@ -25,9 +24,7 @@ def bent(amplitude: float) -> Deformation:
     points = transform_points(index, GRID)
     displacement = np.zeros((31, 31, 31, 3))
     displacement[..., 0] = (amplitude * np.sin(points[:, 1] / 8)).reshape(31, 31, 31)
-    matrix = np.diag([1.1, 1.1, 1.1, 1.0])
-    matrix[:3, 3] = [3.0, -2.0, 1.0]
-    return Deformation(matrix, displacement, GRID)
+    return Deformation(scaling(1.1, (3.0, -2.0, 1.0)), displacement, GRID)
 
 
 POINTS = np.random.default_rng(3).uniform(-20, 20, (200, 3))
@@ -40,12 +37,10 @@ def test_points_go_through_displacement_and_then_the_matrix():
 
 def test_a_correspondence_of_moved_brains_says_the_same_of_the_same_places():
     rng = np.random.default_rng(3)
-    affine = np.diag([2.0, 3.0, 2.0, 1.0])
-    affine[:3, 3] = -8.0
     matrix = rigid(20, 0, 5, shift=(1, 2, 3)) @ np.diag([1.1, 1.2, 1.3, 1.0])
     first, second = rigid(10, -70, 150, shift=(4.0, 5.0, 6.0)), rigid(80, 20, -30, shift=(-9.0, 0.0, 1.0))
     points = rng.uniform(-6, 6, (50, 3))
-    found = Deformation(matrix, rng.normal(size=(9, 6, 9, 3)), affine)
+    found = Deformation(matrix, rng.normal(size=(9, 6, 9, 3)), scaling((2.0, 3.0, 2.0), -8.0))
     moved = between_moved(found, first, second)
     at_second = transform_points(carry(found, points), second)
     assert carry(moved, transform_points(points, first)) == pytest.approx(at_second)

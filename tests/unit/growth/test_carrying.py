@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from shapes import ellipsoid_mesh, rigid, sphere
+from shapes import ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, carry
@@ -21,7 +21,7 @@ STRETCH = np.array([1.2, 1.1, 1.0])
 GROWN = MatchedSurfaces(ATLAS, ATLAS.vertices * STRETCH)
 TURN = rigid(10, 20, 150)[:3, :3]
 BALL = ellipsoid_mesh(10, (10.0, 10.0, 10.0))
-GRID = rigid(shift=(-30.0, -30.0, -30.0)) @ np.diag([4.0, 4.0, 4.0, 1.0])
+GRID = scaling(4.0, -30.0)
 
 
 def own_surface() -> TriangleMesh:
@@ -116,12 +116,8 @@ def affine_map(matrix: np.ndarray) -> Deformation:
     return Deformation(matrix, np.zeros((16, 16, 16, 3)), GRID)
 
 
-def scaled(factor: float, shift: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
-    return rigid(shift=shift) @ np.diag([factor] * 3 + [1.0])
-
-
 def test_points_are_carried_in_turn():
-    chain = [affine_map(scaled(1.1, (1, 0, 0))), affine_map(scaled(1.2))]
+    chain = [affine_map(scaling(1.1, (1, 0, 0))), affine_map(scaling(1.2))]
     positions = carry_over_weeks(BALL.vertices, chain)
     assert positions.shape == (3, len(BALL.vertices), 3)
     assert positions[2] == pytest.approx(1.2 * (1.1 * BALL.vertices + [1, 0, 0]))
@@ -151,4 +147,4 @@ def test_maps_come_to_the_vertices_of_a_template():
     # of the template itself, which needs no registration
     assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])["x"] == pytest.approx(brain.vertices[:, 0])
     with pytest.raises(InputError, match="beyond the grid"):
-        maps_on_template(maps, brain, transformed(template, scaled(1, (60, 0, 0))), [between])
+        maps_on_template(maps, brain, transformed(template, scaling(1, (60, 0, 0))), [between])

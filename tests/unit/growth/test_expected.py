@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, sphere
+from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.folding.stretches import Stretches
@@ -74,11 +74,7 @@ def test_needles_do_not_throw_vertices_off_the_surface():
 
 def shift_map(factor, shift=(0.0, 0.0, 0.0)):
     """Return a registration that knows how large a brain becomes and where it lies, and nothing of its folds."""
-    matrix = np.diag([factor] * 3 + [1.0])
-    matrix[:3, 3] = shift
-    affine = np.diag([10.0, 10.0, 10.0, 1.0])
-    affine[:3, 3] = -60.0
-    return Deformation(matrix, np.zeros((13, 13, 13, 3)), affine)
+    return Deformation(scaling(factor, shift), np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
 
 
 def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_along():
@@ -242,10 +238,8 @@ def sampled(moved, points, spacing_mm=3.0):
     """Return a map of space as a registration knows it, on a grid round points."""
     low = points.min(axis=0) - 6.0
     shape = np.ceil((np.ptp(points, axis=0) + 12.0) / spacing_mm).astype(int) + 1
-    affine = np.diag([spacing_mm, spacing_mm, spacing_mm, 1.0])
-    affine[:3, 3] = low
     at = low + spacing_mm * np.indices(shape).reshape(3, -1).T
-    return Deformation(np.eye(4), (moved(at) - at).reshape(*shape, 3), affine)
+    return Deformation(np.eye(4), (moved(at) - at).reshape(*shape, 3), scaling(spacing_mm, low))
 
 
 def tensors(parts):

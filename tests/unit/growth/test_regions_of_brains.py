@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import ellipsoid
+from shapes import ellipsoid, scaling
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
@@ -41,8 +41,7 @@ def test_vertices_take_the_region_of_the_nearest_voxel_in_reach():
 
 
 def test_regions_beside_the_surface_are_refused_few_regions_are_not(caplog):
-    affine = np.diag([1.0, 1.0, 1.0, 1.0])
-    affine[:3, 3] = -30.0
+    affine = scaling(1.0, -30.0)
     centres = transform_points(np.indices((60, 60, 60)).reshape(3, -1).T, affine)
     radius = np.linalg.norm(centres / [16.0, 22.0, 14.0], axis=1)
     shell = ((radius > 0.85) & (radius < 1.0)).reshape(60, 60, 60).astype(int)

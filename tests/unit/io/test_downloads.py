@@ -1,6 +1,7 @@
 """Files from a server: whole or not there, checked; what is there is left as it is."""
 
 import hashlib
+import socket
 
 import pytest
 from local_server import Server, gifti, packed, serving
@@ -90,5 +91,16 @@ def test_what_is_not_the_file_is_refused_and_nothing_is_kept(tmp_path, server, n
     with pytest.raises(StorageError, match=said) as caught:
         fetched(tmp_path, server, name, sha256=known)
     assert f"{server.url}/{name}" in str(caught.value)
+    assert caught.value.exit_code == 5
+    assert files_in(tmp_path) == {}
+
+
+@pytest.mark.fault(40)
+def test_without_a_network_nothing_is_kept(tmp_path):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        nowhere = Server({}, url=f"http://127.0.0.1:{free.getsockname()[1]}")
+        with pytest.raises(StorageError, match=r"cannot be fetched; found .*Connection refused") as caught:
+            fetched(tmp_path, nowhere, SHORT)
     assert caught.value.exit_code == 5
     assert files_in(tmp_path) == {}

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from processes import ran
-from shapes import hemisphere, sphere
+from shapes import hemisphere, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
@@ -140,9 +140,7 @@ def labels_of(folder):
     """Return a volume of labels, and the sphere and its thickness that those of a simulated brain are made of."""
     files = {"labels": "labels.nii.gz", "surface": "whole.surf.gii", "thickness": "thickness.shape.gii"}
     files = {kind: str(folder / name) for kind, name in files.items()}
-    affine = np.diag([1.0, 1, 2, 1])
-    affine[:3, 3] = -20
-    write_label_volume(files["labels"], LabelVolume(np.ones((40, 40, 20), np.int32), affine))
+    write_label_volume(files["labels"], LabelVolume(np.ones((40, 40, 20), np.int32), scaling((1, 1, 2), -20)))
     ball = sphere(10.0)
     write_surface(files["surface"], transformed(ball, POSE))
     write_vertex_maps(files["thickness"], {"thickness_mm": np.full(len(ball.vertices), 3.0)})

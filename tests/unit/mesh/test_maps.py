@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import box_mesh, ellipsoid_mesh, rigid, sphere
+from shapes import box_mesh, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import transform_points
@@ -118,8 +118,7 @@ def test_a_turned_brain_takes_its_map_in_either_coordinates(given_posed):
 
 
 def oblique_volume(shape=(24, 26, 28)):
-    affine = rigid(20, -30, 40)
-    affine[:3, :3] = affine[:3, :3] @ np.diag([2.0, 2.2, 1.9]) @ [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
+    affine = rigid(20, -30, 40) @ scaling((2.0, 2.2, 1.9)) @ [[1, 0.1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     affine[:3, 3] = -affine[:3, :3] @ ((np.array(shape) - 1) / 2)
     index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
     return linear(transform_points(index.reshape(-1, 3), affine)).reshape(shape), affine
@@ -140,8 +139,7 @@ def test_the_outermost_voxels_are_covered_to_their_rim():
 
 @pytest.mark.parametrize("nothing", [np.nan, np.inf])
 def test_vertices_without_a_number_are_counted(ball, nothing):
-    data, affine = np.ones((50, 50, 50)), np.eye(4)
-    affine[:3, 3] = -24.5
+    data, affine = np.ones((50, 50, 50)), scaling(1.0, -24.5)
     # eight voxels, between whose centres lies one vertex
     data[24:26, 24:26, 24:26] = nothing
     with pytest.raises(InputError, match=r"a\.nii.*1 vertices at voxels that are NaN or infinite"):

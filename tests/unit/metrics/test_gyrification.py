@@ -3,11 +3,10 @@
 import igl
 import numpy as np
 import pytest
-import trimesh
-from shapes import sphere
+from shapes import octasphere, sphere
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull, is_closed, signed_volume, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull, is_closed, signed_volume, submesh, vertex_areas
 from gyriflow.metrics.gyrification import (
     cap,
     envelope,
@@ -22,19 +21,15 @@ def index(mesh: TriangleMesh, around: TriangleMesh) -> float:
     return gyrification_index([mesh], [pieces_over(around, mesh)])
 
 
-def half_sphere(radius: float = 25.0) -> TriangleMesh:
-    """Return half a sphere, open in the plane x = 0, where the edges of an octahedron lie."""
-    shape = trimesh.Trimesh(
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 0, -1]], [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]
-    )
-    for _ in range(5):
-        shape = shape.subdivide()
-    return TriangleMesh(radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
+def half_sphere() -> TriangleMesh:
+    """Return half a sphere of 25 mm, open in the plane x = 0."""
+    whole = octasphere(25.0)
+    return submesh(whole, whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0)[0]
 
 
 def dented(depth: float, width: float, subdivisions: int = 5) -> TriangleMesh:
     """Return a sphere of 25 mm with a round dent of that depth and width (mm) at the top."""
-    shape = trimesh.creation.icosphere(subdivisions=subdivisions, radius=25.0)
+    shape = sphere(25.0, subdivisions)
     across = np.linalg.norm(shape.vertices[:, :2], axis=1)
     dent = np.where(shape.vertices[:, 2] > 0, depth * np.exp(-((across / (0.5 * width)) ** 2) * 2), 0.0)
     return TriangleMesh(shape.vertices * (1 - dent / 25.0)[:, None], shape.faces)

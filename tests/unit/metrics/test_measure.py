@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-import trimesh
-from shapes import ellipsoid, sphere
+from shapes import ellipsoid, octasphere, sphere
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh
+from gyriflow.geometry.triangles import flipped, merged, submesh
 from gyriflow.metrics.measure import BrainMetrics, area_ratio_rows, measure_brain
 
 
@@ -26,14 +25,8 @@ def apart() -> BrainMetrics:
 
 @pytest.fixture(scope="module")
 def cut() -> BrainMetrics:
-    """A sphere of 25 mm cut in two, along edges of the octahedron that it is made from."""
-    shape = trimesh.Trimesh(
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]],
-        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
-    )
-    for _ in range(5):
-        shape = shape.subdivide()
-    whole = TriangleMesh(25.0 * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
+    """A sphere of 25 mm cut in two, along its edges."""
+    whole = octasphere(25.0)
     on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
     left, right = submesh(whole, ~on_right)[0], submesh(whole, on_right)[0]
     return measure_brain(whole, left, right, spangy_modes=60)

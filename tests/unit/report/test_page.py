@@ -284,6 +284,7 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verd
 
 def test_the_methods_say_what_was_run():
     packages = dict.fromkeys(("scikit-image", "fenics-dolfinx", "petsc4py", "snakemake"), "9.9")
+    software = {"gyriflow": "0.1", "packages": packages}
     parameters = {
         "start_week": 21.0, "step_s": 43200.0, "material": "neo-hookean", "shear_modulus_cortex_pa": 1500.0,
         "shear_modulus_core_pa": {"map": "core"}, "poisson_ratio": 0.45, "thickness_mm": 1.5,
@@ -292,22 +293,20 @@ def test_the_methods_say_what_was_run():
     }  # fmt: skip
     summary = {"weeks": [21.0, 24.5], "steps": 49, "tets": 1234}
     led = parameters | {"growth": {"model": "shapes", "of": "self"}}
+    brains = [
+        {"week": 21.0, "population": "spina bifida", "source": "labels", "synthetic": False},
+        {"week": 24.5, "population": None, "source": "shape", "synthetic": True},
+    ]
+    runs = [
+        {"run": "stiff", "start": "young", "growth_of": "", "parameters": parameters, "summary": summary},
+        {"run": "led", "start": "a", "growth_of": "population cohort", "parameters": led, "summary": summary},
+        {"run": "own", "start": "a", "growth_of": "own", "parameters": led, "summary": summary},
+    ]
+    template, metrics = (PAGE / "methods.rst").read_text(), {"curvature_radius_mm": 3.0}
     text = methods_text(
-        (PAGE / "methods.rst").read_text(),
-        brains=[
-            {"week": 21.0, "population": "spina bifida", "source": "labels", "synthetic": False},
-            {"week": 24.5, "population": None, "source": "shape", "synthetic": True},
-        ],
-        runs=[
-            {"run": "stiff", "start": "young", "growth_of": "", "parameters": parameters, "summary": summary},
-            {"run": "led", "start": "a", "growth_of": "population cohort", "parameters": led, "summary": summary},
-            {"run": "own", "start": "a", "growth_of": "own", "parameters": led, "summary": summary},
-        ],
-        software={"gyriflow": "0.1", "packages": packages},
-        surface={"edge_length_mm": 0.8, "open_sulci": True},
-        mesh={"order": 2, "mesher": "tetgen"},
-        metrics={"curvature_radius_mm": 3.0},
-    )
+        template, brains=brains, runs=runs, software=software, metrics=metrics,
+        surface={"edge_length_mm": 0.8, "open_sulci": True}, mesh={"order": 2, "mesher": "tetgen"},
+    )  # fmt: skip
     assert (
         "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
     )
@@ -315,16 +314,10 @@ def test_the_methods_say_what_was_run():
     assert "Sulci that labels keep shut were opened, but in start brains, by slits" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
-    nothing = {
-        "brains": [],
-        "runs": [],
-        "surface": {"edge_length_mm": 1, "open_sulci": False},
-        "metrics": {"curvature_radius_mm": 3},
-    }
-    nothing["brains"] = [{"week": 21.0, "population": None, "source": "labels", "synthetic": False}]
     alone = methods_text(
-        (PAGE / "methods.rst").read_text(), software={"gyriflow": "0.1", "packages": packages}, **nothing
-    )
+        template, brains=brains[:1], runs=[], software=software, metrics=metrics,
+        surface={"edge_length_mm": 1, "open_sulci": False},
+    )  # fmt: skip
     assert "simulated" not in alone
     assert "led to (population cohort): a population's growth, not the subject's own. Stress" in text
     assert text.count("its own later one") == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 from pictures import words
-from shapes import rigid, sphere
+from shapes import rigid, scaling, sphere
 
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
@@ -29,21 +29,12 @@ def test_labels_are_grouped_by_tissue():
 def test_the_page_shows_planes_views_and_warnings():
     radius = np.linalg.norm(np.indices((60, 60, 60)) - 30, axis=0)
     groups = np.select([radius < 5, radius < 18, radius < 20, radius < 24], [3, 2, 1, 4], 0)
-    affine = np.eye(4)
-    affine[:3, 3] = -30
     warnings = ["it is crooked"]
     row = quality_row(LABELS, REPORT, {}, warnings, 80.0)
-    figure = quality_page(Brain(sphere(20.0, 3), 0.0, tissues=(groups, affine)), row, warnings)
+    figure = quality_page(Brain(sphere(20.0, 3), 0.0, tissues=(groups, scaling(1.0, -30))), row, warnings)
     shown = words(figure)
-    assert {
-        "a, 24 GW",
-        "LOOK",
-        "Look at:\n• it is crooked",
-        "coronal, y = 0 mm",
-        "left",
-        "right medial",
-        "front",
-    } <= shown
+    parts = {"a, 24 GW", "LOOK", "Look at:\n• it is crooked", "coronal, y = 0 mm", "left", "right medial", "front"}
+    assert parts <= shown
     (head,) = [text for text in shown if text.startswith("source")]
     assert "area: 100.0 cm² (49.0 + 51.0)" in head
     assert "50 % of that expected" in head
@@ -74,14 +65,12 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
 def figure():
     """An ellipsoid in a volume stored obliquely, and the page of quality with both turned upright."""
     centre, half = np.array([12.0, -7.0, 3.0]), np.array([15.0, 21.0, 12.0])
-    oblique = np.eye(4)
-    oblique[:3, :3] = rigid(25, -10, 40)[:3, :3] * 0.8
+    oblique = rigid(25, -10, 40) @ scaling(0.8)
     oblique[:3, 3] = centre - oblique[:3, :3] @ np.full(3, 40.0)
     index = np.stack(np.indices((81, 81, 81)), axis=-1)
     away = np.linalg.norm((index @ oblique[:3, :3].T + oblique[:3, 3] - centre) / half, axis=-1)
     surface = isosurface((1.5 - away).astype(np.float32), oblique)
-    pose = np.eye(4)
-    pose[:3, 3] = 1, 2, 3
+    pose = rigid(shift=(1, 2, 3))
     centre = centre + pose[:3, 3]
     brain = Brain(transformed(surface, pose), centre[0], image=(100.0 * (away < 1), pose @ oblique))
     return quality_page(brain, quality_row(LABELS, REPORT, {}, [], 80.0), []), centre, half
