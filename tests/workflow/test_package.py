@@ -25,10 +25,8 @@ def wheel(tmp_path_factory):
     return found
 
 
-@pytest.fixture(scope="module")
-def installed(wheel, tmp_path_factory):
-    """A virtual environment with the wheel, and all other packages of this environment."""
-    folder = tmp_path_factory.mktemp("installed")
+def installed(wheel, folder):
+    """Return the command of a virtual environment with the wheel and all other packages of this environment."""
     subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder], check=True, timeout=120)
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
@@ -50,8 +48,8 @@ def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]
 
 
-def test_the_command_works_in_an_empty_folder(installed, tmp_path):
-    command, environment = installed
+def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory):
+    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"))
 
     def gyriflow(*arguments):
         return ran(command, *arguments, cwd=tmp_path, env=environment)

@@ -14,7 +14,7 @@ from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_m
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.parameters.terms import SIDES
 
-from .conftest import COARSE, Workflow, labelled
+from .conftest import COARSE, labelled
 
 VOXEL_MM = 2.0
 STUDY = {
@@ -51,20 +51,13 @@ def write_regions(path) -> None:
     write_label_volume(path, LabelVolume(regions, affine))
 
 
-@pytest.fixture(scope="module")
-def made(checkout_copy, tmp_path_factory):
-    """The study, made."""
-    workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("regions"))
+@pytest.mark.slow
+def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     write_regions(workflow.directory / "regions.nii.gz")
     name = workflow.write("study.yaml", STUDY)
     outcome = workflow.run(*TARGETS, "--cores", "2", "--configfile", name, timeout_s=900)
     assert outcome.returncode == 0, outcome.stderr[-3000:]
-    return workflow
-
-
-@pytest.mark.slow
-def test_regions_of_phantoms_are_where_they_are_known_to_be(made):
-    results = made.directory / "results"
+    results = workflow.directory / "results"
 
     places = {
         "given": ("brains/p22/metrics", "brains/p22/surface"),

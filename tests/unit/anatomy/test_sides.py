@@ -17,25 +17,14 @@ from gyriflow.parameters.schemes import LabelScheme
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 
 
-@pytest.fixture(scope="module")
-def bent():
-    """A phantom whose sides meet at a surface bent by 4 mm, cortex on both sides of it and no gap between."""
+def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
+    # at a surface bent by 4 mm, cortex on both sides of it and no gap between: the phantom's own fissure is filled
     labels, affine = phantom()
-    index = np.stack(np.indices(labels.shape), axis=-1)
-    x, y, _ = np.moveaxis(index @ affine[:3, :3].T + affine[:3, 3] - CENTRE_MM, -1, 0)
-    cerebrum = np.isin(labels, (1, 2, 5, 6, 8))
-    middle = 4.0 * np.sin(y / 12.0)
-    # the phantom's own fissure is filled
+    x, y, _ = odd_brains.positions(labels, affine)
     gap = (np.abs(x) < 3.0) & (labels == 4)
-    right = x > middle
-    cortex = (labels == 5) | gap
-    sided = np.where(cerebrum | gap, np.where(cortex, 3, 1) + right, 0)
+    right, cortex = x > 4.0 * np.sin(y / 12.0), (labels == 5) | gap
+    sided = np.where(np.isin(labels, odd_brains.CEREBRUM) | gap, np.where(cortex, 3, 1) + right, 0)
     sided[labels == 2] = 5
-    return sided, affine, middle
-
-
-def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet(bent):
-    sided, affine, _ = bent
     surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
     inverse = surface.pose.world
     expected = {"left": -1, "right": 1}

@@ -22,10 +22,6 @@ from gyriflow.geometry.triangles import (
 AXES = (10.0, 13.0, 8.0)
 
 
-def ball(edge_mm=1.5, **more):
-    return shape_surface((15.0, 15.0, 15.0), edge_length_mm=edge_mm, **{"noise_mm": 0.0} | more)
-
-
 def ellipsoid_area(a, b, c):
     """Return the area of an ellipsoid by midpoint quadrature over the unit sphere."""
     z = np.linspace(-1, 1, 4001)[:-1] + 1 / 4000
@@ -83,7 +79,7 @@ def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
 
 
 def test_a_shape_that_is_not_closed_or_cuts_itself_is_refused():
-    mesh = ball()
+    mesh = shape_surface((15.0, 15.0, 15.0), edge_length_mm=1.5, noise_mm=0.0)
     holed, _ = submesh(mesh, np.arange(len(mesh.faces)) > 0)
     with pytest.raises(MeshError, match="without two faces"):
         from_shape(holed, week=21.0)

@@ -17,12 +17,6 @@ POSE = np.array([[0.0, -1, 0, 5], [1, 0, 0, -3], [0, 0, 1, 2], [0, 0, 0, 1]])
 """A quarter turn and some mm."""
 
 
-@pytest.fixture(scope="module")
-def pial():
-    left, right = split(sphere(PIAL_MM, 4), 0.0)
-    return {"left": left, "right": right}
-
-
 def spheres_labels():
     axis = np.arange(-24, 24, VOXEL_MM) + 0.13
     radius = np.sqrt(sum(np.square(np.meshgrid(axis, axis, axis, indexing="ij"))))
@@ -30,7 +24,8 @@ def spheres_labels():
 
 
 @pytest.mark.parametrize("source", ["labels", "whole", "sides"])
-def test_the_white_surface_of_concentric_spheres_is_the_inner_one(pial, source):
+def test_the_white_surface_of_concentric_spheres_is_the_inner_one(source):
+    pial = dict(zip(("left", "right"), split(sphere(PIAL_MM, 4), 0.0), strict=True))
     if source == "labels":
         labels, affine = spheres_labels()
         # the files lie elsewhere than the posed surface

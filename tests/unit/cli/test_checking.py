@@ -22,24 +22,19 @@ def problems(folder, **keys):
     return [line for line, bad in input_problems(config) if bad]
 
 
-@pytest.fixture
-def volume(tmp_path):
-    """Labels of the spina bifida atlas in a block of white matter with cortex on one side only."""
+def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path):
+    # a block of white matter with cortex on one side only
     labels = np.zeros((20, 20, 20), np.int32)
     labels[4:16, 4:16, 4:16] = 1
     labels[4:6, 4:16, 4:16] = 5
     write_label_volume(tmp_path / "l.nii.gz", LabelVolume(labels, np.eye(4)))
     labels[0, 0, 0] = 99
     write_label_volume(tmp_path / "unknown.nii.gz", LabelVolume(labels, np.eye(4)))
-    return tmp_path
-
-
-def test_the_labels_of_one_hemisphere_are_read_as_labels(volume):
     scheme = "spina-bifida-atlas"
     # its wall towards the side that is not there may have no cortex
-    assert problems(volume, hemisphere={"file": "l.nii.gz", "side": "left"}, scheme=scheme) == []
-    assert "does not lie around" in problems(volume, labels="l.nii.gz", scheme=scheme)[0]
-    (said,) = problems(volume, hemisphere={"file": "unknown.nii.gz", "side": "left"}, scheme=scheme)
+    assert problems(tmp_path, hemisphere={"file": "l.nii.gz", "side": "left"}, scheme=scheme) == []
+    assert "does not lie around" in problems(tmp_path, labels="l.nii.gz", scheme=scheme)[0]
+    (said,) = problems(tmp_path, hemisphere={"file": "unknown.nii.gz", "side": "left"}, scheme=scheme)
     assert f"labels that the scheme '{scheme}' does not know" in said
 
 

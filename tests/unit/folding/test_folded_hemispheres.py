@@ -27,21 +27,16 @@ def folded(points):
 
 
 @pytest.fixture(scope="module")
-def measured():
-    """The hemispheres of a measured brain, in triangles of their own."""
-    surface = ellipsoid(SEMI_AXES, 5)
-    on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
-    return submesh(surface, on_left)[0], submesh(surface, ~on_left)[0]
-
-
-@pytest.fixture(scope="module")
-def made(measured, tmp_path_factory):
+def made(tmp_path_factory):
     """A folder with the regions of the brain's mesh, and with the surfaces of its second frame."""
     folder = tmp_path_factory.mktemp("folded")
     brain = ellipsoid_mesh(16, SEMI_AXES)
     write_tetrahedral_mesh(folder / "brain.xdmf", brain)
-    for side, surface in zip(("left", "right"), measured, strict=True):
-        write_surface(folder / f"start.{side}.gii", surface)
+    # the measured brain, in triangles of its own
+    surface = ellipsoid(SEMI_AXES, 5)
+    on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
+    for side, faces in (("left", on_left), ("right", ~on_left)):
+        write_surface(folder / f"start.{side}.gii", submesh(surface, faces)[0])
     (folder / "params.yaml").write_text(yaml.safe_dump(RUN))
     start = {"mesh": "brain.xdmf", "params": "params.yaml", "sides": ["start.left.gii", "start.right.gii"]}
     run_script("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})

@@ -151,11 +151,6 @@ def domain(written):
     return mesh
 
 
-def midpoints(tags, domain):
-    """Return where the tagged entities lie."""
-    return dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)
-
-
 @pytest.mark.parametrize(
     ("grid", "dimension", "expected"),
     [
@@ -171,4 +166,4 @@ def test_dolfinx_reads_every_tag_where_it_belongs(written, domain, grid, dimensi
         tags = file.read_meshtags(domain, grid, xpath="/Xdmf/Domain[2]")
     assert tags.dim == dimension
     assert len(tags.values) == (len(facets) if dimension == 2 else len(mesh.tets))
-    np.testing.assert_array_equal(tags.values, expected(midpoints(tags, domain)))
+    np.testing.assert_array_equal(tags.values, expected(dolfinx.mesh.compute_midpoints(domain, tags.dim, tags.indices)))

@@ -97,21 +97,13 @@ def test_edge_lengths_grow_with_depth_and_end_at_that_of_the_core():
     np.testing.assert_allclose(edge_length_at(np.array([0.0, 2.0, 4.0, 100.0]), 1.6, 5.0, 2), 2 * lengths)
 
 
-@pytest.fixture(scope="module")
-def filled_ball():
-    return tetrahedralise(BALL, **SIZES)
-
-
-def test_a_ball_is_filled_within_the_envelope(filled_ball):
-    surface, _ = boundary_surface(filled_ball)
+def test_a_ball_is_filled_within_the_envelope_by_elements_that_are_coarser_inside():
+    mesh = tetrahedralise(BALL, **SIZES)
+    surface, volumes = boundary_surface(mesh)[0], signed_volumes(mesh)
     assert nearest_on(surface.vertices, BALL)[0].max() <= 0.11
-    assert (signed_volumes(filled_ball) > 0).all()
+    assert (volumes > 0).all()
     assert mean_edge_length(surface) == pytest.approx(1.5, rel=0.25)
-
-
-def test_elements_are_coarser_inside(filled_ball):
-    centre = np.linalg.norm(filled_ball.vertices[filled_ball.tets].mean(axis=1), axis=1)
-    volumes = signed_volumes(filled_ball)
+    centre = np.linalg.norm(mesh.vertices[mesh.tets].mean(axis=1), axis=1)
     assert np.median(volumes[centre < 3]) > 2 * np.median(volumes[centre > 7])
 
 
@@ -234,17 +226,12 @@ def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_at
 
 
 @pytest.fixture(scope="module")
-def even():
-    return even_surface(BALL, 1.2)
-
-
-@pytest.fixture(scope="module")
 def filled():
     return tetrahedralise(BALL, mesher="tetgen", **(SIZES | {"surface_edge_mm": 1.2}))
 
 
-def test_tetgen_keeps_the_remeshed_surface_exactly(even, filled):
-    own, _ = boundary_surface(filled)
+def test_tetgen_keeps_the_remeshed_surface_exactly(filled):
+    own, even = boundary_surface(filled)[0], even_surface(BALL, 1.2)
     assert len(own.faces) == len(even.faces)
     np.testing.assert_array_equal(*(np.unique(surface.vertices, axis=0) for surface in (own, even)))
     assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)

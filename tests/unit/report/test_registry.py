@@ -28,11 +28,6 @@ def registry():
     return figures_of(resolve(load(STUDY)))
 
 
-def drawn_by(row):
-    module, _, function = row.draw.rpartition(".")
-    return getattr(import_module(f"gyriflow.report.{module}"), function)
-
-
 def rows_of(rule):
     return list(by_rule(registry())[rule].values())
 
@@ -46,7 +41,8 @@ def test_a_figure_gives_its_function_what_that_takes(rule):
         names = code.partition(f"\ndef {rule}(")[2].partition(")")[0].split(", ")
         assert {name for name in names if not name.startswith("**")} <= set(given)
     else:
-        inspect.signature(drawn_by(row)).bind(**given)
+        module, _, function = row.draw.rpartition(".")
+        inspect.signature(getattr(import_module(f"gyriflow.report.{module}"), function)).bind(**given)
 
 
 def test_all_files_are_drawn_once_and_the_report_has_words_on_them():

@@ -41,15 +41,11 @@ def gains(runs, weeks=(22, 23, 24)):
     return pd.DataFrame(rows)
 
 
-def points(axes, marker):
-    return sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == marker)
-
-
 def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
     axes = validation_chart(gains(["reference", "measured"]), gains(["registration"])).axes[0]
-    faces = [line.get_markerfacecolor() for line in axes.lines if line.get_marker() == "o"]
-    assert faces.count("white") == 2
-    assert points(axes, "o") == 6
+    dots = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [line.get_markerfacecolor() for line in dots].count("white") == 2
+    assert sum(len(line.get_xdata()) for line in dots) == 6
     (stars,) = (line for line in axes.lines if line.get_marker() == "*")
     np.testing.assert_allclose(stars.get_ydata(), 0.2)
     assert any(line.get_linestyle() == ":" for line in axes.lines)
