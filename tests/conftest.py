@@ -21,9 +21,6 @@ class Sets(LoadScopeScheduling):
 
     def _split_scope(self, nodeid):
         file, _, _ = nodeid.partition("::")
-        # both look at the one finished study
-        if file in ("tests/workflow/test_dag.py", "tests/workflow/test_rerun.py"):
-            return "finished"
         # these compile forms of their own: two should not fill one cache at once
         return "tests/unit/folding" if file.startswith("tests/unit/folding/") else file
 

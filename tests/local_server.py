@@ -1,10 +1,12 @@
 """A web server on this machine for tests of downloads: it can break off, and remembers what it was asked for."""
 
 import gzip
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from threading import Thread
 
 import nibabel as nib
@@ -55,6 +57,15 @@ def serving(server: Server) -> Iterator[Server]:
         web.shutdown()
         web.server_close()
         thread.join()
+
+
+def sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    """Return the content of each file of a folder by its path."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def packed(size: int, seed: int = 0) -> bytes:

@@ -84,6 +84,14 @@ def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:
     return TriangleMesh(shape.vertices + np.asarray(centre), shape.faces)
 
 
+def sheet(*axes: np.ndarray) -> TriangleMesh:
+    """Return an open surface over a grid: the (n, m) x, y and z of its vertices, seen from above where these ascend."""
+    numbers = np.arange(axes[0].size).reshape(axes[0].shape)
+    a, b, c, d = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    return TriangleMesh(np.stack(axes, axis=-1).reshape(-1, 3), faces)
+
+
 def torus(ring: float, tube: float, around: int = 32, across: int = 32) -> TriangleMesh:
     """Return a torus about z: the radii in mm of its ring and its tube, and the faces along both."""
     shape = trimesh.creation.torus(ring, tube, major_sections=around, minor_sections=across)

@@ -166,12 +166,8 @@ def test_what_scripts_and_benchmarks_import_is_there():
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gyriflow")
         for alias in node.names
     ]
-    gone = [row for row in imported if not hasattr(importlib.import_module(row[1]), row[2]) and not is_module(*row[1:])]
-    assert gone == []
-
-
-def is_module(package: str, name: str) -> bool:
-    return importlib.util.find_spec(f"{package}.{name}") is not None
+    without = [row for row in imported if not hasattr(importlib.import_module(row[1]), row[2])]
+    assert [row for row in without if importlib.util.find_spec(f"{row[1]}.{row[2]}") is None] == []
 
 
 def test_no_vague_names():
@@ -185,11 +181,6 @@ def test_no_vague_names():
     assert [(path, name) for path, name in names if vague.search(name)] == []
 
 
-def listed(path: Path) -> list[str]:
-    """Return the entries of a list of packages."""
-    return [entry for line in path.read_text().splitlines() if (entry := line.split("#")[0].strip())]
-
-
 def locked() -> dict[str, str]:
     """Return the version of each package that is locked, all with hashes."""
     text = (ROOT / "envs" / "requirements.txt").read_text()
@@ -198,18 +189,14 @@ def locked() -> dict[str, str]:
     return found
 
 
-def needed() -> list[str]:
-    """Return the packages that the project names, for users and for development, but numpy, which dolfinx brings."""
-    content = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    entries = [*content["project"]["dependencies"], *content["dependency-groups"]["dev"]]
-    return [name for entry in entries if (name := re.split(r"[<>=]", entry)[0]) != "numpy"]
-
-
 def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     (pip,) = [entry["pip"] for entry in environment["dependencies"] if isinstance(entry, dict)]
-    versions = locked()
-    assert pip == [f"{name}=={versions[name.lower()]}" for name in needed()]
+    content, versions = tomllib.loads((ROOT / "pyproject.toml").read_text()), locked()
+    entries = [*content["project"]["dependencies"], *content["dependency-groups"]["dev"]]
+    # but numpy, which dolfinx brings
+    needed = [name for entry in entries if (name := re.split(r"[<>=]", entry)[0]) != "numpy"]
+    assert pip == [f"{name}=={versions[name.lower()]}" for name in needed]
 
 
 def test_conda_environment_sets_what_the_launcher_sets():
@@ -228,7 +215,8 @@ def test_images_are_made_from_the_same_lists(recipe):
     assert "envs/requirements.txt" in text
     own = re.findall(r"install (?:-\S+ )*([\w.=-]+)", text)
     assert set(own) <= {"-r", "--no-deps", "--no-install-recommends"}
-    assert [package for package in listed(ROOT / "envs" / "debian.txt") if package in text.split()] == []
+    packages = {line.split("#")[0].strip() for line in (ROOT / "envs" / "debian.txt").read_text().splitlines()}
+    assert packages & set(text.split()) == set()
 
 
 def test_images_and_launcher_use_the_same_debian():

@@ -1,9 +1,10 @@
-"""Waves on a growing slab: the theory in its closed limits, and the solver against the theory."""
+"""The solver against closed answers: waves on a growing slab, whose theory is tried in its limits, and made-up ones."""
 
 import numpy as np
 import pytest
 from boxes import COMM
 from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
+from verification_cases.manufactured import CASES, rates, solved
 from verification_cases.modes import Slab, critical_growth, growth_rates
 from verification_cases.slab import Waved, amplified, rate_error
 
@@ -73,3 +74,19 @@ def test_waves_grow_as_in_theory(memory):
     limit = fine + (fine - coarse) / (2**ORDER - 1)
     np.testing.assert_allclose(limit[LONG], exact[LONG], rtol=0.03)
     np.testing.assert_allclose(limit, exact, rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("order", "cells", "fall", "gradient_falls", "left"),
+    # left of a displacement with gradients up to 0.4
+    [(1, (5, 10, 20), 1.8, (0.9, 1.2), 0.015), (2, (3, 5, 10), 2.7, (1.8, 2.4), 0.003)],
+    ids=["linear", "quadratic"],
+)
+@pytest.mark.parametrize("case", CASES)
+def test_errors_fall_with_one_power_more_than_those_of_gradients(case, order, cells, fall, gradient_falls, left):
+    errors = [solved(case, number, order=order) for number in cells]
+    displacement, gradient = rates(errors).T
+    assert displacement[-1] >= fall
+    assert order == 2 or displacement[-1] > displacement[0]
+    assert gradient_falls[0] <= gradient[-1] <= gradient_falls[1]
+    assert errors[-1].displacement < left

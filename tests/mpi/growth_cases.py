@@ -1,15 +1,32 @@
-"""Growth with known answers, and what the mesh does between steps."""
+"""Growth and remembered stress with known answers, a body that nothing holds, and what the mesh does between steps."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from boxes import COMM, curved_box, distorted_box, problem_on, zones_of
+from boxes import (
+    COMM,
+    MATERIAL,
+    EvenGrowth,
+    curved_box,
+    distorted_box,
+    everywhere_known,
+    problem_on,
+    set_layers,
+    solved,
+    zones_of,
+)
+from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
+from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
+from gyriflow.folding.stress import packed, unpacked
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
 from gyriflow.parameters.folding import parameters_from
+from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
 
 @pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=["linear", "quadratic"])
@@ -30,10 +47,9 @@ def test_tangential_growth_stretches_across_the_normal_only(mesh):
 def test_a_run_has_the_material_that_it_names(material):
     # Fe = diag(1.2, 1, 1): tr(FeᵀFe) = 3.44, Je = 1.2
     mesh = distorted_box()
-    values = {"start_week": 21.0, "end_week": 22.0, "output_weeks": [21.0, 22.0], "fissure_x_mm": 0.0}
-    values |= {"shear_modulus_cortex_pa": 1000, "shear_modulus_core_pa": 1000, "growth_rate_per_s": 0}
-    folding = Folding(COMM, mesh, zones_of(mesh), parameters_from(values | {"material": material}))
-    folding.begin(State.at_start(folding.domain.positions, 43200.0), 43200.0)
+    values = {"shear_modulus_cortex_pa": 1000, "shear_modulus_core_pa": 1000, "growth_rate_per_s": 0}
+    folding, start = folding_of(mesh, zones_of(mesh), material=material, **values)
+    folding.begin(start, 43200.0)
     problem = folding.problem
     problem.set_displacement(problem.domain.local(problem.domain.positions) * [0.2, 0.0, 0.0])
     bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
@@ -55,3 +71,96 @@ def test_gathering_and_placing_keep_every_vertex_in_its_place():
     assert total == pytest.approx(1.5**3 * signed_volumes(mesh).sum() * 1e-9, rel=1e-12)
     used = domain.mesh.geometry.x[domain.mesh.geometry.dofmap].mean(axis=1)
     np.testing.assert_allclose(used, moved[domain.vertex_of_node[domain.cells]].mean(axis=1), rtol=1e-12)
+
+
+RUN = {"start_week": 21.0, "end_week": 36.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 36.0]}
+EVEN = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0}
+TIGHT = {"newton_tolerance": 1e-12}
+ORDERS = ["linear", "quadratic"]
+STRETCH = np.array([[1.1, 0.03, 0.0], [0.03, 0.95, -0.02], [0.0, -0.02, 1.02]])
+
+
+def folding_of(mesh, zones, **changes):
+    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "solver": TIGHT} | changes)
+    return Folding(COMM, mesh, zones, parameters), State.at_start(mesh.vertices * M_PER_MM, parameters.step_s)
+
+
+def stretched_problem(zones, mesh):
+    domain = Domain(COMM, mesh)
+    problem = Problem(domain, zones, MATERIAL, remembers_stress=True)
+    nodes, cells = len(domain.vertex_of_node), len(domain.cells)
+    uniform = np.ones(nodes)
+    set_layers(problem, 1000.0 * uniform, 0.0 * uniform, 0.0 * uniform, np.tile([0.0, 0.0, 1.0], (cells, 1)))
+    problem.set_stretch(np.tile(STRETCH, (cells, 1, 1)))
+    return problem
+
+
+def test_a_free_body_springs_back_from_the_stretch_it_kept():
+    mesh = distorted_box()
+    problem = stretched_problem(replace(zones_of(mesh), free=True), mesh)
+    x = problem.domain.local(problem.domain.positions)
+    problem.set_displacement(x @ (np.linalg.inv(STRETCH) - np.eye(3)).T)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-16)
+    solved(problem, newton_tolerance=1e-10, krylov_tolerance=1e-8)
+    assert problem.energy() == pytest.approx(0.0, abs=1e-14)
+    found = everywhere_known(problem)
+    # the rotation is free to choose, so compare distances
+    pairs = np.random.default_rng(1).integers(0, len(found), (200, 2))
+    now, exact = (
+        np.linalg.norm(np.diff(points[pairs], axis=1), axis=2)
+        for points in (problem.domain.positions + found, problem.domain.positions @ np.linalg.inv(STRETCH).T)
+    )
+    np.testing.assert_allclose(now, exact, rtol=1e-6, atol=1e-12)
+
+
+def test_the_energy_of_a_kept_stretch_is_counted_per_volume_without_stress():
+    mesh = distorted_box()
+    problem = stretched_problem(zones_of(mesh), mesh)
+    Je, volume = np.linalg.det(STRETCH), 288e-9
+    bulk = 1000.0 * 2 * 1.45 / (3 * 0.1)
+    density = 500.0 * ((STRETCH**2).sum() * Je ** (-2 / 3) - 3) + bulk / 2 * (Je - 1) ** 2
+    assert problem.energy() == pytest.approx(density * volume / Je, rel=1e-12)
+
+
+@pytest.mark.parametrize("memory_gw", [0.25, np.inf])
+@pytest.mark.parametrize(("mesh", "points"), [(distorted_box(), 1), (curved_box((2, 2, 2)), 8)], ids=ORDERS)
+def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh, points, memory_gw):
+    # uniform isotropic growth of a body whose whole surface is fixed: nothing moves, and ln V adds up and decays
+    zones = zones_of(mesh, lambda centre: np.ones(len(centre), bool))
+    folding, state = folding_of(mesh, zones, stress_memory_gw=memory_gw, **EVEN)
+    folding.model = EvenGrowth(folding.parameters, None, 0.01).growth
+    for _ in range(5):
+        state = folding.step(state, 43200.0)
+    kept = np.exp(-43200.0 / SECONDS_PER_GW / memory_gw)
+    strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
+    assert strain.shape == (len(mesh.tets), points, 3)
+    np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9)
+
+
+def test_an_elastic_state_stays_where_it_is_in_equilibrium():
+    # no growth, one stiffness: what is kept from a stretched start is released in part; then nothing is left to do
+    mesh = box_mesh((3, 3, 3), (6.0, 6.0, 6.0))
+    zones = zones_of(mesh, lambda centre: centre[:, 2] < -2.99)
+    stiffness = {"shear_modulus_cortex_pa": 800, "shear_modulus_core_pa": 800}
+    folding, start = folding_of(mesh, zones, stress_memory_gw="infinite", growth_rate_per_s=0.0, **stiffness)
+    start = replace(start, stretch=packed(np.tile(STRETCH, (len(mesh.tets), 1, 1, 1))))
+    once = folding.step(start, 43200.0)
+    again = folding.step(once, 43200.0)
+    moved = np.abs(once.positions - start.positions).max()
+    assert moved > 1e-4
+    assert np.abs(again.positions - once.positions).max() <= 1e-8 * moved
+
+
+@pytest.mark.parametrize("mesh", [distorted_box(), curved_box()], ids=ORDERS)
+def test_a_free_body_grows_without_drifting(mesh):
+    zones = replace(zones_of(mesh), free=True)
+    folding, state = folding_of(mesh, zones, thickness_mm=2.0, support="free", no_growth={"kind": "none"})
+    # growth on one side only, which would turn a body that is only extrapolated
+    folding._growing = (folding.domain.local(folding.domain.positions)[:, 0] > 0).astype(float)
+    for _ in range(4):
+        before, state = state.positions, folding.step(state, 43200.0)
+        u, x = state.last, before - before.mean(axis=0)
+        size = np.abs(u).max()
+        assert size > 1e-6
+        assert np.abs(u.mean(axis=0)).max() <= 1e-12 * size
+        assert np.abs(np.cross(x, u).sum(axis=0)).max() <= 1e-9 * np.abs(x).max() * size * len(x)

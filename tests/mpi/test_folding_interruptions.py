@@ -28,22 +28,13 @@ pytestmark = pytest.mark.slow
 MANY_STEPS = 4000.0
 
 
-def curved_brain(path):
-    """Write an ellipsoid of quadratic elements that follow it."""
-    axes = (20.0, 26.0, 18.0)
-    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
-    return path
-
-
 @pytest.mark.fault(33, 35)
 @pytest.mark.promise(11)
 def test_quadratic_elements_go_through_interruptions_and_any_number_of_ranks(tmp_path, monkeypatch):
-    path = curved_brain(tmp_path / "curved.xdmf")
-    settings = {
-        "solver": TIGHT,
-        "stress_memory_gw": 1.0,
-        "fields": ["displacement", "cortex_weight", "stress", "strain"],
-    }
+    path, axes = tmp_path / "curved.xdmf", (20.0, 26.0, 18.0)
+    write_tetrahedral_mesh(path, curve_edges(ellipsoid_mesh(4, axes), ellipsoid(axes)))
+    fields = ["displacement", "cortex_weight", "stress", "strain"]
+    settings = {"solver": TIGHT, "stress_memory_gw": 1.0, "fields": fields}
     assert fold(path, tmp_path / "three", 3, **settings).returncode == 0
     mesh, p = read_tetrahedral_mesh(path), parameters_from(WEEK | settings)
     zones = zones_of_run(mesh, p)
@@ -87,8 +78,7 @@ def killed_after(step, arguments):
 
 
 @pytest.mark.fault(33, 35)
-@pytest.mark.promise(3)
-@pytest.mark.promise(11)
+@pytest.mark.promise(3, 11)
 @pytest.mark.parametrize(("first", "then"), [(1, 1), (2, 3)])
 def test_a_killed_run_goes_on_and_ends_where_an_uninterrupted_one_does(mesh, long_run, tmp_path, first, then):
     out = tmp_path / "out"

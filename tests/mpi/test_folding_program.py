@@ -4,7 +4,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections import namedtuple
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -169,10 +169,9 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
 @pytest.mark.fault(36)
 def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
     brain, parameters = ellipsoid_mesh(4, (20.0, 26.0, 18.0)), parameters_from(WEEK)
-    room = namedtuple("usage", "total used free")
-    monkeypatch.setattr("shutil.disk_usage", lambda path: room(10**9, 0, 10**9))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10**9))
     require_space(tmp_path, brain, parameters)
-    monkeypatch.setattr("shutil.disk_usage", lambda path: room(10**9, 10**9, 1000))
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=1000))
     with pytest.raises(StorageError, match="no room for this run"):
         require_space(tmp_path, brain, parameters)
 

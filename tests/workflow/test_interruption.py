@@ -40,8 +40,7 @@ def started(workflow, until):
     return process
 
 
-@pytest.mark.fault(33)
-@pytest.mark.fault(38)
+@pytest.mark.fault(33, 38)
 @pytest.mark.promise(3)
 def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(workflow):
     # an ellipsoid's

@@ -1,10 +1,15 @@
-"""What `./run snakemake` does around Snakemake: refused configurations, locks, exit codes."""
+"""What `./run snakemake` does around Snakemake, locks and exit codes, and the commands of gyriflow."""
 
+import re
 import subprocess
+import sys
 
 import pytest
+from processes import ran
 
 from gyriflow.cli.launch import clear_stale_lock
+
+from .conftest import SMALL_STUDY
 
 
 def message(outcome):
@@ -70,3 +75,32 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
     assert outcome.returncode == 5
     assert "file/below: the working directory cannot be written" in message(outcome)
+
+
+def gyriflow(workflow, *arguments):
+    command = sys.executable, "-m", "gyriflow.cli", *arguments
+    return ran(*command, cwd=workflow.directory, env=workflow.environment)
+
+
+@pytest.mark.fault(27)
+def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflow):
+    name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5}})
+    outcome = gyriflow(workflow, "check", name)
+    assert outcome.returncode == 2
+    assert "the configuration has 2 problems" in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+
+
+@pytest.mark.slow
+def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
+    vary = {"thickness_mm": [1 + 0.2 * i for i in range(10)], "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000]}
+    fifty = {"fifty": {"base": "reference", "vary": vary, "compare_week": 22}}
+    name = workflow.write("study.yaml", SMALL_STUDY | {"runs": {"reference": {}}, "studies": fifty})
+    outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000")
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    said = outcome.stdout
+    assert said.startswith("study.yaml: 2 brains, 1 simulation (reference), 50 of study fifty\n")
+    assert "simulate_member×50" in said
+    assert float(re.search(r"\nwork +about [\d.e+]+ core hours, ([\d.]+)% of them", said)[1]) > 50
+    # the memory of a cluster is not that of this machine
+    assert "are there" not in re.search(r"\nmemory .*", said)[0]

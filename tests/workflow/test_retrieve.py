@@ -1,11 +1,10 @@
 """Missing files of atlases, fetched by the workflow from a server on this machine; what is there is left alone."""
 
-import hashlib
 from pathlib import Path
 
 import pytest
 from configurations import write_atlas
-from local_server import Server, packed, serving
+from local_server import Server, files_in, packed, serving, sha256
 
 pytestmark = pytest.mark.slow
 
@@ -26,14 +25,9 @@ def server():
 
 def study(folder: Path, url: str) -> dict:
     """Write an atlas whose files are at a server into a folder and return a study of it."""
-    sums = {week: hashlib.sha256(FILES[f"w{week}/labels.nii.gz"]).hexdigest() for week in WEEKS}
-    weeks = {week: {"labels": {"sha256": found}} for week, found in sums.items()}
+    weeks = {week: {"labels": {"sha256": sha256(FILES[f"w{week}/labels.nii.gz"])}} for week in WEEKS}
     write_atlas(folder, {"files": {"labels": "w{week}/labels.nii.gz"}, "weeks": weeks}, name="far", url=url)
     return {"atlas": "atlas.yaml", "start": "far-21", "folding": {"end_week": 22}}
-
-
-def files_in(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.promise(8)

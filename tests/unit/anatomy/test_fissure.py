@@ -4,7 +4,7 @@ import numpy as np
 import odd_brains
 import pytest
 from phantoms import CENTRE_MM
-from shapes import cerebrum_surface, ellipsoid, phantom, rigid, sphere
+from shapes import cerebrum_surface, ellipsoid, phantom, rigid, sheet, sphere
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask
 from gyriflow.anatomy.fissure import MidPlane, cut_sides, fissure_between, left_faces, mid_plane, open_fissure, upright
@@ -12,7 +12,7 @@ from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import remesh
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, merged, transformed
+from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, flipped, merged, transformed
 from gyriflow.io.yaml_files import SCHEMES
 
 
@@ -78,13 +78,8 @@ def test_a_bend_of_more_than_5_mm_is_followed():
     # two walls 2 mm apart whose middle bends away from the plane by 9 mm
     y, z = np.meshgrid(np.arange(-40.0, 40.0, 1.0), np.arange(-20.0, 20.0, 1.0), indexing="ij")
     middle = 9.0 * np.exp(-((y / 15.0) ** 2))
-    grid = np.arange(y.size).reshape(y.shape)
-    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    walls = [np.stack([middle + x, y, z], axis=-1).reshape(-1, 3) for x in (-1.0, 1.0)]
-    outer = [np.stack([np.full(y.shape, x), y, z], axis=-1).reshape(-1, 3) for x in (-35.0, 35.0)]
-    sheets = [(walls[0], faces), (walls[1], faces[:, ::-1]), (outer[0], faces[:, ::-1]), (outer[1], faces)]
-    mesh = merged(*(TriangleMesh(points, corner) for points, corner in sheets))
+    left, right = (sheet(middle + x, y, z) for x in (-1.0, 1.0))
+    mesh = merged(left, flipped(right), flipped(sheet(0 * y - 35.0, y, z)), sheet(0 * y + 35.0, y, z))
     plane = MidPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0, 0)
     fissure = fissure_between(mesh, plane)
     for at in (-30.0, -12.0, 0.0, 12.0):

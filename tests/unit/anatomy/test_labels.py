@@ -1,13 +1,27 @@
-"""Label schemes: what is unknown, missing or empty is named."""
+"""Label schemes, whose faults are named; what hangs on a brain by a stalk, and ventricles that are no part of it."""
 
 import numpy as np
 import pytest
+from odd_brains import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
+from scipy import ndimage
+from shapes import phantom
 
+from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.hindbrain import pose_of_labels
-from gyriflow.anatomy.labels import cerebrum_mask, require_cortex_outside, require_sides
+from gyriflow.anatomy.labels import (
+    cerebrum_mask,
+    outside_ventricles,
+    read_cerebrum,
+    require_cortex_outside,
+    require_sides,
+    unlabelled_ventricles,
+)
+from gyriflow.anatomy.repair import surface_without_stalks
 from gyriflow.errors import InputError
+from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.shipped import SHIPPED
 
 ATLAS = SCHEMES["spina-bifida-atlas"]
@@ -79,10 +93,16 @@ def test_labels_of_the_left_on_the_right_are_refused():
 
 
 @pytest.fixture(scope="module")
-def feta():
-    """The shipped atlas' brain of 25 GW in the labels of FeTA."""
+def atlas_brain():
+    """The shipped atlas' brain of 25 GW."""
     volume = read_label_volume(SHIPPED / "atlases/spina-bifida/fetal_SB_atlas_GA25_notoperated/parcellation.nii.gz")
-    return np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[volume.labels], volume.affine
+    return volume.labels, volume.affine
+
+
+@pytest.fixture(scope="module")
+def feta(atlas_brain):
+    """That brain in the labels of FeTA."""
+    return np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])[atlas_brain[0]], atlas_brain[1]
 
 
 def test_sides_that_are_no_hemispheres_are_another_schemes(feta):
@@ -94,3 +114,133 @@ def test_a_hindbrain_inside_the_cerebrum_is_another_schemes(feta):
     assert pose_of_labels(*feta, SCHEMES["feta-7"]).by == "file"
     with pytest.raises(InputError, match=r"'drawem-9' calls the cerebellum lies inside"):
         pose_of_labels(*feta, SCHEMES["drawem-9"])
+
+
+AFFINE = np.diag([0.8, 0.8, 0.8, 1.0])
+
+
+def body(stalk_mm, ball_mm=4.0):
+    """Return a ball of 15 mm radius from which a smaller one hangs by a stalk of a radius."""
+    x, y, z = (0.8 * np.indices((60, 60, 80)).astype(float)) - np.array([24, 24, 40])[:, None, None, None]
+    large = np.sqrt(x**2 + y**2 + z**2) < 15.0
+    stalk = (np.hypot(x, y) < stalk_mm) & (z < 0) & (z > -24.0)
+    small = np.sqrt(x**2 + y**2 + (z + 24.0) ** 2) < ball_mm
+    return large | stalk | small, large
+
+
+def test_a_ball_on_a_thin_stalk_is_cut_off_with_the_stalk():
+    mask, large = body(1.0)
+    left, stalks = without_stalks(mask, AFFINE)
+    assert (left ^ large).sum() < 30
+    (found,) = stalks
+    assert found["volume_mm3"] == pytest.approx((mask & ~large).sum() * 0.8**3, rel=0.1)
+    assert found["stalk_mm2"] == pytest.approx(np.pi, rel=0.6)
+    # the ball's, nearly: in the affine's mm
+    assert found["place_mm"] == pytest.approx([24.0, 24.0, 17.0], abs=1.5)
+
+
+@pytest.mark.parametrize("case", ["a thick stalk", "a blade"])
+def test_parts_that_are_joined_broadly_stay(case):
+    mask, _ = body(2.5)
+    if case == "a blade":
+        # a gyrus as thin as a stalk, but long, and thicker at its crown
+        mask, _ = body(0.0, 0.0)
+        mask[10:50, 29:32, 2:40] = True
+        mask[10:50, 27:34, 2:8] = True
+    left, stalks = without_stalks(mask, AFFINE)
+    assert stalks == []
+    assert (left == mask).all()
+
+
+def test_a_polyp_of_a_surface_is_cut_and_the_cut_closed():
+    mask, large = body(1.4)
+    mesh, stalks = surface_without_stalks(isosurface(smooth_mask(mask, 0.7), AFFINE))
+    assert len(stalks) == 1
+    assert is_closed(mesh)
+    assert euler_number(mesh) == 2
+    assert signed_volume(mesh) == pytest.approx(signed_volume(isosurface(smooth_mask(large, 0.7), AFFINE)), rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom()
+
+
+def test_the_fourth_ventricle_is_outside_and_the_third_is_not(brain):
+    labels, affine = brain
+    made = with_fourth_ventricle(labels, affine)
+    x, y, z = positions(made, affine)
+    added = (made == VENTRICLES) & (labels != VENTRICLES)
+    below = z[np.isin(labels, CEREBRUM) & (np.abs(x) < 2.0) & (np.abs(y + 6.0) < 3.0)].min()
+    out = outside_ventricles(made, SCHEMES["spina-bifida-atlas"])
+    assert out[added & (z < below - 2.0)].all()
+    assert not out[z > below + 5.0].any()
+
+
+def test_a_ventricle_that_opens_to_the_outer_csf_stays_whole(brain):
+    labels, affine = brain
+    x, y, z = positions(labels, affine)
+    # a cleft as wide as the ventricle is long, through the whole mantle on the left
+    cleft = (x < -8.0) & (np.abs(y) < 9.0) & (np.abs(z - 2.0) < 7.0) & np.isin(labels, CEREBRUM)
+    split = np.where(cleft, VENTRICLES, labels)
+    assert not outside_ventricles(split, SCHEMES["spina-bifida-atlas"]).any()
+
+
+def test_without_labels_of_the_hindbrain_all_that_is_open_is_outside():
+    labels = np.zeros((40, 40, 40), dtype=int)
+    labels[5:35, 5:35, 20:36] = 1
+    labels[15:25, 15:25, 4:30] = 2
+    out = outside_ventricles(labels, LabelScheme(name="mine", cerebrum=(1, 2), ventricles=(2,)))
+    assert out[15:25, 15:25, 4:18].all()
+    assert not out[:, :, 24:].any()
+
+
+UNNAMED = LabelScheme(
+    name="unnamed", cerebrum=(1, 5, 6, 8), known={2: "CSF", 3: "cerebellum", 4: "CSF", 7: "brainstem"}
+)
+SOLID = LabelScheme(name="solid", cerebrum=(1, 2, 5, 6, 8), known={3: "cerebellum", 4: "CSF", 7: "brainstem"})
+
+
+@pytest.mark.parametrize(
+    ("given", "scheme"), [(0, SCHEMES["spina-bifida-atlas"]), (4, SCHEMES["spina-bifida-atlas"]), (2, UNNAMED)]
+)
+def test_ventricles_without_labels_are_filled_and_no_fissure_or_cistern(atlas_brain, given, scheme):
+    labels, affine = atlas_brain
+    known = SCHEMES["spina-bifida-atlas"]
+    ventricles = (labels == VENTRICLES) & ~outside_ventricles(labels, known)
+    found = unlabelled_ventricles(np.where(labels == VENTRICLES, given, labels), scheme, affine)
+    assert (found & ventricles).sum() > 0.98 * ventricles.sum()
+    assert (found & ~ventricles).sum() < 0.01 * ventricles.sum()
+
+
+@pytest.mark.parametrize("scheme", [SOLID, SCHEMES["spina-bifida-atlas"]])
+def test_nothing_is_filled_where_the_cerebrum_is_whole(atlas_brain, scheme):
+    assert not unlabelled_ventricles(*(atlas_brain[0], scheme, atlas_brain[1])).any()
+
+
+def test_a_filled_ventricle_is_told_and_counts_as_ventricle_and_not_as_tissue(atlas_brain):
+    labels, affine = atlas_brain
+    with_labels, without = (
+        read_cerebrum(given, affine, SCHEMES["spina-bifida-atlas"])
+        for given in (labels, np.where(labels == VENTRICLES, 0, labels))
+    )
+    assert any("ventricles without a label" in warning for warning in without.warnings)
+    assert not any("without a label" in warning for warning in with_labels.warnings)
+    for name, volume in with_labels.report["label_volumes_mL"].items():
+        assert without.report["label_volumes_mL"][name] == pytest.approx(volume, rel=0.01)
+
+
+def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain):
+    labels, affine = brain
+    scheme, random = SCHEMES["spina-bifida-atlas"], np.random.default_rng(0)
+    clean = read_cerebrum(labels, affine, scheme)
+    inside = ndimage.binary_erosion(np.isin(labels, CEREBRUM), iterations=2)
+    far = ~ndimage.binary_dilation(labels > 0, iterations=2)
+    noise = random.random(labels.shape)
+    strewn = np.where(far & (noise < 0.02), 5, np.where(inside & (noise < 0.02), 0, labels))
+    found = read_cerebrum(strewn, affine, scheme)
+    assert (strewn != labels).sum() > 1000
+    assert np.array_equal(found.mask, clean.mask)
+    expected = clean.report["label_volumes_mL"]["cerebrum"]
+    assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(expected, rel=1e-6)
+    assert any("parts apart from the brain were dropped" in warning for warning in found.warnings)

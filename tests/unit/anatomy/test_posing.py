@@ -1,26 +1,36 @@
-"""Hemispheres in any pose: found again by their shape or their files, or refused."""
+"""Hemispheres and whole brains in any pose: told by shape, hindbrain, labelled sides or file, or refused."""
 
 import json
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import odd_brains
 import pytest
-from atlas_brains import atlas_halves
+from atlas_brains import atlas_brain, atlas_halves
 from scipy.spatial.transform import Rotation
-from shapes import LPS, ellipsoid
+from shapes import LPS, cerebrum_surface, ellipsoid, phantom, rigid
 
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import least_gap
+from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.pial import from_hemispheres
-from gyriflow.anatomy.pose import hemisphere_by_shape, pose_of_pair
+from gyriflow.anatomy.pose import (
+    doubts_of_hemispheres,
+    hemisphere_by_shape,
+    pose_of_pair,
+    pose_of_surface,
+    pose_of_volume_by_shape,
+)
 from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import MIRROR, medial_wall, shape_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import read_surface
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.parameters.terms import SIDES
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")) / "hemispheres"
@@ -31,7 +41,7 @@ def halves():
     return atlas_halves()
 
 
-def rigid(seed):
+def drawn(seed):
     random = np.random.default_rng(seed)
     return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0, 30, 3))
 
@@ -49,7 +59,7 @@ def require_upright(pose, moved, pitch=10.0, tilt=2.0):
 
 
 def test_separately_moved_hemispheres_are_posed(halves):
-    moved = [rigid(1), rigid(101)]
+    moved = [drawn(1), drawn(101)]
     pose = pose_of_pair(*(transformed(half, there) for half, there in zip(halves, moved, strict=True)))
     require_upright(pose, moved, pitch=5.0)
     assert not pose.together
@@ -64,7 +74,7 @@ def test_separately_moved_hemispheres_are_posed(halves):
 
 
 def test_hemispheres_of_one_pose_keep_their_distance(halves):
-    turn = rigid(3)
+    turn = drawn(3)
     pose = pose_of_pair(*(transformed(half, turn) for half in halves))
     assert pose.together
     np.testing.assert_array_equal(pose.of_file("left"), pose.of_file("right"))
@@ -94,13 +104,13 @@ def test_files_that_name_one_system_stay_together_however_they_lie(halves):
 def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
     size = np.cbrt(np.linalg.det(change))
     changed = [linear(halves[0], size * np.eye(3)), linear(halves[1], np.array(change))]
-    moved = [rigid(7), rigid(8)]
+    moved = [drawn(7), drawn(8)]
     pose = pose_of_pair(*(transformed(half, there) for half, there in zip(changed, moved, strict=True)))
     require_upright(pose, moved, tilt=4.0)
 
 
 def test_swapped_hemispheres_are_refused(halves):
-    left, right = (transformed(half, rigid(seed)) for half, seed in zip(halves, (9, 10), strict=True))
+    left, right = (transformed(half, drawn(seed)) for half, seed in zip(halves, (9, 10), strict=True))
     with pytest.raises(InputError, match="seem to be swapped"):
         pose_of_pair(right, left)
     with pytest.raises(InputError, match="of one side"):
@@ -127,7 +137,7 @@ def test_a_wall_that_was_cut_is_found_to_half_a_degree():
 
 
 def test_surface_of_hemispheres_inside_out_in_any_pose_is_one_brain(halves):
-    left, right = (flipped(transformed(half, rigid(seed))) for half, seed in zip(halves, (11, 12), strict=True))
+    left, right = (flipped(transformed(half, drawn(seed))) for half, seed in zip(halves, (11, 12), strict=True))
     surface = from_hemispheres(left, right, week=24.0, coordinates="auto", edge_length_mm=1.6)
     assert is_closed(surface.whole)
     sides = pieces(surface.whole)
@@ -161,7 +171,7 @@ def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
     np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))
     assert "set coordinates" in pose.warnings[0]
     with pytest.raises(InputError, match="pose of the left hemisphere cannot be determined from its shape"):
-        pose_of_pair(*(transformed(half, rigid(31)) for half in halves))
+        pose_of_pair(*(transformed(half, drawn(31)) for half in halves))
 
 
 def test_the_mirror_image_of_a_hemisphere_fits_worse(halves):
@@ -170,3 +180,124 @@ def test_the_mirror_image_of_a_hemisphere_fits_worse(halves):
     assert one.sided > 1.1
     assert other.sided == pytest.approx(1 / one.sided, rel=0.1)
     assert angle_deg(one.rotation) < 8.0
+
+
+TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]
+
+
+@pytest.fixture(scope="module")
+def brain():
+    return phantom(24.0, 1.6)
+
+
+def pose_when_turned(brain, degrees):
+    return pose_of_labels(brain[0], rigid(*degrees) @ brain[1], SCHEMES["spina-bifida-atlas"])
+
+
+@pytest.mark.fault(49)
+@pytest.mark.parametrize("degrees", TURNS)
+def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
+    pose = pose_when_turned(brain, degrees)
+    assert pose.by == "cerebellum and brainstem"
+    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
+    assert "the brain was turned by" in pose.warnings[0]
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (5, 0, 0), (-15, 0, 0), (-6, 5, 7)])
+def test_small_tilts_are_the_files_own(brain, degrees):
+    pose = pose_when_turned(brain, degrees)
+    assert (pose.by, pose.warnings) == ("file", ())
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "angle"), [((25, 0, 0), 25), ((30, 0, 0), 30), ((45, 0, 0), 45), ((0, 45, 0), 45), ((-20, 25, 30), 46)]
+)
+def test_larger_tilts_are_kept_and_told(brain, degrees, angle):
+    pose = pose_when_turned(brain, degrees)
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
+    (warning,) = pose.warnings
+    said = re.search(r"cerebellum and brainstem say that the brain is turned by about (\d+)°: its mid-plane", warning)
+    # the hindbrain of this brain is pitched by 7° against that of the atlas
+    assert abs(int(said[1]) - angle) < 8
+
+
+@pytest.mark.parametrize("lost", [(), (10,), (11, 12)], ids=["nothing", "cerebellum", "brainstem"])
+def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brain, lost):
+    labels, affine = odd_brains.add_sides(*brain), brain[1]
+    labels = np.where(np.isin(labels, lost), 0, labels)
+    for turn in TURNS:
+        pose = pose_of_labels(labels, rigid(*turn) @ affine, SCHEMES["dhcp-19"])
+        np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*turn)[:3, :3], np.eye(3), atol=1e-9)
+    tilts = ((0, 0, 0), (0, 10, 8), (0, -5, 12))
+    for tilt in tilts:
+        assert pose_of_labels(labels, rigid(*tilt) @ affine, SCHEMES["dhcp-19"]).by == "file"
+    for turn in (*tilts, *TURNS) if not lost else tilts:
+        with pytest.raises(InputError, match=r"left hemisphere lie on the right.*affine mirrors"):
+            pose_of_labels(labels, rigid(*turn) @ np.diag([-1.0, 1, 1, 1]) @ affine, SCHEMES["dhcp-19"])
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
+def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
+    mesh = transformed(atlas_brain(), rigid(*degrees))
+    pose = pose_of_volume_by_shape(mesh, sided=False)
+    np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
+    assert ["left and right are exchanged now" in warning for warning in pose.warnings] == [True] * any(degrees)
+
+
+def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
+    # neither front nor back, up nor down, and its axes are no file's
+    mesh = transformed(ellipsoid((24, 33, 22)), rigid(50, 40, 30))
+    with pytest.raises(InputError, match="cannot be determined from its shape"):
+        pose_of_surface(mesh, "auto")
+    pose = pose_of_volume_by_shape(mesh, sided=False)
+    assert np.array_equal(pose.world, np.eye(4))
+    assert "unchecked" in pose.warnings[0]
+
+
+def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
+    labels, affine = brain
+    scheme = SCHEMES["spina-bifida-atlas"]
+    assert "left and right are exchanged now" in pose_of_labels(labels[:, ::-1], affine, scheme).warnings[0]
+    sided = odd_brains.add_sides(*brain)
+    turned = pose_of_labels(sided, rigid(0, 0, 180) @ affine, SCHEMES["dhcp-19"])
+    assert "exchanged" not in turned.warnings[0]
+
+
+@pytest.mark.fault(10)
+@pytest.mark.parametrize(
+    ("turn", "most_deg", "said"),
+    [(np.eye(4), 1e-6, ()), (LPS, 1e-6, ("are LPS",)), (rigid(100, 40, -70), 5.0, ("as its shape says",))],
+    ids=["RAS", "LPS", "any"],
+)
+def test_the_shape_of_a_surface_tells_its_pose(turn, most_deg, said):
+    pose = pose_of_surface(transformed(atlas_brain(), turn), "auto")
+    assert angle_deg(pose.of_file()[:3, :3] @ turn[:3, :3]) < most_deg
+    assert [part in warning for part, warning in zip(said, pose.warnings, strict=True)] == [True] * len(said)
+
+
+def test_coordinates_that_are_named_are_kept_and_doubted():
+    pose = pose_of_surface(transformed(atlas_brain(), rigid(180, 0, 0)), "ras")
+    assert np.array_equal(pose.world[:3, :3], np.eye(3))
+    assert "turned by 1" in pose.warnings[0]
+    assert pose_of_surface(atlas_brain(), "ras").warnings == ()
+
+
+@pytest.mark.parametrize("pathology", ["without_callosum", "holoprosencephaly", "wide_hemisphere"])
+def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, pathology):
+    mesh = cerebrum_surface(getattr(odd_brains, pathology)(*brain), brain[1])
+    pose = pose_of_surface(mesh, "auto")
+    assert pose.by == "default"
+    assert "set coordinates" in pose.warnings[0]
+
+
+@pytest.mark.fault(9, 10)
+def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
+    left, right = atlas_halves()
+    assert doubts_of_hemispheres(left, right, "ras") == []
+    # files that are swapped, and in the other one of RAS and LPS: back to front
+    about = [transformed(side, LPS) for side in (right, left)]
+    (doubt,) = doubts_of_hemispheres(*about, "lps")
+    assert "are left and right swapped, and the coordinates not LPS?" in doubt
+    (doubt,) = doubts_of_hemispheres(*(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras")
+    assert "turned by 1" in doubt

@@ -27,8 +27,7 @@ def test_hemispheres_are_parted_where_the_labels_of_the_sides_meet():
     sided[labels == 2] = 5
     surface = from_labels(sided, affine, SIDED, week=24.0, edge_length_mm=1.5)
     inverse = surface.pose.world
-    expected = {"left": -1, "right": 1}
-    for name, sign in expected.items():
+    for name, sign in (("left", -1), ("right", 1)):
         part = getattr(surface, name)
         centres = corners(part).mean(axis=1) - inverse[:3, 3]
         places = centres @ np.linalg.inv(inverse[:3, :3]).T - CENTRE_MM

@@ -1,8 +1,8 @@
 """What the commands hand on to Snakemake, what they tell to type next, and in which code they end."""
 
 import shutil
-from collections import namedtuple
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -155,9 +155,6 @@ def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until
     assert not (tmp_path / "gyriflow.yaml").exists()
 
 
-Usage = namedtuple("Usage", "total used free")
-
-
 @pytest.mark.fault(36)
 @pytest.mark.parametrize(
     ("code", "recorded", "free", "expected"),
@@ -166,6 +163,6 @@ Usage = namedtuple("Usage", "total used free")
 def test_a_full_disk_is_the_cause_where_no_step_has_told_another(
     tmp_path, monkeypatch, capsys, code, recorded, free, expected
 ):
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage(2**31, 2**31 - free, free))
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(total=2**31, free=free))
     assert launch.exit_code(code, recorded, tmp_path) == expected
     assert ("the disk is full" in capsys.readouterr().err) == (expected == 5)

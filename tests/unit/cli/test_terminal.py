@@ -1,13 +1,18 @@
-"""What a run tells by Snakemake's records: on a terminal and in a file, with warnings, weeks, failures and the end."""
+"""What a run tells by Snakemake's records, on a terminal and in a file; how far a study is, and whose results."""
 
 import io
 import logging
 
 import pytest
+from configurations import LABELLED
 
-from gyriflow.cli.status import STATE
+from gyriflow.cli.launch import hold_lock
+from gyriflow.cli.provenance import require_own_results
+from gyriflow.cli.status import STATE, status
 from gyriflow.cli.terminal import RunDisplay
-from gyriflow.io.files import read_json
+from gyriflow.config import load
+from gyriflow.errors import InputError
+from gyriflow.io.files import read_json, write_json
 from gyriflow.step import EXIT_FILE, recorded_exit_code
 
 STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
@@ -145,3 +150,98 @@ def test_an_error_of_no_job_is_told(run):
     run.tell("error", text="WorkflowError: no such profile", level=logging.ERROR)
     run.display.end()
     assert run.lines[1:] == ["WorkflowError: no such profile"]
+
+
+RUNNING = {
+    "began": "2026-01-01 10:00:00",
+    "ended": None,
+    "done": 3,
+    "total": 10,
+    "left_s": 240.0,
+    "running": ["folding, run r, brain a: GW 21.50 of 23"],
+    "failed": [],
+    "details": "run.log",
+    "interrupted": False,
+}
+
+
+@pytest.fixture
+def study(tmp_path):
+    for name in ("brains/a/surface/pial.surf.gii", "brains/b/logs/x", "runs/r/a/logs/simulate.log"):
+        (tmp_path / "results" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "results" / name).touch()
+    write_json(tmp_path / STATE, RUNNING)
+    return tmp_path
+
+
+def text(folder):
+    return "\n".join(status(folder))
+
+
+def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
+    with hold_lock(study):
+        said = text(study)
+    assert "running since 2026-01-01 10:00:00: 3 of 10 steps done, about 4 min left" in said
+    assert "now: folding, run r, brain a: GW 21.50 of 23" in said
+
+
+def test_a_run_that_was_killed_is_called_interrupted(study):
+    assert "interrupted: the run of 2026-01-01 10:00:00 ended without notice, 3 of 10 steps done" in text(study)
+    assert "now:" not in text(study)
+    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
+    assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
+
+
+def test_stages_of_brains_and_runs_are_told_from_their_files(study):
+    rows = [line.split() for line in text(study).splitlines()]
+    assert ["a", "done", "-", "-"] in rows
+    assert ["b", "-", "-", "-"] in rows
+    assert ["r", "a", "-", "-", "-", "-"] in rows
+    progress = study / "results/runs/r/a/logs/simulate.jsonl"
+    progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
+    assert "GW 21.50 of 23 " in text(study)
+    write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
+    assert "done, GW 23.00 " in text(study)
+    assert "report:" not in text(study)
+
+
+def test_a_folder_without_a_study_is_named(tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
+        text(tmp_path)
+
+
+def configured(*ids, week=21):
+    brains = [{"id": name, "week": week, **LABELLED} for name in ids]
+    return load({"brains": brains, "start": ids[0], "folding": {"end_week": 30}})
+
+
+@pytest.fixture
+def made(tmp_path):
+    """A folder with results of a study of brains a and b."""
+    require_own_results(tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True)
+    (tmp_path / "results" / "brains" / "a").mkdir(parents=True)
+    return tmp_path
+
+
+def test_another_study_is_refused_with_what_to_do(made):
+    with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Choose .*--directory"):
+        require_own_results(made, [made / "two.yaml"], configured("c"), record=True)
+    # a brain of the same name may be another one
+    with pytest.raises(InputError, match="another study"):
+        require_own_results(made, [made / "two.yaml"], configured("a", week=25), record=False)
+
+
+@pytest.mark.parametrize(
+    ("file", "ids"),
+    [("one.yaml", ["c"]), ("two.yaml", ["b", "c"])],
+    ids=["the same file, changed", "a copy of it, changed"],
+)
+def test_a_study_that_was_changed_goes_on(made, file, ids):
+    require_own_results(made, [made / file], configured(*ids), record=True)
+    # whose they are now
+    require_own_results(made, [made / file], configured(*ids), record=False)
+
+
+def test_results_that_were_deleted_are_nobodys(made):
+    (made / "results" / "brains" / "a").rmdir()
+    require_own_results(made, [made / "two.yaml"], configured("c"), record=True)

@@ -142,8 +142,6 @@ def test_parameters_of_a_run_are_what_the_folding_program_reads():
 
 CONFIG = Path(__file__).parents[3] / "config"
 EXAMPLES = sorted([CONFIG / "config.yaml", *(CONFIG / "examples").glob("*.yaml")])
-
-
 SCHEMA = Config.model_json_schema()
 
 

@@ -1,17 +1,24 @@
-"""The steps of a simulation: which are shortened, and how halved ones grow back."""
+"""The steps of a simulation: their lengths, how stiff contact is from one to the next, and what is told of the mesh."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.errors import SolverError
 from gyriflow.folding import simulation
 from gyriflow.folding.checkpoint import State
+from gyriflow.folding.checks import stiffness_warning
+from gyriflow.folding.contact import STIFFEST, SelfContact
+from gyriflow.folding.diagnosis import elements_through, resolution_warning, unconverged_warning
+from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
+from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.run import shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.parameters.folding import parameters_from
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
@@ -81,3 +88,96 @@ def test_a_short_remainder_is_halved_as_often_as_a_whole_step():
     # 43 200 s and 800 s: what is left over is far below the smallest part of a whole step
     stepper = Stepper(lambda time_s: 1e9 if time_s < 43_000 else 300.0, solver={"max_halvings": 3})
     assert steps_to(stepper, 44_000.0) == pytest.approx([43_200.0, 200.0, 200.0, 200.0, 200.0])
+
+
+def test_elements_through_a_layer_are_its_thickness_over_the_edges_in_it():
+    mesh = box_mesh((4, 4, 8), (4.0, 4.0, 8.0))
+    # coarser below the layer, which is not to count
+    z = mesh.vertices[:, 2] - 4.0
+    stretched = np.where(z < -3, -3 + 4 * (z + 3), z)
+    domain = Domain(MPI.COMM_SELF, TetrahedralMesh(np.column_stack([mesh.vertices[:, :2], stretched]), mesh.tets))
+    depth = -domain.local(domain.positions)[:, 2]
+    # a cube in six tetrahedra, each with three edges, two diagonals and the long one
+    edge = (3 + 2 * np.sqrt(2) + np.sqrt(3)) / 6
+    assert elements_through(domain, depth, 3e-3) == pytest.approx(3 / edge)
+    domain.place(2 * domain.positions)
+    assert elements_through(domain, 2 * depth, 3e-3) == pytest.approx(1.5 / edge)
+    assert np.isnan(elements_through(domain, depth + 1.0, 3e-3))
+
+
+def rows(*through):
+    return [{"week": 21.0 + i, "elements_through_cortex": value} for i, value in enumerate(through)]
+
+
+@pytest.mark.fault(25)
+def test_a_cortex_that_outgrows_its_elements_is_told_once():
+    assert resolution_warning(rows(2.3, 2.1), 1) == ""
+    assert "GW 23.00" in resolution_warning(rows(2.3, 2.1, 1.9), 1)
+    assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
+    assert resolution_warning(rows(1.5), 1).startswith("from the start on fewer than 2")
+    assert resolution_warning(rows(1.5), 2) == ""
+    assert resolution_warning(rows(0.81), 2) == ""  # the default mesh at its start
+    assert "fewer than 0.8" in resolution_warning(rows(1.2, 0.79), 2)
+    assert "fewer than 2" in resolution_warning(rows(np.nan), 1)  # no element lies in the cortex at all
+
+
+def test_nearly_incompressible_tissue_is_told():
+    assert stiffness_warning(0.45) == stiffness_warning(0.46) == ""
+    assert "0.48" in stiffness_warning(0.48)
+
+
+def test_a_step_above_its_tolerance_is_told():
+    row = {"step": 7, "residual": 3e-6, "converged": True}
+    assert unconverged_warning(row) == ""
+    assert "step 7" in unconverged_warning(row | {"converged": False})
+
+
+@pytest.mark.fault(38)
+@pytest.mark.parametrize(
+    ("order", "tets", "ranks", "contact", "measured"),
+    [
+        *((1, 182_779, 1, "planes", 564), (1, 182_779, 1, "global", 649), (1, 448_597, 1, "planes", 877)),
+        *((1, 448_597, 1, "global", 1001), (1, 499_373, 1, "global", 914), (1, 499_373, 2, "global", 1580)),
+        *((2, 23_910, 1, "global", 600), (2, 23_910, 2, "global", 955), (2, 23_910, 2, "none", 838)),
+        *((2, 34_684, 1, "global", 784), (2, 34_684, 2, "global", 1141)),
+    ],
+)
+def test_predicted_memory_is_what_runs_have_taken(order, tets, ranks, contact, measured):
+    assert predicted_memory_mib(tets, ranks, contact, order) == pytest.approx(measured, rel=0.155)
+
+
+START_PA = 1000.0
+
+
+@pytest.fixture(scope="module")
+def contact():
+    mesh = ellipsoid_mesh(2, (4.0, 4.0, 4.0))
+    domain = Domain(MPI.COMM_SELF, mesh)
+    return SelfContact(domain, np.zeros((len(mesh.vertices), 3)), boundary_faces(mesh)[0], START_PA, 0.2)
+
+
+def after(part, stiffness_pa):
+    """Return the table's row of a step whose smallest gap was a part of the distance."""
+    return {"min_distance_mm": part * 0.2, "contact_distance_mm": 0.2, "contact_stiffness_pa": stiffness_pa}
+
+
+@pytest.mark.parametrize(
+    ("part", "before", "then"),
+    [
+        (0.09, 4.0, 8.0),
+        (0.11, 4.0, 4.0),
+        (0.74, 4.0, 4.0),
+        (0.76, 4.0, 2.0),
+        # nothing is near
+        (np.nan, 4.0, 2.0),
+        # no stiffer than the limit, and no softer than at the start
+        (0.09, STIFFEST, STIFFEST),
+        (0.09, 0.75 * STIFFEST, STIFFEST),
+        (0.76, 1.0, 1.0),
+        (np.nan, 1.5, 1.0),
+    ],
+)
+def test_the_barrier_becomes_stiffer_where_folds_come_close_and_softer_where_they_part(contact, part, before, then):
+    # only the last step counts
+    contact.adapt([after(0.01, START_PA), after(part, before * START_PA)])
+    assert contact.stiffness_pa == then * START_PA

@@ -1,10 +1,9 @@
 """Files from a server: whole or not there, checked; what is there is left as it is."""
 
-import hashlib
 import socket
 
 import pytest
-from local_server import Server, gifti, packed, serving
+from local_server import Server, files_in, gifti, packed, serving, sha256
 
 from gyriflow.errors import StorageError
 from gyriflow.io import downloads
@@ -33,15 +32,6 @@ def fetched(folder, server, name, **known):
     said: list[str] = []
     fetch(folder / name, f"{server.url}/{name}", said.append, **known)
     return said
-
-
-def sha256(content):
-    return hashlib.sha256(content).hexdigest()
-
-
-def files_in(folder):
-    """Return the content of each file of a folder by its path."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize(("name", "content"), [(LONG, LABELS), (SHORT, SURFACE)])

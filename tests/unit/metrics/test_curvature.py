@@ -2,16 +2,16 @@
 
 import logging
 
-import igl
 import numpy as np
 import pytest
-from shapes import sphere, torus
+from shapes import sheet, sphere, torus
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import (
     Floats,
     TriangleMesh,
+    flipped,
     mean_edge_length,
     merged,
     signed_volume,
@@ -47,12 +47,6 @@ def test_irregular_triangles_of_any_density_give_the_same_curvature_and_noise_is
     assert error < bound
 
 
-def grid(size: int) -> TriangleMesh:
-    """Return a flat square of size x size vertices, 1 mm apart."""
-    vertices, faces = igl.triangulated_grid(size, size)
-    return TriangleMesh(np.column_stack([(size - 1) * vertices, np.zeros(len(vertices))]), faces)
-
-
 def test_torus() -> None:
     mesh, angle = torus_and_angle()
     assert signed_volume(mesh) > 0
@@ -68,10 +62,8 @@ def test_torus() -> None:
 
 
 def test_walls_of_a_narrow_sulcus_do_not_see_each_other() -> None:
-    lower, upper = grid(30), grid(30)
-    upper = TriangleMesh(upper.vertices + [0.0, 0.0, 0.5], upper.faces[:, ::-1])
-    slope = lower.vertices[:, [0]] ** 2 * [0.0, 0.0, 0.01]
-    third = TriangleMesh(lower.vertices + [0.0, 0.0, 1.0] + slope, lower.faces)
+    x, y = np.meshgrid(np.arange(30.0), np.arange(30.0), indexing="ij")
+    lower, upper, third = sheet(x, y, 0 * x), flipped(sheet(x, y, 0 * x + 0.5)), sheet(x, y, 1.0 + 0.01 * x**2)
     alone = curvature(lower, radius_mm=3.0)
     between = curvature(merged(lower, upper, third), radius_mm=3.0)
     np.testing.assert_allclose(between.maximum[: len(lower.vertices)], alone.maximum, atol=1e-12)
@@ -116,10 +108,7 @@ def test_folds_shorter_than_four_radii_are_flattened(wavelength, least, most):
     # folds a quarter as deep as long
     x, y = np.meshgrid(np.arange(70) * 0.5, np.arange(30) * 0.5, indexing="ij")
     k, height = 2 * np.pi / wavelength, wavelength / 8
-    numbers = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    bend = curvature(TriangleMesh(np.stack([x, y, height * np.cos(k * x)], -1).reshape(-1, 3), faces), radius_mm=3.0)
+    bend = curvature(sheet(x, y, height * np.cos(k * x)), radius_mm=3.0)
     stretch = np.sqrt(1 + (height * k * np.sin(k * x.ravel())) ** 2)
     exact = 0.5 * height * k**2 * np.cos(k * x.ravel()) / stretch**3
     inner = bend.reliable & (np.abs(x.ravel() - 17.25) < 12.0)

@@ -256,13 +256,6 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert [alone[name] for name in ("real brain", "gain", "95 % interval")] == ["none", "–", "–"]
 
 
-def finished_run(order, *through):
-    """Return a run to its end with so many elements through the cortex, before and in its steps of half a week."""
-    steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
-    run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
-    return run | resolution_over_steps(order, steps)
-
-
 @pytest.mark.parametrize(
     ("order", "through", "verdict"),
     [
@@ -276,7 +269,10 @@ def finished_run(order, *through):
     ],
 )
 def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verdict):
-    run = finished_run(order, *through)
+    # to its end, with so many elements before its steps of half a week and in them
+    steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
+    run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
+    run |= resolution_over_steps(order, steps)
     assert verdict in run_verdict(run)
     assert verdict or run_verdict(run) == "reached 23 GW"
     assert "inverted" in run_verdict(run | {"min_J": -0.1})
