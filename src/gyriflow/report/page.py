@@ -28,13 +28,13 @@ FIRST = ("predicted_figure", "weekly_figure")
 OF_BRAINS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """The metrics in the row of a brain."""
 NORM_WORDS = {
-    "ok": "Below a number: its centile (z) at this age among the norm's other subjects.",
-    SPREAD_UNKNOWN: "Below a number: its difference from the curve of the norm ({norm}), whose brains are averages, "
-    "one a week. How far individuals spread around such a curve is unknown: no centile can be given.",
-    "too few brains": "There are too few subjects for centiles: a curve over the weeks takes six others.",
+    "ok": "Below each number: its centile (and z) for this age among the norm's other subjects.",
+    SPREAD_UNKNOWN: "Below each number: its difference from the curve of the norm ({norm}). The norm has one average "
+    "brain a week, so the spread of individuals around the curve is unknown and there are no centiles.",
+    "too few brains": "There are too few subjects for centiles: a curve over the weeks needs six others.",
 }
 """What is said of numbers by how brains stand among the norm."""
-NOT_COMPARED = "No real brain of the same population and week was there to compare a simulation with."
+NOT_COMPARED = "There is no real brain of the same population and week to compare a simulation with."
 DEEP_MM = 0.5
 """Walls of the fissure that begin so far beyond their planes are told of."""
 
@@ -126,7 +126,9 @@ def page_content(
     own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
     files = [file for file in provenance["files"] if file["brain"] in ids]
     versions = [(name, version) for name, version in software.items() if version]
-    title, said, scores = f"Cortical folding, {'measured' if pictures is not None else ids[0]}", "", ""
+    title, said, scores = f"Measured cortical folding, {ids[0]}", "", ""
+    if pictures is not None:
+        title, said = "Measured cortical folding", measured_verdict(quality)
     if runs is not None:
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
         said = verdict(runs, validation, warnings, worth_told(prediction) if prediction else NOT_COMPARED)
@@ -275,15 +277,24 @@ def worth_told(prediction: Mapping[str, Any]) -> str:
     horizon = min((tried for tried in rows["horizon"] if tried >= ahead - 1e-6), default=rows["horizon"].max())
     ways = rows[rows["horizon"] == horizon].groupby("model")
     run, atlas, scaled = (
-        f"{span(of['distance_mm'])} mm from the real brain, r {span(of['r_shape_index'])}"
+        f"{span(of['distance_mm'])} mm (r {span(of['r_shape_index'])})"
         for of in map(ways.get_group, ("run", "atlas", "scaled"))
     )
-    beyond = f" None was tried {ahead:.3g} weeks ahead." if ahead > horizon + 1e-6 else ""
+    beyond = f" No test went as far as {ahead:.3g} weeks." if ahead > horizon + 1e-6 else ""
     return (
-        f"A prediction, not a scan. {horizon:g} weeks ahead such predictions were {run} of shape index; the atlas' own "
-        f"brain {atlas}; the scaled start {scaled}.{beyond} These were averages of many normal fetuses: how far single "
-        "fetuses are from their predictions is not known."
+        f"This is a prediction, not a scan. In tests over {horizon:g} weeks, the mean distance from the real brain and "
+        f"the correlation of shape index with it were {run} for predictions, {atlas} for the atlas' own brain and "
+        f"{scaled} for the scaled start.{beyond} The test brains were averages of many normal fetuses; the accuracy "
+        "for a single fetus is unknown."
     )
+
+
+def measured_verdict(quality: pd.DataFrame) -> str:
+    """Return in a sentence how many brains were measured without warnings, and how many were not."""
+    counts = quality["verdict"].value_counts()
+    words = {"fine": "measured without warnings", "look": "measured with warnings", "refused": "refused"}
+    brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
+    return f"{brains}: {', '.join(f'{counts[name]} {word}' for name, word in words.items() if name in counts)}."
 
 
 def verdict(
@@ -301,13 +312,13 @@ def verdict(
         last = validation[validation["week"] == validation["week"].max()]
         best = last.sort_values("r_shape_index", ascending=False).iloc[0]
         sentence = (
-            f"At {week_label(best['week'])} run {best['run']} comes nearest to the real brain ({best['kind']}): shape "
-            f"index r {best['r_shape_index']:.2f}, {best['r_start_shape_index']:.2f} by doing nothing but scaling the "
-            f"start; {best['distance_mm']:.2f} mm from it."
+            f"At {week_label(best['week'])}, run {best['run']} agrees best with the real brain ({best['kind']}): shape "
+            f"index r {best['r_shape_index']:.2f}, against {best['r_start_shape_index']:.2f} for the scaled start, at "
+            f"a mean distance of {best['distance_mm']:.2f} mm."
         ).replace("-", "−")
     doubts = [text for _, run in runs.iterrows() for text in run_verdict(run).split("; ")[1:]]
     worst = [*warnings.loc[warnings["level"] == "error", "message"], *doubts, *warnings["message"]]
-    return f"{sentence} {f'Worst warning: {worst[0].rstrip(".")}.' if worst else 'No step has warned.'}"
+    return f"{sentence} {f'Worst warning: {worst[0].rstrip(".")}.' if worst else 'There were no warnings.'}"
 
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
@@ -331,13 +342,13 @@ def _resolution(run: Mapping[str, Any] | pd.Series) -> str:
     needed = ELEMENTS_NEEDED[int(run["order"])]
     at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
     if not at_start >= needed:  # not a number: no element lies in the cortex
-        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds may be the mesh's"
+        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds may be artefacts"
     if pd.isna(week):
         return ""
     return (
         f"cortex not resolved from {week_label(round(week, 2))} on "
         f"(down to {run['least_elements_through_cortex']:.3g} elements through it, {needed:g} needed): "
-        "folds may be the mesh's from then on"
+        "folds may be artefacts from then on"
     )
 
 

@@ -23,7 +23,7 @@ from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted,
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure, styled, wrap
 
-VERDICTS = {"fine": ("No warnings.", "#009E73"), "look": ("Look at:", "#E69F00")}
+VERDICTS = {"fine": ("No warnings.", "#009E73"), "look": ("Warnings:", "#E69F00")}
 """What stands above the warnings of a page, and the colour of the verdict."""
 TISSUES = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
 """Groups of labels as they are coloured, in place of an image."""

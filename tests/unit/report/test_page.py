@@ -110,7 +110,7 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     parts = ("first &lt;page", "<h3>Runs", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Brains", "<h2>Provenance")
     order = [text.index(word) for word in parts]
     assert order == sorted(order)
-    assert "2 brains of 21 to 23 GW (healthy) went in. young was filled with" in " ".join(text.split())
+    assert "2 brains of 21 to 23 GW (healthy) were analysed. young was meshed and" in " ".join(text.split())
     assert "grown to 23 GW in 1 simulation of" in " ".join(text.split())
     assert "12ab" in text
     assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
@@ -143,13 +143,15 @@ def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_thr
 def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     none = pd.DataFrame({"level": [], "message": []})
     told = verdict(RUNS, VALIDATION, none)
-    assert told.startswith("At 23 GW run thin comes nearest to the real brain (predicted): shape index r 0.57, 0.57 by")
-    assert "0.42 mm from it. Worst warning: cortex not resolved (1.2 elements through it, 2 needed)" in told
+    assert told.startswith(
+        "At 23 GW, run thin agrees best with the real brain (predicted): shape index r 0.57, against"
+    )
+    assert "distance of 0.42 mm. Worst warning: cortex not resolved (1.2 elements through it, 2 needed)" in told
     failed = pd.DataFrame({"level": ["warning", "error"], "message": ["holes closed", "a step died."]})
     assert verdict(RUNS, VALIDATION, failed).endswith("Worst warning: a step died.")
     alone = verdict(RUNS.assign(elements_through_cortex=3.0, unresolved_from_week=np.nan), None, none)
-    assert alone.startswith("No real brain of the same population")
-    assert alone.endswith("No step has warned.")
+    assert alone.startswith("There is no real brain of the same population")
+    assert alone.endswith("There were no warnings.")
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
 
 
@@ -173,7 +175,7 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     text = " ".join(page(figures, validation=None, prediction=foretold(7.5), metrics=metrics).split())
     parts = (
         "Prediction of young to 29.5 GW, by the growth of the atlas crl</h1>",
-        *("A prediction, not a scan. 8 weeks", "7.5 weeks later", "210.5", "What such predictions were worth"),
+        *("This is a prediction, not a scan. In tests over 8", "7.5 weeks later", "210.5", "How accurate such"),
         *("norms/predictions.yaml", "results/a.surf.gii", "results/a_dseg.nii.gz"),
         *("Cite: A. et al., doi 10.1/x.", "CRL licence. Research only.", "<h2>Brains"),
     )
@@ -187,9 +189,9 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
     last = max(row["horizon"] for row in WORTH["rows"])
-    assert "None was tried" not in worth_told(foretold(last))
-    assert f"{last:g} weeks ahead such" in worth_told(foretold(last + 1))
-    assert f"None was tried {last + 1:g} weeks ahead." in worth_told(foretold(last + 1))
+    assert "No test went" not in worth_told(foretold(last))
+    assert f"In tests over {last:g} weeks, " in worth_told(foretold(last + 1))
+    assert f"No test went as far as {last + 1:g} weeks." in worth_told(foretold(last + 1))
 
 
 def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_beside_simpler_ways():
@@ -225,9 +227,9 @@ def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings()
 
 def test_a_page_says_what_its_centiles_are_worth():
     text = page(shown("growth_figure"))
-    assert "its centile (z) at this age among the norm&#39;s other subjects." in text
+    assert "its centile (and z) for this age among the norm&#39;s other subjects." in text
     assert "the curve of the norm (the norm)" in text
-    assert "How far individuals spread around such a curve is unknown" in text
+    assert "the spread of individuals around the curve is unknown" in text
     assert "There are too few subjects" not in text
 
 
@@ -237,7 +239,7 @@ def test_a_brain_has_a_page_of_its_own():
     )
     alone = {"brains": BRAINS[:1], "pictures": None, "runs": None, "validation": None, "warnings": warnings}
     text = page(shown("quality"), **alone)
-    assert "<h1>Cortical folding, young</h1>" in text
+    assert "<h1>Measured cortical folding, young</h1>" in text
     assert 'href="../report.html"' in text
     assert "other&#39;s" not in text
     assert text.index(">own<") < text.index("<h2>quality") < text.index("<th>left</th>")
@@ -307,7 +309,7 @@ def test_the_methods_say_what_was_run():
         "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
     )
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
-    assert "Sulci that labels keep shut were opened, but in start brains, by slits" in text
+    assert "Except in start brains, sulci that are closed in the labels were opened by slits" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
     alone = methods_text(
@@ -315,9 +317,10 @@ def test_the_methods_say_what_was_run():
         surface={"edge_length_mm": 1, "open_sulci": False},
     )  # fmt: skip
     assert "simulated" not in alone
-    assert "led to (population cohort): a population's growth, not the subject's own. Stress" in text
-    assert text.count("its own later one") == 1
-    assert "itself [4]" in text
+    assert "Tallinen" not in alone
+    assert "(population cohort), a population's growth and not the subject's own. Stress" in text
+    assert text.count("its own later shape") == 1
+    assert "was modelled [4]" in text
     assert "<li><p>Run <em>stiff</em>" in caption_html(text)
     assert "system-message" not in caption_html(text)
 
@@ -329,5 +332,6 @@ def test_messages_tell_files_without_their_folders(monkeypatch):
     assert "Smith" not in text
 
 
-def test_a_page_without_simulations_has_no_verdict():
-    assert "<strong>" not in page([], runs=None, validation=None).partition("<h2>Methods")[0]
+def test_a_page_without_simulations_says_how_many_brains_were_measured():
+    said = "<strong>2 brains: 1 measured with warnings, 1 refused.</strong>"
+    assert said in page([], runs=None, validation=None)

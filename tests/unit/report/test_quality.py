@@ -33,7 +33,7 @@ def test_the_page_shows_planes_views_and_warnings():
     row = quality_row(LABELS, REPORT, {}, warnings, 80.0)
     figure = quality_page(Brain(sphere(20.0, 3), 0.0, tissues=(groups, scaling(1.0, -30))), row, warnings)
     shown = words(figure)
-    parts = {"a, 24 GW", "LOOK", "Look at:\n• it is crooked", "coronal, y = 0 mm", "left", "right medial", "front"}
+    parts = {"a, 24 GW", "LOOK", "Warnings:\n• it is crooked", "coronal, y = 0 mm", "left", "right medial", "front"}
     assert parts <= shown
     (head,) = [text for text in shown if text.startswith("source")]
     assert "area: 100.0 cm² (49.0 + 51.0)" in head
