@@ -91,6 +91,13 @@ def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflo
     assert "Traceback" not in outcome.stderr
 
 
+@pytest.mark.fault(27)
+def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
+    outcome = gyriflow(workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs")
+    assert outcome.returncode == 2
+    assert message(outcome).endswith("gyriflow: there is no stage or result metrcs; did you mean metrics?\n")
+
+
 @pytest.mark.slow
 def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     vary = {"thickness_mm": [1 + 0.2 * i for i in range(10)], "shear_modulus_cortex_pa": [300, 600, 900, 1500, 3000]}
@@ -103,4 +110,4 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     assert "simulate_member×50" in said
     assert float(re.search(r"\nwork +about [\d.e+]+ core hours, ([\d.]+)% of them", said)[1]) > 50
     # the memory of a cluster is not that of this machine
-    assert "are there" not in re.search(r"\nmemory .*", said)[0]
+    assert "available" not in re.search(r"\nmemory .*", said)[0]

@@ -51,7 +51,7 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(c
     assert code == 0, said
     assert "pial_from_labels a\r\x1b[2K" in said
     assert "gyriflow: done in" in said
-    (log,) = re.findall(r"all details: (.+?)\r?\n", said)
+    (log,) = re.findall(r"details in (.+?)\r?\n", said)
     assert "rule pial_from_labels:" in Path(log).read_text()
     state = read_json(workflow.directory / STATE)
     assert state["done"] == state["total"] > 2

@@ -60,11 +60,14 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
     if not any(bad for _, bad in problems) and (unnamed := sum(not names_unit(volume) for volume in volumes)):
-        yield f"  note: {unnamed} of {len(volumes)} label volumes name no unit of length: mm, by their sizes", False
+        yield (
+            f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm",
+            False,
+        )
     if missing := sum(len(atlas.missing) for atlas in config.atlases):
-        yield f"  {missing} files of atlases are not there yet and will be downloaded", False
+        yield f"  {missing} atlas file{'s are' if missing > 1 else ' is'} missing and will be downloaded", False
     if not any(bad for _, bad in problems):
-        yield "  input files: all can be read and fit their schemes", False
+        yield "  input files: all are readable and fit their label schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
 
 
@@ -77,7 +80,7 @@ def work_of(
     """
     jobs = plan(path, directory, further, show=show)
     if not jobs:
-        yield "nothing to run: all results that this asks for are up to date", False
+        yield "nothing to run: everything is up to date", False
         return
     yield f"to run: {len(jobs)} step{'s' if len(jobs) > 1 else ''}", False
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
@@ -146,7 +149,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
             enough_mm = math.floor(100 * through / needed) / 100
             yield (
                 f"run {one.run} from {one.start.id}: about {elements:.1f} elements through the cortex, "
-                f"{needed:g} are needed: mesh.surface_edge_mm: {enough_mm:g} would do"
+                f"{needed:g} are needed; mesh.surface_edge_mm: {enough_mm:g} would be fine enough"
             )
 
 
@@ -184,7 +187,7 @@ def _check_files(brain: Brain, config: Config) -> Iterator[str]:
 def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[str]:
     memory = surface_memory_mib(volume, brain.week)
     if memory > max(_memory_mib(), LEAST_SURFACE_MIB):
-        yield f"its voxels need about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: give it larger voxels"
+        yield f"needs about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: resample it to larger voxels"
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
     whole = brain.hemisphere is None
@@ -193,7 +196,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
     if whole and (doubts := list(doubts_of_scheme(layout_of(read.labels), scheme))):
         fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
         if fitting:
-            problem = f"has labels that lie as those of {' or '.join(fitting)}, not as those of {scheme.name}"
+            problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme.name}"
             raise InputError(problem, path=volume, found="; ".join(doubts))
         yield from doubts
     if whole:
@@ -213,7 +216,8 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     hours = (folding_s + other_s) / 3600
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
     yield f"time    about {as_duration(seconds)} on {on}, within a factor of {ERROR:g}", False
-    yield f"work    about {hours:.2g} core hours, {folding_s / 3600 / hours:.0%} of them folding", False
+    of_folding = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
+    yield f"work    about {hours:.2g} core hours{of_folding}", False
     at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
     memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
@@ -226,10 +230,10 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
     if there_mib is None:
-        yield f"{name:<7} about {_gib(mib)}, of the foldings that run side by side", False
+        yield f"{name:<7} about {_gib(mib)}, for the foldings that run at the same time", False
     else:
         bad = mib > there_mib
-        yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} are there{': too little' if bad else ''}", bad
+        yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} available{', which is too little' if bad else ''}", bad
 
 
 def _memory_mib() -> float:

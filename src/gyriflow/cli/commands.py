@@ -31,9 +31,9 @@ directory_option = click.option(
 cores_option = click.option(
     "-c", "--cores", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="all", help="Cores to use."
 )
-stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Up to this target only. May be repeated.")
+stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
-dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Say what would run and why, and run nothing.")
+dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Only say what would run, and why.")
 
 
 class Commands(click.Group):
@@ -53,6 +53,11 @@ class Commands(click.Group):
             return super().invoke(context)
         except GyriflowError as error:
             click.echo(f"gyriflow: {error}", err=True)
+            sys.exit(error.exit_code)
+        except click.UsageError as error:
+            command = error.ctx.command_path if error.ctx else command_name()
+            message = " ".join(error.format_message().split())
+            click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
 
 
@@ -92,31 +97,31 @@ def main() -> None:
 
     \b
     A study, from its data to its report:
-      gyriflow init my-data         write my-data/gyriflow.yaml from the files there
+      gyriflow init my-data         write my-data/gyriflow.yaml for the files there
       cd my-data
-      gyriflow check                is all there, what will run, how long will it take
-      gyriflow run                  run it; the same command goes on after an interruption
-      gyriflow status               how far it is (from another terminal)
+      gyriflow check                check the files; say what will run and how long it will take
+      gyriflow run                  run it; after an interruption, run it again to resume
+      gyriflow status               show the progress (from another terminal)
       gyriflow view                 open the report
 
-    Measures alone, of a folder or a configuration: gyriflow measure my-data
+    Metrics without simulations, of a folder or a configuration: gyriflow measure my-data
 
     A BIDS data set: gyriflow BIDS OUT participant, then gyriflow BIDS OUT group (gyriflow bids --help)
 
-    A brain of later weeks from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
+    Predict a brain at a later week from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
     """
 
 
 @main.command()
 @click.argument("folder", type=THERE)
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
-@click.option("--force", is_flag=True, help="Replace a configuration that is there.")
+@click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @scheme_option
 def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> None:
-    """Write a configuration from the files of a FOLDER.
+    """Write a configuration for the brains in a FOLDER.
 
-    It knows tissue label volumes (their scheme is found from the labels), hemisphere surfaces, and ages from
-    participants.tsv or from names such as week21 or GA21.
+    It recognises tissue label volumes (and their label scheme), hemisphere surfaces, and ages in participants.tsv or
+    in names such as week21 or GA21.
     """
     from .beginning import write_configuration
 
@@ -132,9 +137,9 @@ def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> 
 @cores_option
 @stages_option
 def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str]) -> None:
-    """Check a configuration and its files; say what will run and what it will take.
+    """Check a configuration and its files; say what will run and what it will need.
 
-    Nothing is run or written. CONFIG is gyriflow.yaml where none is named.
+    Nothing is run or written. CONFIG is gyriflow.yaml by default.
     """
     from .checking import check_study
 
@@ -152,14 +157,14 @@ def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str
 @cores_option
 @stages_option
 @dry_run_option
-@click.option("-v", "--verbose", is_flag=True, help="All that Snakemake says, on the terminal.")
+@click.option("-v", "--verbose", is_flag=True, help="Show all messages of Snakemake.")
 @click.argument("further", nargs=-1, type=click.UNPROCESSED, metavar="[CONFIG] [SNAKEMAKE-ARGUMENTS]")
 def run(
     directory: Path, cores: int, stages: Sequence[str], dry_run: bool, verbose: bool, further: Sequence[str]
 ) -> None:
-    """Run a study; what is there and up to date is kept. With --dry-run, say what it would take.
+    """Run a study. Results that are up to date are kept.
 
-    CONFIG is gyriflow.yaml where none is named. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
+    CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
     named = bool(further) and further[0].endswith((".yaml", ".yml", ".json"))
     config = _chosen(Path(further[0]) if named else None, directory)
@@ -190,43 +195,46 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
 @cores_option
 @dry_run_option
 def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
-    """Measure the brains of a folder or a configuration, up to the report, and fold none.
+    """Measure the brains of a folder or a configuration and write the report, without simulations.
 
-    A FOLDER without gyriflow.yaml gets one, as by `gyriflow init`. Neither `start` nor `folding` need be there; a brain
-    that fails does not hold up the others.
+    In a FOLDER without gyriflow.yaml, one is written, as by `gyriflow init`. It needs neither `start` nor `folding`. If
+    a brain fails, the others are finished.
     """
     from .beginning import write_configuration
     from .launch import MEASURES_ONLY
 
     config = data / CONFIG if data.is_dir() else data
-    if not config.exists():
-        for line in write_configuration(data, config, force=False, fold=False):
-            click.echo(line)
     os.environ[MEASURES_ONLY] = "1"
-    sys.exit(_run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all"))
+    with TemporaryDirectory() as scratch:
+        if not config.exists():
+            config = Path(scratch) / CONFIG if dry_run else config
+            for line in write_configuration(data, config, force=False, fold=False):
+                click.echo(line)
+        code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")
+    sys.exit(code)
 
 
 @main.command()
 @click.argument("labels", type=FILE)
-@click.option("--week", type=float, required=True, help="Gestational week of the brain.")
-@click.option("--until", type=float, required=True, help="Week to predict it for.")
-@click.option("--atlas", help="Whose growth: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
+@click.option("--week", type=float, required=True, help="Gestational week of the scan.")
+@click.option("--until", type=float, required=True, help="Gestational week to predict.")
+@click.option("--atlas", help="Atlas whose growth is used: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
 @scheme_option
-@click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: they are downloaded]")
-@click.option("--image", type=FILE, help="T2-weighted volume of the same brain.")
-@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the atlas' licence, where it asks for it.")
-@click.option("--quick", is_flag=True, help="A coarse mesh and steps of a day, for a first look.")
-@click.option("--force", is_flag=True, help="Replace a configuration that is there.")
+@click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: download them]")
+@click.option("--image", type=FILE, help="T2-weighted volume of the scan.")
+@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas, if it has to be.")
+@click.option("--quick", is_flag=True, help="Use a coarse mesh and steps of one day, for a first look.")
+@click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @directory_option
 @cores_option
 @dry_run_option
 def predict(
     labels: Path, week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
 ) -> None:
-    """Predict a brain of later weeks from its tissue LABELS, by the growth of an atlas.
+    """Predict a brain at a later week from its tissue LABELS and the growth of an atlas.
 
-    It writes gyriflow.yaml into the working directory and runs it up to the report and the predicted surfaces and
-    labels, whose places the report names. The same command goes on after an interruption.
+    This writes gyriflow.yaml into the working directory and runs it. The report says where the predicted surfaces and
+    labels are. After an interruption, the same command resumes.
     """
     from .beginning import write_prediction
 
@@ -242,25 +250,29 @@ def predict(
 @click.argument("data", type=THERE, metavar="BIDS")
 @click.argument("out", type=FOLDER)
 @click.argument("level", type=click.Choice(LEVELS))
-@click.option(*LABELS[:2], "participants", multiple=True, help="These participants only.")
-@click.option(*LABELS[2:], "sessions", multiple=True, help="These sessions only.")
-@click.option("--files", help="Pattern of the paths of files to take, where a scan has several.")
+@click.option(*LABELS[:2], "participants", multiple=True, help="Only these participants.")
+@click.option(*LABELS[2:], "sessions", multiple=True, help="Only these sessions.")
+@click.option("--files", help="Pattern of the paths to use if a scan has several files.")
 @scheme_option
 @click.option(
     "--settings",
     type=click.Path(exists=True, dir_okay=False, resolve_path=True),
-    help="Configuration without brains: how finely all is made; what is folded, and how.",
+    help="Configuration without brains, such as resolution, norms or what to fold.",
 )
-@click.option("--fold/--no-fold", default=None, help="Fold the first of several scans of a subject. [default: no]")
-@click.option("-w", "--work-dir", "work", type=FOLDER, help="Folder of results/. [default: OUT/work]")
+@click.option(
+    "--fold/--no-fold",
+    default=None,
+    help="Fold the first of several scans of each subject. [default: no]",
+)
+@click.option("-w", "--work-dir", "work", type=FOLDER, help="Working directory, for results/. [default: OUT/work]")
 @cores_option
 @dry_run_option
 def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_run: bool, **selection: Any) -> None:
     """Run a BIDS data set of tissue labels or surfaces, as a BIDS app: BIDS OUT LEVEL.
 
-    The level participant makes surfaces and maps of each participant in OUT, with --fold simulations too; group the
-    tables and the report of all, with the options that participant had. What is there and up to date is kept; a
-    participant that fails does not hold up the others.
+    The level participant writes surfaces and maps of each participant to OUT, and with --fold simulations, too. The
+    level group adds the tables and the report of all participants, with the same options. Results that are up to date
+    are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import hand_over
     from .beginning import remember, remembered, write_bids
@@ -273,9 +285,10 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     brains, reasons = write_bids(data, config, **selection)
     if level == "participant" and not dry_run:
         remember(options, selection)
-    told = "measured and folded" if selection["fold"] else "measured (--fold folds, too)"
+    work_to_do = "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
     click.echo("\n".join(reasons))
-    click.echo(f"{len(brains)} scans to be {told}: {', '.join(brains)}; {config}")
+    click.echo(f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}: {', '.join(brains)}")
+    click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
     if not dry_run and (exported / "dataset_description.json").is_file():
@@ -287,7 +300,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
 def status(directory: Path) -> None:
-    """How far a study is: done, running, time left, failed and why."""
+    """Show the progress of a study: what is done, running or failed, and the time left."""
     from . import status as module
 
     for line in module.status(directory):
@@ -296,7 +309,7 @@ def status(directory: Path) -> None:
 
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
-@click.option("--print", "only_print", is_flag=True, help="Print where the report is instead of opening it.")
+@click.option("--print", "only_print", is_flag=True, help="Print the path of the report instead of opening it.")
 def view(directory: Path, only_print: bool) -> None:
     """Open the report of a study."""
     from .status import report_of

@@ -6,6 +6,7 @@ failed step. Where steps are run, the terminal shows a bar, warnings and failure
 """
 
 import fcntl
+import logging
 import os
 import re
 import shutil
@@ -53,6 +54,8 @@ REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
 FULL_BYTES = 4 * 2**20
 """With less space left, a run that ended without a code of its own has met a full disk."""
+NO_RULE = re.compile(r"No rule to produce (\S+)")
+"""What Snakemake says of a target that is neither a rule nor a file of one."""
 HELD: list[IO[str]] = []
 """Files whose locks this process holds."""
 
@@ -115,6 +118,13 @@ def refuse_unknown_options(unknown: Sequence[str], usage: str) -> None:
         raise InputError(f"unknown option {name}; {nearest(name, known)}")
 
 
+def unknown_target(name: str) -> InputError:
+    """Return the error of a target that no rule makes."""
+    rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
+    known = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+    return InputError(f"there is no stage or result {name}; {nearest(name, known)}")
+
+
 def send_prints_to(log: Path) -> None:
     """Send what this process' libraries and children print to a file; Python's own streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
@@ -165,7 +175,7 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
 def exit_code(code: int, recorded: int | None, directory: Path) -> int:
     """Return the code of a run from Snakemake's and that of the first failed step; say so where the disk is full."""
     if code and recorded in (None, 1) and shutil.disk_usage(directory).free < FULL_BYTES:
-        full = f"{directory.resolve()}: the disk is full. Free space; the same command goes on"
+        full = f"{directory.resolve()}: the disk is full. Free space, then run the same command again"
         print(f"gyriflow: {full}", file=sys.stderr)
         return StorageError.exit_code
     return (recorded or code) if code else 0
@@ -193,7 +203,13 @@ def main(arguments: Sequence[str]) -> int:
     exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
     os.environ[EXIT_FILE] = str(exit_file)
     interrupts: list[int] = []
+    unknown_targets: list[str] = []
     began = time.time()
+
+    def names_no_target(record: logging.LogRecord) -> bool:
+        names = NO_RULE.findall(record.getMessage())
+        unknown_targets.extend(names)
+        return not names
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         interrupts.append(number)
@@ -206,6 +222,7 @@ def main(arguments: Sequence[str]) -> int:
         details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
         send_prints_to(details)
+    logging.getLogger("snakemake.logging").addFilter(names_no_target)
     try:
         cli.main(complete)
     except SystemExit as end:
@@ -214,6 +231,8 @@ def main(arguments: Sequence[str]) -> int:
         code = INTERRUPTED
     recorded = recorded_exit_code(exit_file)
     exit_file.unlink(missing_ok=True)
+    if unknown_targets:
+        raise unknown_target(unknown_targets[0])
     if code and interrupts:
         print("gyriflow: interrupted; the same command resumes from here", file=sys.stderr)
         return INTERRUPTED

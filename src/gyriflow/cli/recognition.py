@@ -102,7 +102,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     entry, fits = {"id": _id(file), "labels": str(file), "scheme": UNSET}, scheme_fits(read_label_volume(file).labels)
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:
-        problem = f"has labels that lie as those of {' or '.join(fitting)}, not as those of {scheme}"
+        problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
         raise InputError(problem, path=file, found=fits.get(scheme) or "labels that it does not know")
     brain = Recognised(entry, fits=fits)
     choose_schemes([brain], scheme)
@@ -139,13 +139,13 @@ def choose_schemes(brains: Sequence[Recognised], given: str | None = None) -> No
 
 
 def scheme_reasons(brains: Sequence[Recognised]) -> Iterator[str]:
-    """Yield for each scheme that was chosen how many volumes have it, and what speaks against others, or against it."""
+    """Yield for each chosen scheme how many volumes have it, then what speaks against it and against each other one."""
     for name, number in Counter(brain.entry.get("scheme", UNSET) for brain in brains).items():
         if name != UNSET:
             fits = [brain.fits or {} for brain in brains if brain.entry.get("scheme") == name]
             causes = {other: cause for known in fits for other, cause in known.items() if cause}
-            against = "".join(f"; {'but ' if other == name else f'not {other}: '}{causes[other]}" for other in causes)
-            yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}{against}"
+            yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
+            yield from (f"  {'but' if other == name else f'not {other}:'} {causes[other]}" for other in causes)
 
 
 def _is_own(description: Path) -> bool:

@@ -108,9 +108,9 @@ def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
         yield f"running since {state['began']}: {steps}{left}"
         yield from (f"  now: {job}" for job in state["running"])
     elif state["interrupted"]:
-        yield f"interrupted at {state['ended']}, {steps}; the same command goes on"
+        yield f"interrupted at {state['ended']}, {steps}; run the same command again to resume"
     elif state["ended"] is None:
-        yield f"interrupted: the run of {state['began']} ended without notice, {steps}; the same command goes on"
+        yield f"interrupted: the run of {state['began']} ended abruptly, {steps}; run the same command again to resume"
     else:
         yield f"last run: {state['began']} to {state['ended']}, {steps}"
     for failure in state["failed"]:

@@ -87,7 +87,7 @@ class RunDisplay:
                 jobs = {rule: count for rule, count in (said["stats"] or {}).items() if rule != "total"}
                 self.total = sum(jobs.values())
                 self.bar.update(self.task.id, total=sum(count * WEIGHTS.get(rule, 1) for rule, count in jobs.items()))
-                self.console.print(f"gyriflow: {self.total} steps to do; all details: {self.details}")
+                self.console.print(f"gyriflow: {self.total} steps to do; details in {self.details}")
                 self.bar.start()
             case "job_info":
                 wildcards = " ".join((said["wildcards"] or {}).values())
@@ -163,12 +163,12 @@ class RunDisplay:
         self.tick()
         self.bar.stop()
         took = as_duration((self.ended - self.began).total_seconds())
-        done = f"{self.done} of {self.total} steps are done"
+        done = f"{self.done} of {self.total} steps done"
         if self.interrupted:
             self.console.print(f"gyriflow: stopped after {took}, {done}")
         elif self.failed:
-            failed = f"{len(self.failed)} failed after {took}"
-            self.console.print(f"gyriflow: {failed}, {done}; the same command goes on from here")
+            failed = f"finished after {took} with {len(self.failed)} failed"
+            self.console.print(f"gyriflow: {failed}, {done}; run the same command again to resume")
         elif self.of_failed_jobs:
             self.console.print("\n".join(self.of_failed_jobs))
         elif self.total and self.done == self.total:
@@ -181,7 +181,8 @@ class RunDisplay:
                 case {"event": "warning", "message": str(text)}:
                     self._warn(job, text)
                 case {"event": "size", "elements": elements, "ranks": ranks, "memory_mib": mib}:
-                    self.console.print(f"       {job.what}: {elements} elements, {ranks} ranks, about {mib} MiB")
+                    on = f"{ranks} rank{'s' if ranks > 1 else ''}"
+                    self.console.print(f"       {job.what}: {elements} elements, {on}, about {mib} MiB")
                 case {"event": "step"}:
                     job.step = event
 

@@ -68,7 +68,7 @@ def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubted):
 def test_labels_that_lie_as_those_of_another_scheme_are_refused():
     labels = "fetal_SB_atlas_GA28_operated/parcellation.nii.gz"
     said = problems(SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="dhcp-19")
-    assert "has labels that lie as those of spina-bifida-atlas, not as those of dhcp-19; found " in said[0]
+    assert "has labels arranged like those of spina-bifida-atlas, not like those of dhcp-19; found " in said[0]
     assert problems(SHIPPED / "atlases" / "spina-bifida", week=28, labels=labels, scheme="spina-bifida-atlas") == []
 
 
@@ -82,7 +82,7 @@ def test_a_header_without_a_unit_is_told_once_and_is_no_warning(tmp_path, monkey
     text = yaml.safe_dump({"brains": brains, "start": "a", "folding": {"end_week": 39}})
     (tmp_path / "gyriflow.yaml").write_text(text)
     said = [line for line, _ in check_study(tmp_path / "gyriflow.yaml", tmp_path, 1) if "no unit" in line]
-    assert said == ["  note: 2 of 3 label volumes name no unit of length: mm, by their sizes"]
+    assert said == ["  note: 2 of 3 label volumes give no unit of length, taken as mm"]
     assert [record for record in caplog.records if record.levelname == "WARNING"] == []
 
 
@@ -98,7 +98,9 @@ def coarse(mesh, **folding):
 def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
     fine = {"surface_edge_mm": 0.7}
     (said,) = coarse(fine | {"order": 1}, thickness_mm=1.0)
-    assert "about 1.4 elements through the cortex, 2 are needed: mesh.surface_edge_mm: 0.47 would do" in said
+    assert (
+        "about 1.4 elements through the cortex, 2 are needed; mesh.surface_edge_mm: 0.47 would be fine enough" in said
+    )
     assert coarse(fine, thickness_mm=1.5) == coarse({"surface_edge_mm": 0.47, "order": 1}, thickness_mm=1.0) == []
     assert "mesh.surface_edge_mm: 0.48" in coarse(fine, thickness_mm={"weeks": {22: 0.5, 24: 1.5}})[0]
 
@@ -110,7 +112,7 @@ def test_a_look_leaves_nothing_behind(tmp_path):
     )
     assert plan(config, tmp_path / "new" / "study", ["surface"])
     ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
-    assert said == "nothing to run: all results that this asks for are up to date"
+    assert said == "nothing to run: everything is up to date"
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 

@@ -55,6 +55,13 @@ def test_a_missing_configuration_is_told_in_one_line_where_it_is_named(monkeypat
     assert (done.exit_code, "there is no configuration" in done.output) == (2, True)
 
 
+def test_a_mistake_in_an_argument_is_one_line():
+    done = CliRunner().invoke(main, ["run", "--cores", "two"], prog_name="gyriflow")
+    assert (done.exit_code, done.output.count("\n")) == (2, 1)
+    assert done.output.startswith("gyriflow: Invalid value for '-c' / '--cores'")
+    assert done.output.endswith("See `gyriflow run --help`.\n")
+
+
 def test_an_unknown_option_is_refused_with_the_nearest_one(tmp_path):
     with pytest.raises(InputError, match=r"^unknown option --corse; did you mean --cores\?$"):
         launch.main(["--directory", str(tmp_path), "--corse", "2"])
@@ -144,7 +151,7 @@ def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path
         ("30", ["--atlas", "crl"], "For non-commercial education and research only"),
         ("30", ["--atlas", "crk"], "did you mean crl?"),
         ("25", ["--scheme", "feta"], "--scheme: found 'feta'; did you mean feta-7?"),
-        ("25", ["--scheme", "feta-7"], "lie as those of spina-bifida-atlas, not as those of feta-7"),
+        ("25", ["--scheme", "feta-7"], "arranged like those of spina-bifida-atlas, not like those of feta-7"),
         ("25", ["--folder", "nowhere"], "Directory 'nowhere' does not exist"),
     ],
 )

@@ -67,7 +67,7 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
         run.end(number, number + 1, 100)
     run.tell(text="a warning of Snakemake's", level=logging.WARNING)
     run.display.end()
-    assert run.lines[0].startswith("gyriflow: 100 steps to do; all details: ")
+    assert run.lines[0].startswith("gyriflow: 100 steps to do; details in ")
     assert run.lines[1] == "  0 %  measure b0"
     assert run.lines[11] == " 50 %  2 min left  measure b50"
     assert run.lines[-2] == "a warning of Snakemake's"
@@ -88,7 +88,7 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
     run.display.tick()
     run.end()
     assert run.lines[1:] == [
-        "       simulate r a: 12 elements, 1 ranks, about 70 MiB",
+        "       simulate r a: 12 elements, 1 rank, about 70 MiB",
         "warning simulate r a: coarse",
         # a quarter of its time has passed
         " 25 %  simulate r a: GW 21.50 of 23",
@@ -108,7 +108,7 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         "warning pial_from_labels a: thin cortex",
         "failed  pial_from_labels a: a.nii: is no image",
         f"        log: {log}",
-        "gyriflow: 1 failed after 5 s, 0 of 2 steps are done; the same command goes on from here",
+        "gyriflow: finished after 5 s with 1 failed, 0 of 2 steps done; run the same command again to resume",
     ]
     assert run.state["failed"] == [{"what": "pial_from_labels a", "why": "a.nii: is no image", "logs": [str(log)]}]
 
@@ -140,7 +140,7 @@ def test_what_was_stopped_is_no_failure(run):
     run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
     run.fail("simulate")
     run.display.end()
-    assert run.lines[-1] == "gyriflow: stopped after 5 s, 0 of 2 steps are done"
+    assert run.lines[-1] == "gyriflow: stopped after 5 s, 0 of 2 steps done"
     assert run.state["interrupted"]
     assert run.state["failed"] == []
 
@@ -186,7 +186,7 @@ def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
 
 
 def test_a_run_that_was_killed_is_called_interrupted(study):
-    assert "interrupted: the run of 2026-01-01 10:00:00 ended without notice, 3 of 10 steps done" in text(study)
+    assert "interrupted: the run of 2026-01-01 10:00:00 ended abruptly, 3 of 10 steps done" in text(study)
     assert "now:" not in text(study)
     write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
     assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
