@@ -168,7 +168,12 @@ def from_labels(
     warnings += logged(pose.warnings)
     affine = pose.world @ cerebrum.affine
     if side:
-        even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm)
+        shut, taken_ml = (field, affine), 0.0
+        if open_sulci:
+            field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme)
+            warnings += logged(_left_shut(report))
+        taken = taken_ml / ML_PER_MM3
+        even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, shut=shut)
         require_one(even.mesh)
         pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
         report = {"source": "hemisphere", "side": side, **report, **even.report}
@@ -196,18 +201,9 @@ def from_labels(
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
-        sulci: dict[str, Any] = {"left_shut": "the labels have no white matter"}
-        if scheme.cortex and np.isin(tissue, scheme.white_matter).any():
-            # handles are cheaper to find before voxels are made finer
-            simple, repaired = make_simple(field, cerebrum.smallest_part)
-            gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
-            opened_ml -= gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-            field, affine, sulci = open_shut_sulci(simple, affine, core, fissure)
-            sulci["repaired_before"] = repaired
-        if why := sulci.get("left_shut"):
-            warnings += logged([f"sulci that the labels keep shut were not opened: {why}"])
-        opened_ml += sulci.get("opened_mL", 0.0)
-        report["sulci"] = sulci
+        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, fissure)
+        warnings += logged(_left_shut(report))
+        opened_ml += taken_ml
     even = surface_of_mask(
         field,
         affine,
@@ -223,6 +219,28 @@ def from_labels(
     heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
     report = {"source": "labels", **report, **even.report}
     return _upright(mesh, left_faces(mesh, heights), fissure.plane, pose, week, report, warnings)
+
+
+def _with_sulci(
+    field: NDArray[np.float32], affine: Floats, cerebrum: Cerebrum, scheme: LabelScheme, fissure: Fissure | None = None
+) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any]]:
+    """Return the field with shut sulci opened, its affine, the volume (mL) that this took, and a report."""
+    if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
+        return field, affine, 0.0, {"left_shut": "the labels have no white matter"}
+    # handles are cheaper to find before voxels are made finer
+    simple, repaired = make_simple(field, cerebrum.smallest_part)
+    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    opened, fine, report = open_shut_sulci(simple, affine, core, fissure)
+    if not report.get("sheets"):
+        return field, affine, 0.0, report
+    gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
+    gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
+    return opened, fine, report["opened_mL"] - gained_ml, {**report, "repaired_before": repaired}
+
+
+def _left_shut(report: Mapping[str, Any]) -> list[str]:
+    why = report["sulci"].get("left_shut")
+    return [f"sulci that the labels keep shut were not opened: {why}"] if why else []
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
