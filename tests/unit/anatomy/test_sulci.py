@@ -3,13 +3,15 @@
 from unittest.mock import patch
 
 import numpy as np
+import odd_brains
 import pytest
 from scipy import ndimage
-from shapes import moved, rigid, scaling, sphere
+from shapes import moved, phantom, rigid, scaling, sphere
 
 from gyriflow.anatomy import repair
 from gyriflow.anatomy.extraction import handles, smooth_mask
 from gyriflow.anatomy.fissure import Fissure, MidPlane
+from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import faults, pieces, surface_of_mask
 from gyriflow.anatomy.sulci import open_shut_sulci
 from gyriflow.anatomy.terraces import without_terraces
@@ -23,7 +25,9 @@ from gyriflow.geometry.triangles import (
     transformed,
     vertex_areas,
 )
+from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.curvature import curvature
+from gyriflow.units import CM2_PER_MM2
 
 VOXEL_MM, RADIUS_MM, THICKNESS_MM = 0.8, 12.0, 2.0
 
@@ -84,7 +88,43 @@ def test_cortex_without_a_second_bank_stays_whole(kind):
     else:
         # 1.2 mm thick below, 4.4 mm above
         core = np.linalg.norm(places + [0.0, 0.0, 1.6], axis=-1) < RADIUS_MM - 2.8
-    assert open_shut_sulci(smooth_mask(body), affine, core)[2]["slit_voxels"] == 0
+    field = smooth_mask(body)
+    same, grid, report = open_shut_sulci(field, affine, core)
+    assert report["slit_voxels"] == 0
+    # as it is without opening: no finer voxels either
+    assert same is field
+    assert grid is affine
+
+
+def test_holes_in_the_white_matter_open_nothing_more():
+    body, core, affine = with_sulcus(6.0)
+    deep = ndimage.binary_erosion(core, iterations=2)
+    holes = deep & (np.random.default_rng(0).random(core.shape) < 0.02)
+    assert holes.sum() > 20
+    fields = [open_shut_sulci(smooth_mask(body), affine, one)[0] for one in (core, core & ~holes)]
+    np.testing.assert_array_equal(*fields)
+
+
+def test_a_hemisphere_alone_has_its_sulcus_opened():
+    labels, affine = phantom()
+    scheme = SCHEMES["dhcp-19"]
+    labels = odd_brains.one_hemisphere(odd_brains.add_sides(labels, affine), affine, "left")
+    cerebrum = np.isin(labels, scheme.cerebrum)
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    depth = ndimage.distance_transform_edt(cerebrum, sampling=size)
+    coordinates = np.argwhere(cerebrum) @ affine[:3, :3].T + affine[:3, 3]
+    y = np.zeros(labels.shape)
+    y[cerebrum] = np.abs(coordinates[:, 1] - coordinates[:, 1].mean() - 8.0)
+    sheet = cerebrum & (y < 2.0) & (depth < 7.0) & np.isin(labels, scheme.white_matter)
+    labels = np.where(sheet, scheme.cortex[0], labels)
+    areas = {}
+    for opened in (False, True):
+        surface = from_labels(labels, affine, scheme, "left", week=24.0, open_sulci=opened)
+        areas[opened] = surface.report["area_cm2"]["left"]
+        assert surface.report["euler_number"] == 2
+    # both walls of the slit, which is shorter than the sheet by its rounded ends
+    walls = 2.0 * CM2_PER_MM2 * sheet.sum() * size.prod() / 4.0
+    assert areas[True] - areas[False] == pytest.approx(walls, rel=0.25)
 
 
 def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
