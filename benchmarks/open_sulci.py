@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.extraction import remove_bridges, smooth_mask
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.sulci import open_shut_sulci
@@ -33,8 +33,15 @@ CELLS = 3
 EDGE_MM = 1.0
 
 
-def truth() -> dict[str, float]:
-    """Return the area of the ball and of its sulci's walls, mean depth below the hull, and gyrification."""
+def off_sulci(points: np.ndarray) -> np.ndarray:
+    """Return the distance of points (…, 3) in mm from the middle of the nearest sulcus."""
+    wave = points[..., 1] / LENGTH_MM
+    across = (points[..., 0] - WAVE_MM * np.sin(wave)) / np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(wave)) ** 2)
+    return np.min([np.abs(across - place) for place in PLACES_MM], axis=0)
+
+
+def truth(width_mm: float) -> dict[str, float]:
+    """Return the area of the ball with sulci of a width, mean depth below the hull, and gyrification."""
     step = 0.02
     y, z = np.meshgrid(*[np.arange(-RADIUS_MM, RADIUS_MM, step)] * 2, indexing="ij")
     stretch = np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(y / LENGTH_MM)) ** 2)
@@ -44,8 +51,17 @@ def truth() -> dict[str, float]:
         below = RADIUS_MM - np.sqrt((place + WAVE_MM * np.sin(y / LENGTH_MM)) ** 2 + y**2 + z**2)
         wall = 2.0 * stretch * step**2 * ((below > 0) & (below < DEPTH_MM))
         walls, depth = walls + wall.sum(), depth + (wall * below).sum()
-    whole = hull + walls
-    return {"area_mm2": whole, "depth_mm": depth / whole, "gi": whole / hull, "thickness_mm": THICKNESS_MM}
+    # what the sulci take from the ball, and their bottoms
+    height, turn = np.meshgrid(np.arange(-1, 1, 0.001) + 0.0005, np.arange(0, 2 * np.pi, 0.002), indexing="ij")
+    aside = np.sqrt(1.0 - height**2)
+    directions = np.stack([aside * np.cos(turn), aside * np.sin(turn), height], axis=-1)
+    mouth, bottom = (
+        4.0 * np.pi * radius**2 * float((off_sulci(radius * directions) < 0.5 * width_mm).mean())
+        for radius in (RADIUS_MM, RADIUS_MM - DEPTH_MM)
+    )
+    whole = hull - mouth + walls + bottom
+    depth = (depth + bottom * DEPTH_MM) / whole
+    return {"area_mm2": whole, "depth_mm": depth, "gi": whole / hull, "thickness_mm": THICKNESS_MM}
 
 
 def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]):
@@ -56,9 +72,7 @@ def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, floa
     turn = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
     points = np.stack(np.meshgrid(cells, cells, cells, indexing="ij"), axis=-1) @ turn
     below = RADIUS_MM - np.linalg.norm(points, axis=-1)
-    wave = points[..., 1] / LENGTH_MM
-    across = (points[..., 0] - WAVE_MM * np.sin(wave)) / np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(wave)) ** 2)
-    off = np.min([np.abs(across - place) for place in PLACES_MM], axis=0)
+    off = off_sulci(points)
     # the distance to the middle of the sulci less half their width, and to the outside of the ball
     middle = (off < 0.6 * voxel_mm / CELLS) & (below < DEPTH_MM)
     to_walls = ndimage.distance_transform_edt(~middle, sampling=voxel_mm / CELLS) - 0.5 * width_mm
@@ -83,7 +97,9 @@ def measured(mesh, body, core, affine) -> dict[str, float]:
 def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]) -> dict:
     """Return what today's surface of a phantom has, and that with its sulci opened."""
     body, core, affine = phantom(width_mm, voxel_mm, turn_deg)
-    field, volume = smooth_mask(body), float(body.sum() * voxel_mm**3)
+    # as in a brain, where slits one voxel wide are opened again
+    field, _ = remove_bridges(body, smooth_mask(body), np.zeros_like(body))
+    volume = float(body.sum() * voxel_mm**3)
     shut = surface_of_mask(field, affine, volume, EDGE_MM).mesh
     field, fine, report = open_shut_sulci(field, affine, core)
     opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
@@ -106,7 +122,7 @@ def try_brain(path: Path, week: float) -> dict:
 
 
 if __name__ == "__main__":
-    true, phantoms, brains = truth(), [], {}
+    true, phantoms, brains = {width: truth(width) for width in WIDTHS_MM}, [], {}
     if not sys.argv[1:]:
         print(f"truth: {true}")
         for voxel in VOXELS_MM:
@@ -114,7 +130,10 @@ if __name__ == "__main__":
                 for turn in TURNS_DEG:
                     row = try_phantom(width, voxel, turn)
                     phantoms.append(row)
-                    off = {n: {k: f"{row[n][k] / true[k] - 1:+.1%}" for k in true} for n in ("shut", "opened")}
+                    off = {
+                        n: {k: f"{row[n][k] / known - 1:+.1%}" for k, known in true[width].items()}
+                        for n in ("shut", "opened")
+                    }
                     print(f"{voxel} mm voxels, {width} mm wide, turned {turn}: {off}", flush=True)
     for folder in sys.argv[1:]:
         week = re.findall(r"\d+", Path(folder).name)[0]
