@@ -25,8 +25,7 @@ def pial_settings(wildcards):
         return {}
     if not brain.given.has_labels:
         return surface_settings("edge_length_mm", "max_hole_mm")
-    # elements are wider than slits, and contact keeps walls apart by the smallest gap of the start's mesh
-    return surface_settings("edge_length_mm", *([] if brain in study.starts else ["open_sulci"]))
+    return surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci}
 
 
 # a simple shape in the place of a brain

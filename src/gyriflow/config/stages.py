@@ -19,9 +19,9 @@ class SurfaceSettings(Settings):
     asymmetric: bool = False
     """Whether hemisphere surfaces may differ in size and shape, as with unilateral pathology; else those that do
     are refused as of two brains."""
-    open_sulci: bool = False
-    """Whether sulci that labels keep shut are opened by slits, where labels have cortex and white matter. Start brains
-    keep theirs shut: elements are wider than slits."""
+    open_sulci: bool = True
+    """Whether sulci that labels keep shut are opened by slits, where labels have cortex and white matter. Studies with
+    `runs` keep them shut in all brains: elements are wider than slits."""
 
 
 class MeshSettings(Settings):

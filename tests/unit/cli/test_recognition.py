@@ -270,3 +270,5 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
     # of a configuration with runs, nothing is folded either
     folded = load(written | {"start": "first", "folding": {"end_week": 24}}, tmp_path)
     assert (len(resolve(folded).folded), resolve(folded.measured_only).folded) == (1, [])
+    # surfaces stay as they are for the runs, which have sulci shut
+    assert [one.opens_sulci for one in (study.config, folded, folded.measured_only)] == [True, False, False]

@@ -309,15 +309,16 @@ def test_the_methods_say_what_was_run():
         "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
     )
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
-    assert "Except in start brains, sulci that are closed in the labels were opened by slits" in text
+    assert "Sulci that are closed in the labels were left closed, as mesh elements are wider than slits" in text
     assert "1500 and the values given for each week or place Pa" in text
     assert "tangentially at 2·10⁻⁷ per second" in text
     alone = methods_text(
         template, brains=brains[:1], runs=[], software=software, metrics=metrics,
-        surface={"edge_length_mm": 1, "open_sulci": False},
+        surface={"edge_length_mm": 1, "open_sulci": True},
     )  # fmt: skip
     assert "simulated" not in alone
     assert "Tallinen" not in alone
+    assert "Sulci that are closed in the labels were opened by slits" in alone
     assert "(population cohort), a population's growth and not the subject's own. Stress" in text
     assert text.count("its own later shape") == 1
     assert "was modelled [4]" in text
