@@ -16,6 +16,7 @@ from ..geometry.deformations import transform_points
 from ..units import ML_PER_MM3
 from .extraction import INSIDE, LEVEL, OUTSIDE, Floats, Mask, is_simple, main_parts, refine, shifted_affine
 from .fissure import Fissure, sample
+from .thickness import LEAST_VOXELS
 
 # voxels are made as fine as this before a slit is cut between them; usual ones of 0.5 mm, exact or not, are as they are
 FINE_MM = 0.55
@@ -45,8 +46,8 @@ def open_shut_sulci(
     mask `core`, the tissue inside the cortex, or a whole part of these. Slits begin outside and grow inwards over
     simple points, so that they add neither handles nor cavities, and stop where one bank's white matter begins to be
     the other's. The `fissure` parts the hemispheres: what lies between these is no sulcus. The field is returned as it
-    was where no sulcus is shut, and where much cortex lies far from all white matter; the report then says so as
-    "left_shut".
+    was where no sulcus is shut, where much cortex lies far from all white matter, and where cortex is thinner than 1.5
+    voxels; for the latter two the report says why as "left_shut".
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / FINE_MM))
     every = field.shape[0] // core.shape[0]
@@ -64,6 +65,9 @@ def open_shut_sulci(
     low, thickness = map(float, np.quantile(away[beside[cortex]], [0.25, 0.5]))
     if (far := float((away > FAR * low).mean())) > MOST_FAR:
         why = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
+        return field, affine, {"left_shut": why}
+    if (voxels := thickness / (factor * every * size.max())) < LEAST_VOXELS:
+        why = f"the cortex is {voxels:.1f} voxels thick, so that roughness of the labels looks like two banks"
         return field, affine, {"left_shut": why}
     bank = cortex.copy()
     bank[cortex] = away > LEAST_BANK * thickness

@@ -40,12 +40,12 @@ def ball():
     return depth > 0, places, depth, scaling(VOXEL_MM, axis[0])
 
 
-def with_sulcus(depth_mm):
+def with_sulcus(depth_mm, thickness_mm=THICKNESS_MM):
     """Return a ball with a shut sulcus all round it, in a plane that is oblique to the voxels."""
     body, places, depth, affine = ball()
     across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
     to_end = np.hypot(across, np.maximum(depth - depth_mm, 0.0))
-    return body, body & (depth > THICKNESS_MM) & (to_end > THICKNESS_MM), affine
+    return body, body & (depth > thickness_mm) & (to_end > thickness_mm), affine
 
 
 @pytest.mark.parametrize("depth_mm", [4.0, 6.0])
@@ -106,7 +106,7 @@ def test_holes_in_the_white_matter_open_nothing_more():
 
 
 def test_a_hemisphere_alone_has_its_sulcus_opened():
-    labels, affine = phantom()
+    labels, affine = phantom(voxel_mm=0.8)
     scheme = SCHEMES["dhcp-19"]
     labels = odd_brains.one_hemisphere(odd_brains.add_sides(labels, affine), affine, "left")
     cerebrum = np.isin(labels, scheme.cerebrum)
@@ -135,6 +135,14 @@ def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
     assert "of the cortex is further" in report["left_shut"]
     np.testing.assert_array_equal(same, field)
     np.testing.assert_array_equal(grid, affine)
+
+
+def test_cortex_of_a_voxel_is_told_and_stays_as_it_is():
+    body, core, affine = with_sulcus(6.0, thickness_mm=VOXEL_MM)
+    field = smooth_mask(body)
+    same, _, report = open_shut_sulci(field, affine, core)
+    assert "the cortex is 1." in report["left_shut"]
+    assert same is field
 
 
 def voxels(half):
