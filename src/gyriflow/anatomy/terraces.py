@@ -13,12 +13,11 @@ from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face
 
 # how far a vertex may move at most, in voxels
 FARTHEST_VOXELS = 0.7
-# of a round: weight of roughness against distance, √t in voxels², which halves waves of 11 voxels; and the rounds
-ROUGHNESS_VOXELS2 = 3.2
+# of a round: weight of roughness against distance, √t in mm², which halves waves of 9 mm; and the rounds. In voxels² it
+# would leave the terraces of fine voxels, which are as long, and take folds of 8 mm with coarse ones
+ROUGHNESS_MM2 = 2.048
 ROUNDS = 16
-# with coarse voxels it would take folds of 8 mm
-MOST_ROUGHNESS_MM2 = 2.05
-# what is given back of the height of folds: what the Gaussian takes, in voxels², and the rounds by their roughness
+# what is given back of the height of folds: what the Gaussian takes, in voxels², and what the rounds take, by roughness
 GAUSSIAN_VOXELS2, OF_ROUGHNESS = 0.35, 0.14
 # pivots on the diagonal keep the factors sparse: 60 times faster
 SYMMETRIC = {"SymmetricMode": True}
@@ -43,9 +42,8 @@ def without_terraces(mesh: TriangleMesh, voxels: Floats, kept: NDArray[np.bool_]
         return mesh
     # partial fractions: 1/(1 + x⁴) is the real part of −½ ∑ p/(x − p) over the two poles p above the real axis
     poles = np.exp(1j * np.pi * np.array([0.25, 0.75]))
-    roughness = min(ROUGHNESS_VOXELS2 * size**2, MOST_ROUGHNESS_MM2)
-    given_back = GAUSSIAN_VOXELS2 * size**2 + OF_ROUGHNESS * roughness
-    weighted = roughness * stiffness
+    given_back = GAUSSIAN_VOXELS2 * size**2 + OF_ROUGHNESS * ROUGHNESS_MM2
+    weighted = ROUGHNESS_MM2 * stiffness
     matrices = [sparse.csc_matrix(weighted - pole * sparse.diags(mass)) for pole in poles]
     solvers = [splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options=SYMMETRIC) for matrix in matrices]
 

@@ -145,19 +145,20 @@ def test_cortex_of_a_voxel_is_told_and_stays_as_it_is():
     assert same is field
 
 
-def voxels(half):
+def voxels(half, size=VOXEL_MM):
     """Return the centres (i, j, k, 3) of voxels around the origin and their affine; none lies at the origin."""
-    count = int(np.ceil(half / VOXEL_MM)) + 6
-    affine = scaling(VOXEL_MM, VOXEL_MM * (np.array([0.1, 0.3, 0.2]) - count))
-    return np.moveaxis(np.indices((2 * count + 1,) * 3), 0, -1) * VOXEL_MM + affine[:3, 3], affine
+    count = int(np.ceil(half / size)) + 6
+    affine = scaling(size, size * (np.array([0.1, 0.3, 0.2]) - count))
+    return np.moveaxis(np.indices((2 * count + 1,) * 3), 0, -1) * size + affine[:3, 3], affine
 
 
 def surface(mask, affine):
-    return surface_of_mask(smooth_mask(mask), affine, mask.sum() * VOXEL_MM**3, 1.0)
+    return surface_of_mask(smooth_mask(mask), affine, mask.sum() * np.linalg.det(affine), 1.0)
 
 
-def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels():
-    centres, affine = voxels(18.0)
+@pytest.mark.parametrize("size", [VOXEL_MM, 0.5])
+def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxels(size):
+    centres, affine = voxels(18.0, size)
     mask = np.linalg.norm(centres, axis=-1) < 18.0
     with patch.object(repair, "without_terraces", lambda mesh, *_: mesh):
         before = surface(mask, affine).mesh
@@ -167,9 +168,9 @@ def test_a_digitised_ball_has_the_curvature_of_a_ball_and_the_volume_of_its_voxe
         for mesh in (before, found.mesh)
     ]
     assert errors[1] < 0.5 * errors[0]
-    assert signed_volume(found.mesh) == pytest.approx(mask.sum() * VOXEL_MM**3, rel=0.002)
+    assert signed_volume(found.mesh) == pytest.approx(mask.sum() * size**3, rel=0.002)
     told = found.report["smoothing"]
-    assert 0.0 < told["terraces_moved_mm"] < told["terraces_moved_most_mm"] < VOXEL_MM
+    assert 0.0 < told["terraces_moved_mm"] < told["terraces_moved_most_mm"] < size
 
 
 def test_folds_keep_their_height():
