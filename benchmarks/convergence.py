@@ -89,14 +89,8 @@ PARAMETERS = {
     "fields": ["displacement"],
 }
 COMPARED = (
-    "area",
-    "volume",
-    "gyrification_index",
-    "mean_sulcal_depth",
-    "sulcal_depth_95",
-    "mean_curvedness",
-    "folding_index",
-    *(f"spangy_B{band}_relative_power" for band in range(1, 6)),
+    *("area", "volume", "gyrification_index", "mean_sulcal_depth", "sulcal_depth_95", "mean_curvedness"),
+    *("folding_index", *(f"spangy_B{band}_relative_power" for band in range(1, 6))),
 )
 TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
 """Of Newton's method and in time, of a study's run."""

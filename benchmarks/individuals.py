@@ -48,15 +48,9 @@ KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
 ALL, HERE = "0 mm", f"{OWN_MM:g} mm {FADING_GW:g} GW"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
-MESH_SETTINGS = {
-    "order": 1,
-    "mesher": "tetgen",
-    "surface_edge_mm": 1.3,
-    "core_edge_mm": 3,
-    "max_surface_distance_mm": 0.5,
-}
+MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # flat elements of a coarse mesh of a detailed surface are let through
-MESH_SETTINGS |= {"min_radius_ratio": 0.005}
+MESH_SETTINGS |= {"max_surface_distance_mm": 0.5, "min_radius_ratio": 0.005}
 INDIVIDUALS = ["shape-0-1", "shape-1-1", "shape-2-1", "shape-4-1", "sulci-1-1", "sulci-2-1"]
 
 

@@ -8,6 +8,7 @@ import json
 import re
 import sys
 import time
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ WIDTHS_MM, VOXELS_MM, TURNS_DEG = (0.0, 0.2, 0.5, 1.0), (0.5, 0.8, 1.0), ((0, 0,
 # cells into which a voxel is divided along each axis, of which most give its label
 CELLS = 3
 EDGE_MM = 1.0
+WAYS = ("shut", "opened")
 
 
 def off_sulci(points: np.ndarray) -> np.ndarray:
@@ -104,13 +106,13 @@ def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, 
     field, fine, report = open_shut_sulci(field, affine, core)
     opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
     row = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
-    return row | {name: measured(mesh, body, core, affine) for name, mesh in (("shut", shut), ("opened", opened))}
+    return row | {name: measured(mesh, body, core, affine) for name, mesh in zip(WAYS, (shut, opened), strict=True)}
 
 
 def try_brain(path: Path, week: float) -> dict:
     """Return area, thickness and their ratio to the cortex's volume of a brain, its sulci shut and opened."""
     volume, scheme, row = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"], {"week": week}
-    for name in ("shut", "opened"):
+    for name in WAYS:
         begin = time.process_time()
         brain = from_labels(volume.labels, volume.affine, scheme, week=week, open_sulci=name == "opened")
         taken = time.process_time() - begin
@@ -123,18 +125,10 @@ def try_brain(path: Path, week: float) -> dict:
 
 if __name__ == "__main__":
     true, phantoms, brains = {width: truth(width) for width in WIDTHS_MM}, [], {}
-    if not sys.argv[1:]:
-        print(f"truth: {true}")
-        for voxel in VOXELS_MM:
-            for width in WIDTHS_MM:
-                for turn in TURNS_DEG:
-                    row = try_phantom(width, voxel, turn)
-                    phantoms.append(row)
-                    off = {
-                        n: {k: f"{row[n][k] / known - 1:+.1%}" for k, known in true[width].items()}
-                        for n in ("shut", "opened")
-                    }
-                    print(f"{voxel} mm voxels, {width} mm wide, turned {turn}: {off}", flush=True)
+    for voxel, width, turn in product(VOXELS_MM, WIDTHS_MM, TURNS_DEG) if not sys.argv[1:] else []:
+        phantoms.append(row := try_phantom(width, voxel, turn))
+        shut, opened = ({k: f"{row[n][k] / known - 1:+.1%}" for k, known in true[width].items()} for n in WAYS)
+        print(f"{voxel} mm voxels, {width} mm wide, turned {turn}: shut {shut}, opened {opened}", flush=True)
     for folder in sys.argv[1:]:
         week = re.findall(r"\d+", Path(folder).name)[0]
         brains[Path(folder).name] = row = try_brain(Path(folder) / "parcellation.nii.gz", float(week))
