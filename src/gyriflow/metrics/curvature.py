@@ -23,6 +23,8 @@ log = logging.getLogger(__name__)
 
 EDGES_PER_RADIUS = 2.0
 """Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
+NOT_MUCH_LARGER = 1.1
+"""A radius that is so many times larger than that asked for is used without a warning."""
 
 MAX_FAILED_SHARE = 0.01
 
@@ -79,14 +81,13 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
-    local edges are longer than half of `radius_mm`, the ball grows to two of them, and a warning names the finest
-    scale of the mesh. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
+    local edges are longer than half of `radius_mm`, the ball grows to two of them, and a warning says so
+    where it is more than a tenth larger. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
     neighbourhood.
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
-    if finest > radius_mm:
-        said = "curvature at a radius of %.3g mm is finer than the mesh: %.3g mm is the finest it supports"
-        log.warning(said, radius_mm, finest)
+    if finest > NOT_MUCH_LARGER * radius_mm:
+        log.warning("the mesh is too coarse for curvature at a radius of %.3g mm: %.3g mm is used", radius_mm, finest)
     radii = np.maximum(radius_mm, EDGES_PER_RADIUS * _edge_lengths(mesh))
     coefficients, fitted, one_sided = _quadrics(mesh, radii)
     failed = int(np.count_nonzero(~fitted))

@@ -90,7 +90,9 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
     heading, colour = VERDICTS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
-    words = wrap("   ".join(f"{name}: {value}" for name, value in _facts(row).items()), LINE_LETTERS)
+    # a line ends between facts, not within one
+    facts = [f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}") for name, value in _facts(row).items()]
+    words = wrap("   ".join(facts), LINE_LETTERS)
     title = f"{row['subject']}, {row['week']:g} GW"
     figure.suptitle(title, x=0.015, ha="left", fontsize=10, fontweight="bold")
     box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "edgecolor": "none"}
@@ -196,7 +198,7 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
         "source": str(row["source"]),
         "hemispheres": " and ".join(sides),
         "area": f"{row['area_cm2']:.1f} cm² ({both})",
-        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of that expected)",
+        "volume": f"{row['volume_ml']:.1f} mL ({100 * row['share_of_expected_volume']:.0f} % of the expected)",
         "pose": f"by {row['pose_by']}, turned by {turned:.1f}°" if turned >= 0.05 else "as in the file",
     }
     if row["asymmetry_mm"] is not None:

@@ -75,10 +75,12 @@ def test_a_ball_grows_to_two_edges_where_the_mesh_is_coarse(caplog) -> None:
     length = mean_edge_length(mesh)
     with caplog.at_level(logging.WARNING):
         bend = curvature(mesh, radius_mm=1.5)
-    assert f"{2 * length:.3g} mm is the finest" in caplog.text
+    assert f"{2 * length:.3g} mm is used" in caplog.text
     assert bend.radius_mm.mean() == pytest.approx(2 * length, rel=0.02)
     np.testing.assert_allclose(bend.mean, 1 / 25, rtol=0.03)
     caplog.clear()
+    curvature(mesh, radius_mm=1.9 * length)
+    assert not caplog.text
     assert (curvature(mesh, radius_mm=10.0).radius_mm == 10.0).all()
     assert not caplog.text
 
