@@ -104,11 +104,17 @@ def main() -> None:
       gyriflow status               show the progress (from another terminal)
       gyriflow view                 open the report
 
-    Metrics without simulations, of a folder or a configuration: gyriflow measure my-data
+    \b
+    Metrics without simulations, of a folder or a configuration:
+      gyriflow measure my-data
 
-    A BIDS data set: gyriflow BIDS OUT participant, then gyriflow BIDS OUT group (gyriflow bids --help)
+    \b
+    A BIDS data set (see gyriflow bids --help):
+      gyriflow BIDS OUT participant, then gyriflow BIDS OUT group
 
-    Predict a brain at a later week from one scan: gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
+    \b
+    A brain at a later week, predicted from one scan:
+      gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
     """
 
 
@@ -137,9 +143,9 @@ def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> 
 @cores_option
 @stages_option
 def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str]) -> None:
-    """Check a configuration and its files; say what will run and what it will need.
+    """Check a study; say what it would run and need.
 
-    Nothing is run or written. CONFIG is gyriflow.yaml by default.
+    Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default.
     """
     from .checking import check_study
 
@@ -195,10 +201,10 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
 @cores_option
 @dry_run_option
 def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
-    """Measure the brains of a folder or a configuration and write the report, without simulations.
+    """Measure brains and write the report, without simulations.
 
-    In a FOLDER without gyriflow.yaml, one is written, as by `gyriflow init`. It needs neither `start` nor `folding`. If
-    a brain fails, the others are finished.
+    The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
+    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished.
     """
     from .beginning import write_configuration
     from .launch import MEASURES_ONLY
@@ -222,7 +228,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 @scheme_option
 @click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: download them]")
 @click.option("--image", type=FILE, help="T2-weighted volume of the scan.")
-@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas, if it has to be.")
+@click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas.")
 @click.option("--quick", is_flag=True, help="Use a coarse mesh and steps of one day, for a first look.")
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @directory_option
@@ -231,10 +237,10 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 def predict(
     labels: Path, week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
 ) -> None:
-    """Predict a brain at a later week from its tissue LABELS and the growth of an atlas.
+    """Predict a brain at a later week from its tissue LABELS.
 
-    This writes gyriflow.yaml into the working directory and runs it. The report says where the predicted surfaces and
-    labels are. After an interruption, the same command resumes.
+    It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it. The report
+    says where the predicted surfaces and labels are. After an interruption, the same command resumes.
     """
     from .beginning import write_prediction
 
@@ -268,11 +274,11 @@ def predict(
 @cores_option
 @dry_run_option
 def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_run: bool, **selection: Any) -> None:
-    """Run a BIDS data set of tissue labels or surfaces, as a BIDS app: BIDS OUT LEVEL.
+    """Run a BIDS data set, as a BIDS app: BIDS OUT LEVEL.
 
-    The level participant writes surfaces and maps of each participant to OUT, and with --fold simulations, too. The
-    level group adds the tables and the report of all participants, with the same options. Results that are up to date
-    are kept. If a participant fails, the others are finished.
+    The data are tissue labels or surfaces. The level participant writes surfaces and maps of each participant to OUT,
+    and with --fold simulations, too. The level group adds the tables and the report of all participants, with the same
+    options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import hand_over
     from .beginning import remember, remembered, write_bids
@@ -300,7 +306,10 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
 def status(directory: Path) -> None:
-    """Show the progress of a study: what is done, running or failed, and the time left."""
+    """Show the progress of a study.
+
+    This is what is done, running or failed, and the time left.
+    """
     from . import status as module
 
     for line in module.status(directory):
