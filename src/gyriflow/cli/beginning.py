@@ -177,6 +177,8 @@ def write_bids(
             "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'; --scheme names labels."
         )
         raise InputError("cannot be run as it is", path=folder, found="".join(problems), remedy=remedy)
+    youngest = brains[0].entry["id"]
+    brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     followed = [scans for scans in _of_subjects(brains).values() if len(_weeks(scans)) > 1]
     starts = [scans[0].entry["id"] for scans in followed]
     leading = fold and bool(followed) and all(_leads(scans, folder) for scans in followed)
@@ -185,7 +187,7 @@ def write_bids(
     runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if leading else {})
     text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
     if fold:
-        text |= {"start": starts or brains[0].entry["id"], "runs": runs, **given}
+        text |= {"start": starts or youngest, "runs": runs, **given}
         text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (given.get("folding") or {})
     else:
         text |= {key: value for key, value in given.items() if key not in OF_FOLDING}

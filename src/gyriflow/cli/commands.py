@@ -56,8 +56,7 @@ class Commands(click.Group):
             sys.exit(error.exit_code)
         except click.UsageError as error:
             command = error.ctx.command_path if error.ctx else command_name()
-            message = " ".join(error.format_message().split())
-            click.echo(f"gyriflow: {message} See `{command} --help`.", err=True)
+            click.echo(f"gyriflow: {' '.join(error.format_message().split())} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
 
 
@@ -265,11 +264,7 @@ def predict(
     type=click.Path(exists=True, dir_okay=False, resolve_path=True),
     help="Configuration without brains, such as resolution, norms or what to fold.",
 )
-@click.option(
-    "--fold/--no-fold",
-    default=None,
-    help="Fold the first of several scans of each subject. [default: no]",
-)
+@click.option("--fold/--no-fold", default=None, help="Fold the first of several scans of a subject. [default: no]")
 @click.option("-w", "--work-dir", "work", type=FOLDER, help="Working directory, for results/. [default: OUT/work]")
 @cores_option
 @dry_run_option
@@ -306,10 +301,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
 @main.command()
 @click.argument("directory", type=FOLDER, default=Path())
 def status(directory: Path) -> None:
-    """Show the progress of a study.
-
-    This is what is done, running or failed, and the time left.
-    """
+    """Show the progress of a study."""
     from . import status as module
 
     for line in module.status(directory):

@@ -55,7 +55,6 @@ REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
 FULL_BYTES = 4 * 2**20
 """With less space left, a run that ended without a code of its own has met a full disk."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
-"""What Snakemake says of a target that is neither a rule nor a file of one."""
 HELD: list[IO[str]] = []
 """Files whose locks this process holds."""
 

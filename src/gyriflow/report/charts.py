@@ -268,7 +268,7 @@ def _spectra_legend(
 ) -> None:
     """Draw the legend of a chart of bands, with groups and what is drawn of bands that are cut off or not resolved."""
     untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
-    label = "cut off or not resolved, or a share of such"
+    label = "band cut off or not resolved"
     extra: list[Artist] = []
     if untrusted - {MEASURED}:
         hatched = Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label)

@@ -125,6 +125,9 @@ def page_content(
         warnings = warnings[warnings["subject"].isin(ids)]
     own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
     files = [file for file in provenance["files"] if file["brain"] in ids]
+    flags = set(own["flag"])
+    # the brains of an atlas are too few for norms of each other
+    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
     versions = [(name, version) for name, version in software.items() if version]
     title, said, scores = f"Measured cortical folding, {ids[0]}", "", ""
     if pictures is not None:
@@ -146,7 +149,7 @@ def page_content(
         "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
         "brains": html_table(brains_table(brains, quality, metrics, centiles, pictures or {})),
-        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if (own["flag"] == flag).any()],
+        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
         "alone": pictures is None,
         "numbers": html_table(brain_table(metrics[metrics["subject"] == ids[0]], centiles)) if pictures is None else "",
         "runs": scores,
@@ -290,9 +293,9 @@ def worth_told(prediction: Mapping[str, Any]) -> str:
 
 
 def measured_verdict(quality: pd.DataFrame) -> str:
-    """Return in a sentence how many brains were measured without warnings, and how many were not."""
+    """Return in a sentence how many brains have which verdict of quality control."""
     counts = quality["verdict"].value_counts()
-    words = {"fine": "measured without warnings", "look": "measured with warnings", "refused": "refused"}
+    words = {"fine": "fine", "look": "to look at", "refused": "refused"}
     brains = f"{len(quality)} brain{'s' if len(quality) > 1 else ''}"
     return f"{brains}: {', '.join(f'{counts[name]} {word}' for name, word in words.items() if name in counts)}."
 

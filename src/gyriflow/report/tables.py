@@ -15,7 +15,7 @@ from .style import REAL_BRAIN, run_colours, runs_by_name
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60
-NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?|–")
+NUMBER = re.compile(r"[+−]?\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+| %| \([+−][\d.]+\))?|–")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _TABLE = Environment(autoescape=True).from_string(
     "<table><thead><tr>{% for head in heads %}<th>{{ head }}</th>{% endfor %}</tr></thead>\n<tbody>"

@@ -254,12 +254,15 @@ def _of_folding(study: Study) -> Iterator[Figure]:
 
 def _of_metrics(study: Study) -> Iterator[Figure]:
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
-    options: Given = {"runs": run_names(study.pairs), "measured": measured_name(study.brains.values())}
+    # those of a group have its colour and name
+    everything, groups = study.brains.values(), _groups(study)
+    others = [brain for brain in everything if brain.id not in groups]
+    options: Given = {"runs": run_names(study.pairs), "measured": measured_name(others or everything)}
     subjects = {brain.id: brain.subject for brain in study.brains.values() if brain.given.subject is not None}
-    options |= {"subjects": subjects, "groups": _groups(study)}
+    options |= {"subjects": subjects, "groups": groups}
     yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
     if study.folded:
-        measured = {"measured": options["measured"]}
+        measured = {"measured": measured_name(everything)}
         yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
     yield Figure("spectra_figure", f"{OF_STUDY}/spectra.png", "charts.spectra_weeks_chart", spectra, options)
     reference = list(study.norm_reference)

@@ -124,10 +124,12 @@ def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     assert not (folder / "participants.tsv").exists()
     write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
     (exported.parent / "report" / "brains").mkdir(parents=True)
-    (exported.parent / "report" / "brains" / "sub-01_ses-1.html").touch()
+    for name in ("sub-01_ses-1", "crl-22"):
+        (exported.parent / "report" / "brains" / f"{name}.html").touch()
     hand_over(exported, folder, source, ["sub-01_ses-1"], whole=True)
     assert (folder / "participants.tsv").exists()
-    assert (folder / "brains" / "sub-01_ses-1.html").exists()
+    # the report leads to brains of an atlas, too
+    assert {path.name for path in (folder / "brains").iterdir()} == {"sub-01_ses-1.html", "crl-22.html"}
     assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
 
 

@@ -110,7 +110,7 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     parts = ("first &lt;page", "<h3>Runs", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Brains", "<h2>Provenance")
     order = [text.index(word) for word in parts]
     assert order == sorted(order)
-    assert "2 brains of 21 to 23 GW (healthy) were analysed. young was meshed and" in " ".join(text.split())
+    assert "2 brains of 21 to 23 GW were analysed, all of them healthy. young was meshed and" in " ".join(text.split())
     assert "grown to 23 GW in 1 simulation of" in " ".join(text.split())
     assert "12ab" in text
     assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
@@ -231,6 +231,9 @@ def test_a_page_says_what_its_centiles_are_worth():
     assert "the curve of the norm (the norm)" in text
     assert "the spread of individuals around the curve is unknown" in text
     assert "There are too few subjects" not in text
+    # those of an atlas itself are not spoken of
+    few = pd.concat([MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")])
+    assert "There are too few subjects" not in page([], centiles=few)
 
 
 def test_a_brain_has_a_page_of_its_own():
@@ -305,9 +308,7 @@ def test_the_methods_say_what_was_run():
         template, brains=brains, runs=runs, software=software, metrics=metrics,
         surface={"edge_length_mm": 0.8, "open_sulci": True}, mesh={"order": 2, "mesher": "tetgen"},
     )  # fmt: skip
-    assert (
-        "2 brains of 21 to 24.5 weeks of gestation (GW) (spina bifida) were processed with gyriflow 0.1. Pial" in text
-    )
+    assert "2 brains of 21 to 24.5 weeks of gestation (GW), 1 of them spina bifida, were processed with" in text
     assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
     assert "Sulci that are closed in the labels were left closed, as mesh elements are wider than slits" in text
     assert "1500 and the values given for each week or place Pa" in text
@@ -319,6 +320,7 @@ def test_the_methods_say_what_was_run():
     assert "simulated" not in alone
     assert "Tallinen" not in alone
     assert "Sulci that are closed in the labels were opened by slits" in alone
+    assert "van Doorn [1]" in alone
     assert "(population cohort), a population's growth and not the subject's own. Stress" in text
     assert text.count("its own later shape") == 1
     assert "was modelled [4]" in text
@@ -334,5 +336,5 @@ def test_messages_tell_files_without_their_folders(monkeypatch):
 
 
 def test_a_page_without_simulations_says_how_many_brains_were_measured():
-    said = "<strong>2 brains: 1 measured with warnings, 1 refused.</strong>"
+    said = "<strong>2 brains: 1 to look at, 1 refused.</strong>"
     assert said in page([], runs=None, validation=None)
