@@ -57,7 +57,8 @@ class RigidMotions:
 class ElasticMatrix:
     """The elastic tangent as 3 × 3 blocks, which dolfinx holds.
 
-    dolfinx' own block matrices are filled about twice as fast as PETSc's.
+    dolfinx' own block matrices are filled about twice as fast as PETSc's. Of two blocks between nodes of one rank that
+    mirror each other, `add` may leave out the one below the diagonal, which nothing reads.
 
     `coupling` is a form with the same places of entries, which `add` adds at the present displacement, `fixed` (owned,
     3) the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is (all
