@@ -26,8 +26,8 @@ OWN_MM = 8.0
 
 What is smaller than a gyrus says nothing of folds that are still to come.
 """
-FADING_GW = 1.0
-"""Time in which what is smaller fades."""
+FADING_GW = 4.0
+"""Time in which what is smaller fades: of 1, 4 and 16 weeks the best for invented individuals, see docs/science.md."""
 
 
 def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:

@@ -16,7 +16,14 @@ from gyriflow.geometry.diffusion import diffuse, vertex_sizes
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
-from gyriflow.growth.expected import carry_sharply, expected_positions, fit_onto_surface, predict_shapes, sizes_of
+from gyriflow.growth.expected import (
+    FADING_GW,
+    carry_sharply,
+    expected_positions,
+    fit_onto_surface,
+    predict_shapes,
+    sizes_of,
+)
 from gyriflow.metrics.curvature import curvature
 
 BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))
@@ -180,7 +187,9 @@ def test_small_bumps_of_a_brain_fade_and_its_size_stays():
     start = TetrahedralMesh(mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets)
     _, positions = expected_positions(start, 22.0, atlas, WEEKS)
     left = [np.sqrt(((at - a) ** 2).mean()) for at, a in zip(positions, atlas, strict=True)]
-    assert left[2] < 0.35 * left[0]
+    # a fifth larger by then, as the brain is
+    assert left[2] < 1.1 * 1.2 * np.exp(-2.0 / FADING_GW) * left[0]
+    assert left[2] < 0.8 * left[0]
 
 
 @pytest.mark.parametrize("week", [20.9, 24.0, 25.0])
@@ -195,7 +204,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
 
     This holds where all that sets the brain apart is kept (`own_mm` 0), for a map that turns by any angle, makes longer
     or shorter, bends by tenths of a millimetre, and whose turn varies by 4 degrees over 30 mm. What the usual 8 mm
-    smooth away returns to the atlas, also a part of a difference in size: growth is then off by 12 to 20 % here.
+    smooth away returns to the atlas, also a part of a difference in size: growth is then off by 5 to 10 % here.
     """
     axes = np.array([30.0, 36.0, 27.0])
     mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
@@ -228,7 +237,7 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
 
     # without the rotation they would be wrong by far more than what is allowed
     assert size(known - wanted) > 0.5 * size(wanted)
-    for own_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.1, 0.2)):
+    for own_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.05, 0.1)):
         _, positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], own_mm=own_mm)
         found = tensors(log_growth(x, stretches, positions[1] - x, 0.0))
         assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
