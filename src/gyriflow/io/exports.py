@@ -248,9 +248,10 @@ def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Seque
         f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
     }
     # brains of an atlas have pages, too, to which the report leads
-    report = [path.relative_to(exported.parent) for path in (exported.parent / "report").glob("**/*.html")]
-    of_all = {str(path.relative_to("report")): path for path in [*report, Path("report/methods.rst")] if whole}
-    for target, page in {**pages, **of_all}.items():
+    report = exported.parent / "report"
+    names = [*(str(path.relative_to(report)) for path in report.glob("**/*.html")), "methods.rst"]
+    of_all = {name: f"report/{name}" for name in names if whole}
+    for target, page in (pages | of_all).items():
         if (exported.parent / page).is_file():
             _copy(exported.parent / page, folder / target)
     description = source / "dataset_description.json"
