@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES, SPREAD_UNKNOWN
+from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES
 from .labels import METRICS, value_labels, with_unit
 from .pictures import region_colours
 from .style import (
@@ -202,7 +202,7 @@ def norms_chart(
     if curves["low"].notna().any():
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
     elif len(curves):
-        extra.append(Line2D([], [], color=MUTED_COLOUR, label=f"curve of the norm; {SPREAD_UNKNOWN}"))
+        extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
     run_legend(figure, colours, measured=measured, markers=markers, extra=extra)
     return figure
 

@@ -91,7 +91,7 @@ def with_unit(name: str, unit: object) -> str:
 
 def plain(name: str) -> str:
     """Return a name of columns or files as words."""
-    return name.replace("_", " ").replace("spangy", "SpAnGy")
+    return name.replace("_", " ").replace("spangy", "SpAnGy").replace("weyl", "Weyl")
 
 
 def week_label(week: float) -> str:

@@ -210,7 +210,7 @@ def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
     assert curve.get_ydata()[[0, -1]] == pytest.approx([210, 300], abs=1)
     (band,) = (part.get_paths() for part in figure.axes[0].collections[:1])
     assert not band or np.isnan(band[0].vertices).any()
-    assert {"curve of the norm; spread of individuals unknown", "sex: F"} <= words(figure)
+    assert {"norm, spread unknown", "sex: F"} <= words(figure)
     assert not {"90 % of further brains", "other measured brains"} & words(figure)
 
 
