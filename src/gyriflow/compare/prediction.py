@@ -9,7 +9,6 @@ from scipy.spatial import cKDTree
 from ..geometry.alignment import fit_onto
 from ..geometry.diffusion import diffuse
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
-from ..geometry.remeshing import remesh
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -22,19 +21,19 @@ from ..geometry.triangles import (
     vertex_normals,
 )
 from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, values_on
-from .shapes import EDGE_MM, Shape, cortex_dice
+from .shapes import Shape, cortex_dice
 
 SMOOTHING_MM = 3.0
 """Standard deviation that areas are smoothed with before they are compared."""
 
 
 def apart(predicted: TriangleMesh, real: TriangleMesh, real_even: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
-    """Return two surfaces with even triangles, and how far their vertices are from the other in mm, as they lie.
+    """Return two surfaces, and how far their vertices are from the other in mm, as they lie.
 
     `real_even` is the real one made `ready`.
     """
-    both = ((remesh(predicted, EDGE_MM), real), (real_even, predicted))
-    return [(even, nearest_on(even.vertices, other)[0]) for even, other in both]
+    both = ((predicted, real), (real_even, predicted))
+    return [(one, nearest_on(one.vertices, other)[0]) for one, other in both]
 
 
 def distances(pair: list[tuple[TriangleMesh, Floats]]) -> dict[str, float]:

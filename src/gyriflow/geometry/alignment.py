@@ -29,6 +29,9 @@ class Fit:
 POINTS, ROUNDS, ARRIVED_MM = 4000, 60, 0.005
 """Of closest points: how many of either surface, most rounds, and the move that ends them."""
 
+PATIENCE, NEARER = 5, 1e-3
+"""Surfaces that differ never stand still: rounds also end when so many brought them no nearer by this share."""
+
 
 def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
     """Return the (4, 4) motion p → rotation p + shift; without one of the two, the identity in its place."""
@@ -117,6 +120,7 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
 
     Points of both surfaces move towards the planes of their nearest faces on the other one.
     """
+    left: list[float] = []
     nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
     of_a, of_b = (one.vertices[:: max(1, len(one.vertices) // POINTS)] for one in (mesh, onto))
 
@@ -127,9 +131,13 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
         on_a, normals_a = nearest_of_a((of_b - shift) @ rotation)
         points = np.concatenate([moved, on_a @ rotation.T + shift])
         normals = np.concatenate([normals_b, normals_a @ rotation.T])
-        return points, normals, np.einsum("ij,ij->i", np.concatenate([on_b, of_b]) - points, normals), None
+        ahead = np.einsum("ij,ij->i", np.concatenate([on_b, of_b]) - points, normals)
+        left.append(float(np.linalg.norm(ahead)))
+        return points, normals, ahead, None
 
     def arrived(points: Floats, turn: Floats, move: Floats) -> bool:
+        if len(left) > PATIENCE and min(left[-PATIENCE:]) > (1 - NEARER) * min(left[:-PATIENCE]):
+            return True
         moved = points[: len(of_a)]
         return bool(np.linalg.norm(moved @ turn.T + move - moved, axis=1).max() < ARRIVED_MM)
 

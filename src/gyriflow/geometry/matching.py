@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import igl
 import igl.predicates
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from .triangles import Floats, Ints, TriangleMesh, corners, face_normals, transformed, vertex_normals
@@ -69,10 +71,9 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
     low, high = (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
     low = low - 4 * voxel_mm
     shape = np.ceil((high - low) / voxel_mm + 4).astype(int) + 1
-    inside = _inside(mesh, low + voxel_mm * np.indices(shape).reshape(3, -1).T)
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = low
-    return inside.reshape(shape).astype(np.int32), affine
+    return _inside(mesh, tuple(shape), affine).astype(np.int32), affine
 
 
 def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats) -> NDArray[np.int32]:
@@ -80,19 +81,31 @@ def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], 
 
     `affine` (4, 4) leads from voxels to mm; what lies beyond the volume is not in it.
     """
+    inside = np.argwhere(_inside(mesh, shape, affine))
+    depth, faces, _ = nearest_on(inside @ affine[:3, :3].T + affine[:3, 3], mesh)
     labels = np.zeros(shape, dtype=np.int32)
-    voxels = np.indices(shape).reshape(3, -1).T
-    index = transformed(mesh, np.linalg.inv(affine)).vertices
-    voxels = voxels[((voxels >= index.min(axis=0)) & (voxels <= index.max(axis=0))).all(axis=1)]
-    centres = voxels @ affine[:3, :3].T + affine[:3, 3]
-    inside = _inside(mesh, centres)
-    depth, faces, _ = nearest_on(centres[inside], mesh)
-    labels[tuple(voxels[inside].T)] = np.where(depth <= thickness[mesh.faces[faces]].mean(axis=1), 2, 1)
+    labels[tuple(inside.T)] = np.where(depth <= thickness[mesh.faces[faces]].mean(axis=1), 2, 1)
     return labels
 
 
-def _inside(mesh: TriangleMesh, points: Floats) -> NDArray[np.bool_]:
-    return np.asarray(igl.fast_winding_number(mesh.vertices, mesh.faces, points) > 0.5)
+def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> NDArray[np.bool_]:
+    """Return whether the centres of an (i, j, k) volume's voxels lie inside a closed surface, by winding numbers.
+
+    They are asked for beside the surface, and once for each region of voxels that it does not part.
+    """
+    index = transformed(mesh, np.linalg.inv(affine))
+    pieces, _ = trimesh.remesh.subdivide_to_size(index.vertices, index.faces, 1.0, max_iter=20)
+    points = np.rint(pieces).astype(np.int64)
+    beside = np.zeros(shape, dtype=bool)
+    beside[tuple(points[((points >= 0) & (points < shape)).all(axis=1)].T)] = True
+    beside = ndimage.binary_dilation(beside, np.ones((3, 3, 3)))
+    regions, _ = ndimage.label(~beside)
+    _, some, region = np.unique(regions, return_index=True, return_inverse=True)
+    asked = np.stack(np.unravel_index(np.concatenate([some, np.flatnonzero(beside)]), shape), axis=1)
+    winding = igl.fast_winding_number(index.vertices, index.faces, asked.astype(float)) > 0.5
+    inside = winding[: len(some)][region.reshape(shape)]
+    inside[beside] = winding[len(some) :]
+    return np.asarray(inside)
 
 
 def faces_that_cross(mesh: TriangleMesh) -> Ints:
