@@ -9,9 +9,9 @@ import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
 
-LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/")
-RANKS = "tests/mpi/test_ranks.py"
-"""Comes after the same cases on one rank, which compile their forms while no other rank waits for them."""
+LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/mpi/test_ranks.py", "tests/")
+"""Cases on several ranks come after the same on one, which compile their forms while no other rank waits for them, and
+beside tests of one process: with more processes than cores, ranks wait for each other most of the time."""
 MOST_WORKERS = 8
 """Some tests start three ranks, or a workflow of two cores, of their own."""
 
@@ -41,8 +41,8 @@ def pytest_collection_modifyitems(items):
     slow = {item.path for item in items if item.get_closest_marker("slow")}
 
     def place(item):
-        folder = next(n for n, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start))
-        return folder, item.nodeid.startswith(RANKS), item.path not in slow
+        folder = max(filter(item.nodeid.startswith, LONGEST_FIRST), key=len)
+        return LONGEST_FIRST.index(folder), item.path not in slow
 
     items.sort(key=place)
 

@@ -1,6 +1,7 @@
 """Surfaces made ready for comparison: the real brain's volume, even triangles, one pose; and what folds they have."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -10,7 +11,7 @@ from ..errors import InputError
 from ..geometry.alignment import fit_onto
 from ..geometry.matching import surface_mask
 from ..geometry.remeshing import remesh
-from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed, vertex_areas
+from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, transformed, vertex_areas
 
 EDGE_MM = 1.0
 """Edges that surfaces are compared with, after both have the real brain's volume."""
@@ -90,13 +91,17 @@ def against_real(run: Shape, real: Shape) -> dict[str, float]:
 
 def cortex_dice(one: TriangleMesh, other: TriangleMesh) -> float:
     """Return the Dice overlap of the outermost `CORTEX_MM` of two closed surfaces, as they lie to each other in mm."""
-    points = np.concatenate([one.vertices, other.vertices])
-    box = np.stack([points.min(axis=0), points.max(axis=0)])
-    ribbons = []
-    for mesh in (one, other):
-        inside = surface_mask(mesh, VOXEL_MM, box)[0] > 0
-        # distances are to the centres of voxels outside, half a voxel beyond the surface
-        depth = distance_transform_edt(inside, sampling=VOXEL_MM) - VOXEL_MM / 2
-        ribbons.append(inside & (depth <= CORTEX_MM))
-    both = np.count_nonzero(ribbons[0] & ribbons[1])
-    return 2 * both / sum(map(np.count_nonzero, ribbons))
+    ribbons = [_ribbon(mesh) for mesh in (one, other)]
+    both = sum(map(len, ribbons)) - len(np.unique(np.concatenate(ribbons), axis=0))
+    return 2 * both / sum(map(len, ribbons))
+
+
+@lru_cache(maxsize=2)
+def _ribbon(mesh: TriangleMesh) -> Ints:
+    """Return the voxels of the outermost `CORTEX_MM`, (k, 3) multiples of `VOXEL_MM`."""
+    corner = np.floor(mesh.vertices.min(axis=0) / VOXEL_MM)
+    box = np.stack([corner * VOXEL_MM, mesh.vertices.max(axis=0)])
+    mask, affine = surface_mask(mesh, VOXEL_MM, box)
+    # distances are to the centres of voxels outside, half a voxel beyond the surface
+    depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2
+    return np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
