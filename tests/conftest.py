@@ -9,9 +9,8 @@ import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
 
-LONGEST_FIRST = ("tests/mpi/", "tests/workflow/", "tests/mpi/test_ranks.py", "tests/")
-"""Cases on several ranks come after the same on one, which compile their forms while no other rank waits for them, and
-beside tests of one process: with more processes than cores, ranks wait for each other most of the time."""
+LONGEST_FIRST = ("tests/mpi/", "tests/mpi/test_ranks.py", "tests/workflow/", "tests/")
+"""Cases on several ranks come after the same on one, which compile their forms while no other rank waits for them."""
 MOST_WORKERS = 8
 """Some tests start three ranks, or a workflow of two cores, of their own."""
 
