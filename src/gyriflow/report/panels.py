@@ -122,21 +122,23 @@ def panel_grid(
     columns = [wrap(column, int(panel / 0.055)) for column, panel in zip(columns, panels, strict=True)]
     head_in = _dots(0.1)
     block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
-    heights = [[_heights_in(row, block, inches_per_mm) for row in rows] for block in blocks]
+    # what a block shows nothing of has no row in it
+    drawn = [[row for row in rows if row.absent or any(row.panels[block])] for block in blocks]
+    heights = [[_heights_in(row, block, inches_per_mm) for row in of] for block, of in zip(blocks, drawn, strict=True)]
     total = head_in + layout.foot + len(blocks) * block_head_in
     total += sum(height + caption for of_block in heights for height, caption in of_block)
 
     figure = Figure(figsize=(width, total))
     top = total - head_in
     letters = iter(ascii_lowercase)
-    for block, of_block in zip(blocks, heights, strict=True):
+    for block, in_block, of_block in zip(blocks, drawn, heights, strict=True):
         left = left_in
         for head, panel in zip(columns[block], panels[block], strict=True):
             x, y = (left + panel / 2) / width, (top - block_head_in / 2) / total
             figure.text(x, y, head, ha="center", va="center", fontsize=7)
             left += panel
         top -= block_head_in
-        for row, (height, caption) in zip(rows, of_block, strict=True):
+        for row, (height, caption) in zip(in_block, of_block, strict=True):
             marks = 1 if len(rows) > 1 else len(row.panels[block]) if len(columns) > 1 else 0
             marked = list(islice(letters, marks))
             _draw_row(figure, row, block, layout, marked, bottom=top - height, height=height)

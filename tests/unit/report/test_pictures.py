@@ -55,6 +55,12 @@ def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
     assert [blue > red for red, _, blue in tones] == 2 * [False, True, False]
 
 
+def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
+    figure = runs_by_week({"long": dict.fromkeys(np.arange(21.0, 31.0), BRAIN)}, {21.0: BRAIN}, views=("left",))
+    written = [text.get_text() for text in figure.texts]
+    assert [sum(name in text for text in written) for name in ("long", "real brain")] == [2, 1]
+
+
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
     small, large = BRAIN, box((60, 80, 60))
     figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))
