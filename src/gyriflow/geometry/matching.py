@@ -99,11 +99,12 @@ def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> NDArr
     beside = np.zeros(shape, dtype=bool)
     beside[tuple(points[((points >= 0) & (points < shape)).all(axis=1)].T)] = True
     beside = ndimage.binary_dilation(beside, np.ones((3, 3, 3)))
-    regions, _ = ndimage.label(~beside)
-    _, some, region = np.unique(regions, return_index=True, return_inverse=True)
+    regions, number = ndimage.label(~beside)
+    some = np.zeros(number + 1, dtype=np.int64)
+    some[regions.ravel()] = np.arange(regions.size)
     asked = np.stack(np.unravel_index(np.concatenate([some, np.flatnonzero(beside)]), shape), axis=1)
     winding = igl.fast_winding_number(index.vertices, index.faces, asked.astype(float)) > 0.5
-    inside = winding[: len(some)][region.reshape(shape)]
+    inside = winding[: len(some)][regions]
     inside[beside] = winding[len(some) :]
     return np.asarray(inside)
 
