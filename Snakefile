@@ -10,7 +10,7 @@ min_version("9.0")
 CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
 SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
-from gyriflow.io.sources import code_hash
+from gyriflow.code_hash import code_hash
 
 # a configuration given on the command line replaces the demo instead of being mixed with it
 if not workflow.overwrite_configfiles:

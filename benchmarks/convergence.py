@@ -47,7 +47,7 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import folding_rows, measure_hemisphere, size_rows, spectrum_rows
-from gyriflow.parameters.terms import CURVATURE_RADIUS_MM
+from gyriflow.settings.terms import CURVATURE_RADIUS_MM
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]

@@ -16,9 +16,9 @@ from typing import Any
 
 import yaml
 
-from gyriflow.config.atlas import ATLASES
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
+from gyriflow.settings.atlas import ATLASES
 from workflow import call
 
 WEEKS = range(22, 35)

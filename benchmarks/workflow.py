@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 def call(folder: Path, config: dict[str, Any], cores: int, *targets: str) -> None:
     """Run targets in a folder; GyriflowError where one fails."""
     write_yaml(folder / "study.yaml", config)
-    command = [sys.executable, "-m", "gyriflow.cli.launch", "--cores", str(cores), *targets, "--snakefile"]
+    command = [sys.executable, "-m", "gyriflow.running.launch", "--cores", str(cores), *targets, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]
     path = os.pathsep.join(filter(None, [str(ROOT / "src"), os.environ.get("PYTHONPATH", "")]))
     environment = os.environ | {"PYTHONPATH": path}

@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.study.loading import load
 from gyriflow.study.study import Study
 
 LABELLED = {"labels": __file__, "scheme": "spina-bifida-atlas"}

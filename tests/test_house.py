@@ -11,49 +11,47 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gyriflow.cli.launch import SETTINGS
-from gyriflow.io.sources import imported_modules, room_of
+from gyriflow.code_hash import imported_modules, room_of
+from gyriflow.running.launch import SETTINGS
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-PLAIN = {"errors", "units", "geometry", "parameters"}
-"""What every room may use: errors, units, plain geometry and the shared vocabulary."""
+GROUND = {"errors", "units", "quantities"}
+PLAIN = GROUND | {"geometry", "settings"}
+"""What every room may import: errors, units, quantities, plain geometry and typed settings."""
 ARROWS = {
     "errors": set(),
     "units": set(),
-    "geometry": {"errors", "units"},
-    # label schemes are known by the names of their files
-    "parameters": {"errors", "units", "shipped"},
-    # a configuration names atlases, which are described in files
-    "config": PLAIN | {"io", "shipped"},
-    # what a study consists of is told from its configuration
-    "study": PLAIN | {"config", "io"},
-    "mechanics": set(),
-    # surfaces are posed by those of the shipped atlas
-    "anatomy": PLAIN | {"io", "shipped"},
-    # the solve is a program of its own, with its own frames and checkpoints
-    "folding": PLAIN | {"mechanics", "io"},
-    **dict.fromkeys(("io", "mesh", "growth", "metrics"), PLAIN),
-    **dict.fromkeys(("compare", "report"), PLAIN),
+    "quantities": set(),
+    "code_hash": set(),
     "shipped": set(),
     "version": {"shipped"},
     "step": {"errors"},
-    # the shell around the rooms: how a workflow starts, what it will take, what the terminal says
-    "cli": PLAIN | {"config", "folding", "io", "study", "shipped", "step", "anatomy", "version"},
+    # names of label schemes and atlases are names of shipped files
+    "settings": GROUND | {"shipped"},
+    "geometry": {"errors", "units"},
+    "mechanics": set(),
+    **dict.fromkeys(("io", "mesh", "growth", "metrics", "compare", "report"), PLAIN),
+    # surfaces are posed by those of the shipped atlas
+    "anatomy": PLAIN | {"io", "shipped"},
+    # the solver is a program of its own, with its own frames and checkpoints
+    "folding": PLAIN | {"mechanics", "io", "code_hash"},
+    "study": PLAIN | {"io"},
+    "running": PLAIN | {"study", "anatomy", "folding", "io", "shipped", "step", "version"},
+    "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
 }
-"""The rooms, and what each may import besides itself. Siblings do not know each other; they meet in plain geometry, in
-the vocabulary and in files."""
-OF_PROGRAMS = {"io", "step"}
-"""What a room's program (`__main__.py`) may import beyond that."""
+"""The rooms, and what each may import besides itself. Siblings meet in plain geometry, settings and files."""
+PROGRAM_ARROWS = {"io", "step"}
+"""What the program of a room (`__main__.py`) may import beyond that."""
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
 PROGRAMS = [*SCRIPTS, *(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "atlases").rglob("*.py")]
 RULE_FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
 
-OPENING_ROOMS = {"io", "folding", "cli", "step"}
+OPENING_ROOMS = {"code_hash", "io", "folding", "running", "cli", "step"}
 OPENING_NAMES = {"open"}
 OPENING_METHODS = {
     *("open", "read_text", "read_bytes", "write_text", "write_bytes", "tofile", "to_filename", "savefig"),
@@ -126,7 +124,7 @@ def test_rooms_import_only_what_is_below_them():
         short(path): forbidden
         for path in SOURCES
         if room_of(path) != "__init__"
-        if (forbidden := rooms_imported(path) - ARROWS[room_of(path)] - (OF_PROGRAMS if is_program(path) else set()))
+        if (forbidden := rooms_imported(path) - ARROWS[room_of(path)] - (PROGRAM_ARROWS if is_program(path) else set()))
     }
     assert upwards == {}
 

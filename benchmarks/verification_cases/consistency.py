@@ -10,7 +10,7 @@ from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
-from gyriflow.parameters.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
+from gyriflow.settings.terms import CLAMPED, FREE, LEFT_CONTACT, RIGHT_CONTACT
 
 from .manufactured import STRETCH
 

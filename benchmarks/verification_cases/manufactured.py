@@ -21,7 +21,7 @@ from gyriflow.folding.problem import Problem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
-from gyriflow.parameters.terms import CLAMPED
+from gyriflow.settings.terms import CLAMPED
 
 Floats = NDArray[np.float64]
 

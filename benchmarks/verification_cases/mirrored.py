@@ -10,7 +10,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
-from gyriflow.parameters.folding import FoldingParameters, parameters_from
+from gyriflow.settings.folding import FoldingParameters, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
-from gyriflow.parameters.folding import FoldingParameters, Solver, parameters_from
+from gyriflow.settings.folding import FoldingParameters, Solver, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 from .modes import Slab, amplifications

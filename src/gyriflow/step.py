@@ -14,7 +14,7 @@ from pathlib import Path
 from .errors import GyriflowError
 
 EXIT_FILE = "GYRIFLOW_EXIT_FILE"
-"""Environment variable with the file in which `gyriflow.cli.launch` finds the first failed step's exit code."""
+"""Environment variable with the file in which `gyriflow.running.launch` finds the first failed step's exit code."""
 INTERRUPTED = 130
 KILLED = 137
 OUT_OF_MEMORY = "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"

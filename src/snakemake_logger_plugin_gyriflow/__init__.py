@@ -26,7 +26,7 @@ class LogHandler(LogHandlerBase):
         # every job's process imports this module, and few need more of it
         from snakemake.logging import DefaultFormatter
 
-        from gyriflow.cli.terminal import RunDisplay
+        from gyriflow.running.terminal import RunDisplay
 
         details = Path(getattr(self.settings, "details", ""))
         self.file = logging.FileHandler(details)

@@ -11,8 +11,8 @@ from gyriflow.folding.problem import Problem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
-from gyriflow.parameters.folding import parameters_from
-from gyriflow.parameters.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
+from gyriflow.settings.folding import parameters_from
+from gyriflow.settings.terms import CLAMPED, FREE, SIDE_X, SIDE_Y
 from gyriflow.units import M_PER_MM
 
 HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2

@@ -22,8 +22,8 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import boundary_faces, signed_volumes
-from gyriflow.parameters.folding import parameters_from
-from gyriflow.parameters.terms import FREE
+from gyriflow.settings.folding import parameters_from
+from gyriflow.settings.terms import FREE
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
 GROWTH = 2e-7

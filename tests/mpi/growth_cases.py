@@ -25,7 +25,7 @@ from gyriflow.folding.simulation import Folding
 from gyriflow.folding.stress import packed, unpacked
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 from gyriflow.units import M_PER_MM, SECONDS_PER_GW
 
 

@@ -20,7 +20,7 @@ from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import Share, cell_sizes, vertex_sizes
 from gyriflow.geometry.tetrahedra import linear_pieces
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, M_PER_MM, ML_PER_MM3, MM_PER_M
 
 DAY_S = 86_400.0

@@ -11,7 +11,7 @@ from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.frames import read_positions
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 pytestmark = pytest.mark.slow
 

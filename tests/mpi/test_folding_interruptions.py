@@ -21,7 +21,7 @@ from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.mesh.nodes import curve_edges
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 pytestmark = pytest.mark.slow
 

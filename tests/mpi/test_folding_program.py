@@ -19,7 +19,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ import yaml
 from configurations import labelled, touched
 from processes import ran
 
-from gyriflow.config import load
+from gyriflow.study.loading import load
 
 CHECKOUT = Path(__file__).parents[2]
 PAGES = [CHECKOUT / "README.md", CHECKOUT / "docs" / "tutorial.md", *sorted(CHECKOUT.glob("docs/how-to/*.md"))]

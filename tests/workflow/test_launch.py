@@ -7,7 +7,7 @@ import sys
 import pytest
 from processes import ran
 
-from gyriflow.cli.launch import clear_stale_lock
+from gyriflow.running.launch import clear_stale_lock
 
 from .conftest import SMALL_STUDY
 
@@ -54,7 +54,7 @@ def test_a_stale_lock_is_cleared(tmp_path, capsys):
 def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_look(workflow):
     lock = stale(workflow.directory)
     holder = subprocess.Popen(
-        [*workflow.command()[:1], "-c", "from gyriflow.cli.launch import hold_lock; from pathlib import Path;"
+        [*workflow.command()[:1], "-c", "from gyriflow.running.launch import hold_lock; from pathlib import Path;"
          "lock = hold_lock(Path('.')); print('held', flush=True); input()"],
         cwd=workflow.directory, env=workflow.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip

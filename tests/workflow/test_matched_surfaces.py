@@ -10,7 +10,6 @@ from configurations import labelled
 from shapes import LPS, cerebrum_surface, phantom, rigid, sphere
 
 from gyriflow.anatomy.repair import pieces
-from gyriflow.config import load
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import MatchedSurfaces, transform_points
 from gyriflow.geometry.poses import Pose
@@ -20,7 +19,8 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.registrations import read_weekly_shapes, write_correspondence
 from gyriflow.io.surfaces import read_pose, write_surface, write_vertex_labels
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
+from gyriflow.study.loading import load
 from gyriflow.study.resolve import resolve
 
 from .conftest import COARSE

@@ -12,7 +12,7 @@ from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps, write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
 
 from .conftest import COARSE, labelled
 

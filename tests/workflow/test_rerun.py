@@ -97,7 +97,7 @@ CODE = {
         {rule: count for rule, count in BOTH_RUNS.items() if rule not in ("parameters", "regions")},
     ),
     # what the terminal says, comments in rules and the environment make no result
-    "around": (["src/gyriflow/cli/launch.py", "workflow/rules/metrics.smk", "envs/gyriflow.yaml"], {}),
+    "around": (["src/gyriflow/running/launch.py", "workflow/rules/metrics.smk", "envs/gyriflow.yaml"], {}),
 }
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from shapes import phantom, save_labels
 
-from gyriflow.cli.status import STATE
 from gyriflow.io.files import read_json
+from gyriflow.running.status import STATE
 
 from .conftest import Workflow
 

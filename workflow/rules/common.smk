@@ -3,13 +3,13 @@ import os
 from operator import attrgetter
 
 from gyriflow.errors import GyriflowError
-from gyriflow.parameters.measures import SHAPE_MEASURES
-from gyriflow.parameters.terms import SIDES
+from gyriflow.quantities import SHAPE_MEASURES
+from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of, measured_name
 from gyriflow.study.paths import *
-from gyriflow.cli.launch import GOES_ON, LOOKS, MEASURES_ONLY, hold_lock, refused_brains
-from gyriflow.cli.provenance import input_contents, require_own_results
+from gyriflow.running.launch import GOES_ON, LOOKS, MEASURES_ONLY, hold_lock, refused_brains
+from gyriflow.running.provenance import input_contents, require_own_results
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -30,7 +30,7 @@ def validated_study():
 
     Ends with a message and exit code 2 where the configuration is not valid.
     """
-    from gyriflow.config import load
+    from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
 
     try:
@@ -73,7 +73,7 @@ if workflow.is_main_process:
     for row in CONFIG.left_out.values():
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 
-# held as long as this process lives: how `gyriflow.cli.launch` tells a live run from one that was interrupted
+# held as long as this process lives: how `gyriflow.running.launch` tells a live run from one that was interrupted
 if RUNS:
     LOCK = hold_lock(Path.cwd())
 

@@ -1,6 +1,6 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
 from gyriflow.io.files import read_json
-from gyriflow.cli.cost import job_limits
+from gyriflow.running.cost import job_limits
 
 # runs of a calibration have their parameters from its rounds, and their maps from its base
 with_parameters = {one.run: one for one in study.simulations.values() if one.base == one.run}

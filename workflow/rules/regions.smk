@@ -1,6 +1,6 @@
 # Regions of the cortex: given on some brains, carried to others by registration, and to simulated ones with the tissue;
 # where none are given, named sulci. Maps of all brains at the vertices of one, the template.
-from gyriflow.config.atlas import SULCI
+from gyriflow.settings.atlas import SULCI
 
 
 rule given_regions:

@@ -1,11 +1,11 @@
 # Files of atlases that are not there yet. A file that exists is an input like any other: no rule makes it, so that no
 # copy of a user's own is ever deleted or replaced.
-from gyriflow.config.atlas import retrieval_note
+from gyriflow.study.atlases import retrieval_note, used_atlases
 
-ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in CONFIG.atlases for file in atlas.missing}
+ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in used_atlases(CONFIG) for file in atlas.missing}
 
 if workflow.is_main_process:
-    for atlas in CONFIG.atlases:
+    for atlas in used_atlases(CONFIG):
         if atlas.missing:
             print(f"gyriflow: {retrieval_note(atlas)}", file=sys.stderr)
 

@@ -1,5 +1,5 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
-from gyriflow.cli.cost import surface_memory_mib
+from gyriflow.running.cost import surface_memory_mib
 
 # how unequal and how asymmetric hemispheres may be, besides what is usual
 LIMITS = (

@@ -6,7 +6,7 @@ from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carrying import carry_regions
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels, write_vertex_labels
-from gyriflow.parameters.terms import SIDES, STRUCTURES
+from gyriflow.settings.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
 files, reports = snakemake.input, (snakemake.input.given_report, snakemake.input.report)

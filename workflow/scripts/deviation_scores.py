@@ -4,7 +4,7 @@ import pandas as pd
 
 from gyriflow.io.files import read_table, write_table
 from gyriflow.metrics.norms import measured_scores
-from gyriflow.parameters.terms import MEASURED
+from gyriflow.settings.terms import MEASURED
 from gyriflow.step import step
 
 SCORES = ["expected", "sd", "z", "centile", "brains", "flag"]

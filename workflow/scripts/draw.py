@@ -14,7 +14,7 @@ from gyriflow.io.frames import read_field, read_positions, read_tets, read_weeks
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 from gyriflow.step import step
 from gyriflow.units import SECONDS_PER_GW
 

@@ -5,7 +5,7 @@ from gyriflow.io.frames import read_positions
 from gyriflow.io.surfaces import write_brain, write_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.metrics.thickness import depth_of_weight, simulated_thickness
-from gyriflow.parameters.terms import LEFT
+from gyriflow.settings.terms import LEFT
 from gyriflow.step import step
 
 with step(snakemake.log[0]):

@@ -7,7 +7,7 @@ from gyriflow.geometry.triangles import transformed
 from gyriflow.growth.carried_regions import number_regions, regions_from_surface, regions_from_volume, renumber
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.parameters.terms import SIDES, STRUCTURES
+from gyriflow.settings.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params

@@ -7,7 +7,7 @@ from gyriflow.io.files import write_table
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.norms import published_norms, published_scores, structure_volumes
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 from gyriflow.units import ML_PER_MM3
 

@@ -5,7 +5,7 @@ from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.growth.matched_surfaces import match_surfaces, outward
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 first, second = snakemake.params.files

@@ -3,7 +3,7 @@
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.metrics.measure import measure_brain
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

@@ -10,8 +10,8 @@ from gyriflow.growth.channels import channels
 from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.parameters.terms import SIDES, STRUCTURES
+from gyriflow.settings.schemes import LabelScheme
+from gyriflow.settings.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
 files, read = snakemake.input, snakemake.params.read

@@ -6,8 +6,8 @@ from gyriflow.io.surfaces import read_pose, read_surface_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.mesh import maps as on_mesh
-from gyriflow.parameters.folding import FoldingSettings, target_maps
-from gyriflow.parameters.varying import bounds_of
+from gyriflow.settings.folding import FoldingSettings, target_maps
+from gyriflow.settings.varying import bounds_of
 from gyriflow.step import step
 
 files, maps, given = snakemake.input, {}, snakemake.params

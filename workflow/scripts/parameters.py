@@ -4,7 +4,7 @@ from gyriflow.growth.following import THICKNESS, followed_sizes
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.yaml_files import write_yaml
-from gyriflow.parameters.folding import target_map
+from gyriflow.settings.folding import target_map
 from gyriflow.step import step
 
 files, weeks, settings = snakemake.input, snakemake.params.weeks, dict(snakemake.params.settings)

@@ -5,7 +5,7 @@ from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_surface, write_brain
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

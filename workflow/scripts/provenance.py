@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from gyriflow.cli.provenance import software, texts_in
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.files import files_in, fingerprints, read_json, read_text, write_json, write_text
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.report.page import methods_text
+from gyriflow.running.provenance import software, texts_in
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

@@ -5,11 +5,11 @@ from gyriflow.anatomy.thickness import posed_whites
 from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
-from gyriflow.io.jobs import read_messages
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_label_volume, read_volume_map
-from gyriflow.parameters.schemes import LabelScheme
 from gyriflow.report.quality import Brain, quality_page, quality_row, tissue_groups
+from gyriflow.running.jobs import read_messages
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

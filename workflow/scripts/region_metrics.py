@@ -3,7 +3,7 @@
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.metrics.regions import region_metrics
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, given = snakemake.input, snakemake.params.labels

@@ -12,8 +12,8 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import Regions, read_maps, read_tetrahedral_mesh, write_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.parameters.folding import parameters_from, require_maps
-from gyriflow.parameters.terms import REGION_FIELDS
+from gyriflow.settings.folding import parameters_from, require_maps
+from gyriflow.settings.terms import REGION_FIELDS
 from gyriflow.step import step
 
 files = snakemake.input

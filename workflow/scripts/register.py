@@ -7,7 +7,7 @@ from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import judge, require_good
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_label_volume, read_values
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards

@@ -4,7 +4,7 @@ from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.growth.carried_regions import regions_from_surface
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, write_vertex_labels
 from gyriflow.io.tetmeshes import read_regions
-from gyriflow.parameters.terms import LEFT, SIDES, STRUCTURES
+from gyriflow.settings.terms import LEFT, SIDES, STRUCTURES
 from gyriflow.step import step
 
 files = snakemake.input

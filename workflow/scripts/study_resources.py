@@ -2,9 +2,9 @@
 
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import write_table
-from gyriflow.io.jobs import gather_messages, read_benchmarks
-from gyriflow.parameters.terms import run_names
 from gyriflow.report.tables import html_table, resources
+from gyriflow.running.jobs import gather_messages, read_benchmarks
+from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

@@ -5,8 +5,8 @@ import pandas as pd
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.parameters.terms import run_names
 from gyriflow.report.tables import OF_EVERY_RUN, html_table, resolution_over_steps, runs_table
+from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
 BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through_cortex")

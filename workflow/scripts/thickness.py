@@ -4,8 +4,8 @@ from gyriflow.anatomy.thickness import thickness_from_labels, thickness_from_whi
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_one_hemisphere, read_pose, read_surface, write_vertex_maps
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.schemes import LabelScheme
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

@@ -12,8 +12,8 @@ from gyriflow.io.surfaces import (
 )
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.measure import measure_white
-from gyriflow.parameters.schemes import LabelScheme
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.schemes import LabelScheme
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params

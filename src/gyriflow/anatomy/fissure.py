@@ -26,7 +26,7 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
-from ..parameters.schemes import LabelScheme
+from ..settings.schemes import LabelScheme
 from .extraction import EDGE_SLOPE, Floats, Mask
 
 SAMPLES = 600

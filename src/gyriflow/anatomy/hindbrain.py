@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..geometry.alignment import CUBE_ROTATIONS, angle_deg
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, unit
-from ..parameters.schemes import LabelScheme
+from ..settings.schemes import LabelScheme
 
 # from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
 EXPECTED = {"cerebellum": np.array([0.0, -0.58, -0.81]), "brainstem": np.array([0.0, -0.30, -0.95])}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError
-from ..parameters.schemes import SCHEME_FILES, LabelScheme
+from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from .extraction import (
     COMPARABLE,

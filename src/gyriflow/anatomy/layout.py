@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ..parameters.schemes import LabelScheme
+from ..settings.schemes import LabelScheme
 from .extraction import Floats
 from .labels import LEAST_CORTEX_OUTSIDE, Labels
 

@@ -11,17 +11,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
-from ..geometry.triangles import (
-    TriangleMesh,
-    area,
-    corners,
-    euler_number,
-    merged,
-    signed_volume,
-    transformed,
-)
-from ..parameters.schemes import LabelScheme
-from ..parameters.terms import SIDES, Side
+from ..geometry.triangles import TriangleMesh, area, corners, euler_number, merged, signed_volume, transformed
+from ..settings.schemes import LabelScheme
+from ..settings.terms import SIDES, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import (
     LEVEL,
@@ -56,14 +48,7 @@ from .fissure import (
     upright,
 )
 from .hindbrain import pose_of_labels
-from .labels import (
-    LEAST_CORTEX_OUTSIDE,
-    REPORTED_LOSS,
-    Cerebrum,
-    Labels,
-    read_cerebrum,
-    require_sides,
-)
+from .labels import LEAST_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
 from .layout import doubts_of_scheme, layout_of
 from .plausible import (
     DOUBTFUL_RATIO,
@@ -74,13 +59,7 @@ from .plausible import (
     require_plausible_size,
     require_whole,
 )
-from .pose import (
-    doubts_of_hemispheres,
-    pose_of_hemisphere,
-    pose_of_pair,
-    pose_of_surface,
-    pose_of_volume_by_shape,
-)
+from .pose import doubts_of_hemispheres, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
 from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
 from .sulci import open_shut_sulci
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..geometry.alignment import Fit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
-from ..parameters.terms import SIDES
+from ..settings.terms import SIDES
 from .hindbrain import LEAST_TURN_DEG, judged_turn
 from .template import (
     DEEPEST,

@@ -30,7 +30,7 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
-from ..parameters.terms import MOST_HOLE_MM
+from ..settings.terms import MOST_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks

@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..geometry.matching import layer_thickness, nearest_on
 from ..geometry.poses import Pose
 from ..geometry.triangles import TriangleMesh, area, merged, transformed, vertex_areas
-from ..parameters.schemes import LabelScheme
-from ..parameters.terms import SIDES
+from ..settings.schemes import LabelScheme
+from ..settings.terms import SIDES
 from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
 from .fissure import sample
 from .labels import Labels, read_cerebrum

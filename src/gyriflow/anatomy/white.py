@@ -6,8 +6,8 @@ import numpy as np
 
 from ..geometry.poses import Pose
 from ..geometry.triangles import TriangleMesh
-from ..parameters.schemes import LabelScheme
-from ..parameters.terms import Side
+from ..settings.schemes import LabelScheme
+from ..settings.terms import Side
 from .extraction import Floats, smooth_mask
 from .fissure import cut_sides, nearer_left
 from .labels import Labels, read_cerebrum

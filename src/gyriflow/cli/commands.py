@@ -128,7 +128,7 @@ def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> 
     It recognises tissue label volumes (and their label scheme), hemisphere surfaces, and ages in participants.tsv or
     in names such as week21 or GA21.
     """
-    from .beginning import write_configuration
+    from .init import write_configuration
 
     path = output or folder / CONFIG
     for line in write_configuration(folder, path, force, scheme=scheme):
@@ -146,7 +146,7 @@ def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str
 
     Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default.
     """
-    from .checking import check_study
+    from .check import check_study
 
     problems = 0
     for line, bad in check_study(_chosen(config, directory), directory, cores, stages):
@@ -184,12 +184,12 @@ def run(
 
 def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list[str], *targets: str) -> int:
     if dry_run:
-        from .checking import work_of
+        from .check import work_of
 
         for line, _ in work_of(config, directory, cores, [*options, *targets], show="--verbose" in options):
             click.echo(line)
         return 0
-    from .launch import main as launch
+    from ..running.launch import main as launch
 
     return launch(["--configfile", str(config.resolve()), *options, "--directory", str(directory), *targets])
 
@@ -205,8 +205,8 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
     The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
     `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished.
     """
-    from .beginning import write_configuration
-    from .launch import MEASURES_ONLY
+    from ..running.launch import MEASURES_ONLY
+    from .init import write_configuration
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURES_ONLY] = "1"
@@ -241,7 +241,7 @@ def predict(
     It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it. The report
     says where the predicted surfaces and labels are. After an interruption, the same command resumes.
     """
-    from .beginning import write_prediction
+    from .init import write_prediction
 
     with TemporaryDirectory() as scratch:
         config = Path(scratch if dry_run else directory) / CONFIG
@@ -276,7 +276,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import hand_over
-    from .beginning import remember, remembered, write_bids
+    from .init import remember, remembered, write_bids
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
@@ -302,7 +302,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
 @click.argument("directory", type=FOLDER, default=Path())
 def status(directory: Path) -> None:
     """Show the progress of a study."""
-    from . import status as module
+    from ..running import status as module
 
     for line in module.status(directory):
         click.echo(line)
@@ -313,7 +313,7 @@ def status(directory: Path) -> None:
 @click.option("--print", "only_print", is_flag=True, help="Print the path of the report instead of opening it.")
 def view(directory: Path, only_print: bool) -> None:
     """Open the report of a study."""
-    from .status import report_of
+    from ..running.status import report_of
 
     report = report_of(directory)
     click.echo(report)

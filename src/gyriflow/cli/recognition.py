@@ -12,12 +12,12 @@ import numpy as np
 
 from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import doubts_of_scheme, layout_of
-from ..config.participants import Scan, covariates, read_scans
 from ..errors import InputError
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
-from ..parameters.settings import nearest
+from ..settings.base import nearest
+from ..study.participants import Scan, covariates, read_scans
 
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
 SURFACES = (".gii", ".vtk", ".vtp", ".stl", ".ply", ".obj")

@@ -15,7 +15,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
-from ..parameters.terms import AMPLITUDE, STIFFNESS_RATIO, Score
+from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
 from .placement import MEASURES, correlation, values_on
 from .shapes import Shape, against_real
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..parameters.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
+from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
 
 SIZES = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the real brain's is a measure."""

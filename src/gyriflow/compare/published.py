@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..parameters.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, FOLD_BANDS
+from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, FOLD_BANDS
 from .members import MODES
 
 

@@ -17,9 +17,9 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
 from ..io.tetmeshes import read_maps, read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
-from ..parameters.folding import FoldingParameters, parameters_from, require_maps
-from ..parameters.terms import ELEMENT_FIELDS, ZONE_NAMES
-from ..parameters.varying import Maps, value_at
+from ..settings.folding import FoldingParameters, parameters_from, require_maps
+from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
+from ..settings.varying import Maps, value_at
 from ..step import record_exit_code
 from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
 from .output import ZONES, log_event, say, warn, write_events

@@ -13,14 +13,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from ..code_hash import modules_behind, room_of
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..io.files import new_hdf5
-from ..io.sources import modules_behind, room_of
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps
+from ..settings.folding import FoldingParameters
+from ..settings.varying import Maps
 
-ROOMS = ("folding", "mechanics", "geometry", "parameters", "units")
+ROOMS = ("folding", "mechanics", "geometry", "settings", "units")
 """Where the modules lie on which the course of a run depends."""
 ARRAYS = ("positions", "last", "before_last", "stretch", "grown")
 

@@ -7,7 +7,7 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import EDGES, lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from ..parameters.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
+from ..settings.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
 MUCH_BETWEEN_PLANES = 0.05

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..geometry.triangles import Floats
-from ..parameters.terms import ELEMENTS_NEEDED
+from ..settings.terms import ELEMENTS_NEEDED
 from ..units import MM_PER_M
 from .contact import SelfContact
 from .domain import Domain

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps, value_at
+from ..settings.folding import FoldingParameters
+from ..settings.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 from .layers import Tissue
 from .zones import Zones

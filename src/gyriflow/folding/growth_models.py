@@ -3,7 +3,7 @@
 from functools import partial
 
 from ..geometry.diffusion import ALONE, Share
-from ..parameters.folding import FoldingParameters
+from ..settings.folding import FoldingParameters
 from .growth import Floats, GrowthByRates, GrowthInputs, GrowthModel
 from .steering import SteeredGrowth
 from .targets import GrowthToTargets

@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 from ..geometry.matching import barycentric, nearest_on
 from ..geometry.triangles import Floats, TriangleMesh, corners, unit, vertex_normals
-from ..parameters.folding import FoldingParameters
-from ..parameters.terms import CORTICAL_STEEPNESS
-from ..parameters.varying import Maps, value_at
+from ..settings.folding import FoldingParameters
+from ..settings.terms import CORTICAL_STEEPNESS
+from ..settings.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
 from .points import IntegrationPoints
 

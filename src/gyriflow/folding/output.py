@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..errors import StorageError
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps, value_at
+from ..settings.folding import FoldingParameters
+from ..settings.varying import Maps, value_at
 from ..units import week_tag
 from .growth import increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus

@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from ..geometry.triangles import Floats
 from ..mechanics.materials import Material
-from ..parameters.terms import LEFT_CONTACT, RIGHT_CONTACT
+from ..settings.terms import LEFT_CONTACT, RIGHT_CONTACT
 from ..units import M_PER_MM
 from .compilation import form_compiler
 from .contact import SelfContact

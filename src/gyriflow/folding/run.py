@@ -15,8 +15,8 @@ from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, read_positions, write_frame
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import Maps
+from ..settings.folding import FoldingParameters
+from ..settings.varying import Maps
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, progress_line, say, warn

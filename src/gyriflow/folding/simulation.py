@@ -12,18 +12,12 @@ from ..geometry.diffusion import Share
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
-from ..parameters.folding import FoldingParameters, require_maps
-from ..parameters.varying import Maps, value_at, value_range
+from ..settings.folding import FoldingParameters, require_maps
+from ..settings.varying import Maps, value_at, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact
-from .diagnosis import (
-    contact_row,
-    elements_through,
-    resolution_warning,
-    unconverged_warning,
-    worst_places,
-)
+from .diagnosis import contact_row, elements_through, resolution_warning, unconverged_warning, worst_places
 from .domain import Domain
 from .growth import Growth, GrowthInputs, StepStart
 from .growth_models import growth_model

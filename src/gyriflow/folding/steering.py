@@ -12,8 +12,8 @@ import numpy as np
 from ..errors import SolverError
 from ..geometry.tetrahedra import volumes_between
 from ..geometry.triangles import TriangleMesh, area_vectors
-from ..parameters.folding import FoldingParameters
-from ..parameters.varying import value_at
+from ..settings.folding import FoldingParameters
+from ..settings.varying import value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .growth import Floats, Growth, GrowthByRates, GrowthInputs, Size, StepStart, increments
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight

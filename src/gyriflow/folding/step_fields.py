@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats
-from ..parameters.folding import FoldingParameters
-from ..parameters.terms import ELEMENT_FIELDS
+from ..settings.folding import FoldingParameters
+from ..settings.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
 from .contact import SelfContact
 from .domain import Domain

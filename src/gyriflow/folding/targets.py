@@ -15,7 +15,7 @@ from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
-from ..parameters.folding import AXES, FoldingParameters
+from ..settings.folding import AXES, FoldingParameters
 from .growth import Floats, Growth, GrowthInputs, Size, StepStart
 from .layers import Tissue
 from .stress import unpacked

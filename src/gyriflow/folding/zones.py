@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
 from ..geometry.triangles import Floats, TriangleMesh, face_normals
-from ..parameters import terms
-from ..parameters.folding import FoldingParameters, NoGrowth
-from ..parameters.terms import Side
+from ..settings import terms
+from ..settings.folding import FoldingParameters, NoGrowth
+from ..settings.terms import Side
 from .layers import PialSearch
 
 Tags = dict[str, NDArray[np.int32]]

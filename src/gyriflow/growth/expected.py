@@ -12,7 +12,7 @@ from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, ver
 from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
-from ..parameters.growth import BEFORE_GW
+from ..settings.growth import BEFORE_GW
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces

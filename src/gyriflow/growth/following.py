@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from ..parameters.growth import SIZES
+from ..settings.growth import SIZES
 from .curves import Curve, Fit, fitted, tabulated, value
 
 THICKNESS = "thickness_mm"

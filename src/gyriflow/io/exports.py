@@ -14,7 +14,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
-from ..parameters.terms import MEASURED, STRUCTURES, Side
+from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, read_json, replaced, write_json, write_text
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, read_label_volume, write_label_volume

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
-from ..parameters.terms import STRUCTURES, Side
+from ..settings.terms import STRUCTURES, Side
 from .files import AnyPath, read_json, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)

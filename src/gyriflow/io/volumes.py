@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
-from ..parameters.terms import AffineSource
+from ..settings.terms import AffineSource
 from .files import AGAIN, AnyPath, reading, replaced, require_finite
 
 log = logging.getLogger(__name__)

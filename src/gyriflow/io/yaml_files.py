@@ -7,8 +7,8 @@ from typing import Any
 import yaml
 
 from ..errors import InputError
-from ..parameters.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
-from ..parameters.settings import validated
+from ..settings.base import validated
+from ..settings.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
 from .files import AnyPath, write_text
 
 MOST_VALUES = 1_000_000

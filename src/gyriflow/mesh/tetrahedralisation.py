@@ -12,7 +12,7 @@ from ..geometry.matching import crossing_faces
 from ..geometry.remeshing import remesh, untangle
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
-from ..parameters.terms import Mesher
+from ..settings.terms import Mesher
 from .meshers import run_mesher
 from .nodes import curve_edges
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, edges, mean_edge_length, unit, vertex_areas, vertex_normals
-from ..parameters.terms import CURVATURE_RADIUS_MM
+from ..settings.terms import CURVATURE_RADIUS_MM
 
 RESOLVED_RADII = 4.0
 """The shortest wavelength of folds that count as resolved, in radii. ∫ H² is short there by 3 % for folds a quarter as

@@ -15,7 +15,7 @@ from ..errors import MeshError
 from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
-from ..parameters.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
+from ..settings.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
 from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth

@@ -10,8 +10,8 @@ from scipy import stats
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
-from ..parameters.schemes import LabelScheme
-from ..parameters.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
+from ..settings.schemes import LabelScheme
+from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
 from .tables import BRAIN, OF_THE_ANALYSIS
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}

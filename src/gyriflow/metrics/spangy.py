@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints
-from ..parameters.terms import FOLD_BANDS, MEASURED, LastBand
+from ..settings.terms import FOLD_BANDS, MEASURED, LastBand
 from .laplace_beltrami import Modes, count_below, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.triangles import Floats, Ints
-from ..parameters.terms import MEASURED, SIDES
+from ..settings.terms import MEASURED, SIDES
 
 BRAIN = ["subject", "run", "week"]
 """The columns that name a brain."""

@@ -9,7 +9,7 @@ from ..errors import InputError, MeshError
 from ..geometry.matching import layer_thickness
 from ..geometry.tetrahedra import TetrahedralMesh, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
-from ..parameters.terms import CORTICAL_STEEPNESS
+from ..settings.terms import CORTICAL_STEEPNESS
 
 SAME_POINT_MM = 1e-3
 """Surfaces are written in single precision: vertices that are nearer are the same."""

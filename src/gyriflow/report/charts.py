@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..parameters.terms import FOLD_BANDS, MEASURED, SIDES
+from ..settings.terms import FOLD_BANDS, MEASURED, SIDES
 from .labels import METRICS, value_labels, with_unit
 from .pictures import region_colours
 from .style import (

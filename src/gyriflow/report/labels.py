@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
-from ..parameters.measures import SHAPE_MEASURES
+from ..quantities import SHAPE_MEASURES
 
 METRICS = {
     "volume": "volume",

@@ -13,7 +13,7 @@ from docutils.core import publish_parts
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from ..parameters.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
+from ..settings.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
 from .labels import METRICS, plain, week_label, with_unit
 from .tables import brain_table, html_table, predicted_table, span, standing, worth_table
 

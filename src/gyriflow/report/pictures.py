@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
-from ..parameters.measures import SHAPE_MEASURES, VertexMeasure
-from ..parameters.terms import ZONE_NAMES
+from ..quantities import SHAPE_MEASURES, VertexMeasure
+from ..settings.terms import ZONE_NAMES
 from ..units import CM2_PER_MM2
 from .labels import AREA_GROWTH, DEVIATIONS, DISPLACEMENT, DISTANCE, MAPS, column_label, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid

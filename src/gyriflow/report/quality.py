@@ -17,8 +17,8 @@ from ..geometry.alignment import angle_deg
 from ..geometry.deformations import voxel_index
 from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
-from ..parameters.measures import SHAPE_MEASURES
-from ..parameters.schemes import LabelScheme
+from ..quantities import SHAPE_MEASURES
+from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure, styled, wrap

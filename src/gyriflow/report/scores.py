@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
-from ..parameters.terms import MEASURED, SIDES
+from ..settings.terms import MEASURED, SIDES
 from .labels import MEASURES, SIMPLER_WAYS, parameter_label, plain, with_unit
 from .style import (
     FULL_WIDTH_IN,

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..parameters.terms import MEASURED, run_names
+from ..settings.terms import MEASURED, run_names
 
 SINGLE_COLUMN_IN = 3.5
 """Width of one column of a journal page, in inches."""

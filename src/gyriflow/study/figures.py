@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..parameters.terms import MOST_COLOURED, run_names
+from ..settings.terms import MOST_COLOURED, run_names
 from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
 from .records import Brain, Comparison, Measured, Simulation
 from .study import Study

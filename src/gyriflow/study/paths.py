@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from ..parameters.terms import SIDES, Side
+from ..settings.terms import SIDES, Side
 
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
-from ..config.brains import Brain as GivenBrain
-from ..config.runs import Run
 from ..io.yaml_files import SCHEMES
-from ..parameters.folding import VARYING
-from ..parameters.terms import MEASURED, Side
-from ..parameters.varying import Varying, files_of
+from ..settings.brains import Brain as GivenBrain
+from ..settings.folding import VARYING
+from ..settings.runs import Run
+from ..settings.terms import MEASURED, Side
+from ..settings.varying import Varying, files_of
 from ..units import week_tag
 from . import paths
 

@@ -5,14 +5,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
 
-from ..config.brains import Brain as GivenBrain
-from ..config.root import Config
-from ..config.runs import Compared, Run, changed, starts_of, variants
 from ..errors import InputError
-from ..parameters.folding import output_weeks
-from ..parameters.growth import BEFORE_GW, SIZES
-from ..parameters.terms import SIDES
+from ..io.yaml_files import SCHEMES
+from ..settings.brains import Brain as GivenBrain
+from ..settings.folding import output_weeks
+from ..settings.growth import BEFORE_GW, SIZES
+from ..settings.root import Config
+from ..settings.runs import Compared, Run, changed, starts_of, variants
+from ..settings.schemes import LabelScheme
+from ..settings.terms import SIDES
 from ..units import week_tag
+from .atlases import known_checksums
 from .paths import CURVES
 from .records import Brain, Calibration, Chain, Comparison, Origin, Simulation
 from .series import Series, series_of, several_subjects
@@ -28,7 +31,8 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     of a run that grows towards shapes are not folded either, as `Study.unreachable` says; InputError where no brain is
     refused and there are such.
     """
-    brains = {given.id: _brain(given, config, refused) for given in config.brains if given.id not in refused}
+    checksums = known_checksums(config)
+    brains = {given.id: _brain(given, config, refused, checksums) for given in config.brains if given.id not in refused}
     accepted, series = list(brains.values()), series_of(config, brains)
     foldings, members = _foldings(config, brains, series)
     chains = _chains(foldings, series, accepted)
@@ -56,8 +60,18 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     )
 
 
-def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain:
-    scheme = config.scheme(given) if given.has_labels else None
+def label_scheme(config: Config, brain: GivenBrain) -> LabelScheme:
+    """Return the scheme of a brain's labels; KeyError where it has none."""
+    settings = config.schemes.get(str(brain.scheme))
+    if settings is None:
+        return SCHEMES[str(brain.scheme)]
+    return LabelScheme(name=str(brain.scheme), **settings.model_dump())
+
+
+def _brain(
+    given: GivenBrain, config: Config, refused: Collection[str], checksums: Mapping[str, tuple[str, str]]
+) -> Brain:
+    scheme = label_scheme(config, given) if given.has_labels else None
     labels = {"labels": str(given.label_volume)} if scheme and scheme.cortex else {}
     all_white = config.metrics.white_surfaces == "all"
     whole = len(given.sides) == len(SIDES)
@@ -77,7 +91,7 @@ def _brain(given: GivenBrain, config: Config, refused: Collection[str]) -> Brain
         white_from=given.white_files or (labels if all_white else {}),
         regions_from=regions_from,
         has_regions=bool(regions_from) and (bool(with_regions) or regions == "named_sulci"),
-        checksums={path: config.known_files[path] for path in given.files if path in config.known_files},
+        checksums={path: checksums[path] for path in given.files if path in checksums},
     )
 
 

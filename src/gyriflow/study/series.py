@@ -4,10 +4,11 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..config.brains import Brain as GivenBrain
-from ..config.root import Config
-from ..config.runs import growth_series
 from ..errors import InputError
+from ..settings.brains import Brain as GivenBrain
+from ..settings.root import Config
+from ..settings.runs import growth_series
+from .atlases import used_atlases
 from .paths import MATCHED, REGISTERED
 from .records import Brain
 
@@ -90,7 +91,9 @@ def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
     description is believed.
     """
     names = growth_series([brain.given for brain in brains.values()], config.growth.brains)
-    believed = {str(f.path) for used in config.atlases for f in used.missing if used.atlas.series[f.series].matched}
+    believed = {
+        str(f.path) for used in used_atlases(config) for f in used.missing if used.atlas.series[f.series].matched
+    }
     matched, unmatched = {}, {}
     for name, ids in names.items():
         given = sorted((brains[brain].given for brain in ids), key=lambda brain: brain.week)

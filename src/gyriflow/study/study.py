@@ -6,13 +6,14 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from ..config.atlas import Atlas
-from ..config.root import Config
 from ..errors import InputError
 from ..io.exports import ExportedBrain, labels_of
-from ..parameters.terms import MEASURED, SIDES, Side
+from ..settings.atlas import Atlas
+from ..settings.root import Config
+from ..settings.terms import MEASURED, SIDES, Side
 from ..units import week_tag
 from . import paths
+from .atlases import used_atlases
 from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
 from .series import Series, several_subjects
 
@@ -230,7 +231,7 @@ class Study:
         """The atlas of each brain that is of one, by id."""
         return {
             used.atlas.brain_id(file.series, file.week): used.atlas
-            for used in self.config.atlases
+            for used in used_atlases(self.config)
             for file in used.files
         }
 

@@ -21,7 +21,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 from gyriflow.shipped import SHIPPED
 
 ATLAS = SCHEMES["spina-bifida-atlas"]

@@ -31,7 +31,7 @@ from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.parameters.terms import SIDES
+from gyriflow.settings.terms import SIDES
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data")) / "hemispheres"
 

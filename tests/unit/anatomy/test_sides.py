@@ -12,7 +12,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import area, corners, face_areas, merged, signed_volume
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 
 SIDED = LabelScheme(name="sided", cerebrum=(1, 2, 3, 4, 5), cortex=(3, 4), left=(1, 3), right=(2, 4))
 

@@ -12,7 +12,7 @@ from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 
 FOLDS_MM = 2.0
 

@@ -9,7 +9,7 @@ from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
 from gyriflow.metrics.measure import measure_white
-from gyriflow.parameters.schemes import LabelScheme
+from gyriflow.settings.schemes import LabelScheme
 
 PIAL_MM, WHITE_MM, VOXEL_MM = 20.0, 17.0, 0.8
 SCHEME = LabelScheme(name="two", cerebrum=(1, 2), cortex=(2,))

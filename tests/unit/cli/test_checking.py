@@ -7,9 +7,11 @@ import yaml
 from configurations import LABELLED
 from shapes import hemisphere
 
-from gyriflow.cli import checking
-from gyriflow.cli.checking import check_study, coarse_cortices, input_problems, plan, work_of
-from gyriflow.cli.cost import (
+from gyriflow.cli import check as checking
+from gyriflow.cli.check import check_study, coarse_cortices, input_problems, plan, work_of
+from gyriflow.io.surfaces import write_surface
+from gyriflow.io.volumes import LabelVolume, write_label_volume
+from gyriflow.running.cost import (
     ERROR,
     LEAST_SURFACE_MIB,
     SECONDS_PER_ELEMENT_AND_STEP,
@@ -18,12 +20,10 @@ from gyriflow.cli.cost import (
     linear_elements,
     surface_memory_mib,
 )
-from gyriflow.config import load
-from gyriflow.config.stages import MeshSettings
-from gyriflow.io.surfaces import write_surface
-from gyriflow.io.volumes import LabelVolume, write_label_volume
+from gyriflow.settings.stages import MeshSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
+from gyriflow.study.loading import load
 
 
 def problems(folder, **keys):

@@ -8,13 +8,14 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
-from gyriflow.cli import checking, launch
-from gyriflow.cli.checking import coarse_cortices
+from gyriflow.cli import check as checking
+from gyriflow.cli.check import coarse_cortices
 from gyriflow.cli.commands import main
-from gyriflow.config import load
 from gyriflow.errors import InputError
+from gyriflow.running import launch
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
+from gyriflow.study.loading import load
 
 
 @pytest.fixture

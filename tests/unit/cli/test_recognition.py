@@ -10,16 +10,16 @@ from click.testing import CliRunner
 from configurations import touched
 from shapes import sphere
 
-from gyriflow.cli import launch
-from gyriflow.cli.beginning import write_configuration
 from gyriflow.cli.commands import main
+from gyriflow.cli.init import write_configuration
 from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
-from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.running import launch
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
+from gyriflow.study.loading import load
 
 ATLAS = SHIPPED / "atlases" / "spina-bifida"
 LABELS = ATLAS / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapes import box_mesh
 
+from gyriflow.code_hash import modules_behind
 from gyriflow.folding import checkpoint
 from gyriflow.folding.checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from gyriflow.io.sources import modules_behind
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 VALUES = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 22.0]}
 

@@ -13,7 +13,7 @@ from gyriflow.geometry.triangles import corners, submesh
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import read_regions, write_tetrahedral_mesh
-from gyriflow.parameters.terms import LEFT, RIGHT
+from gyriflow.settings.terms import LEFT, RIGHT
 
 
 def beyond_fissure(points):

@@ -16,7 +16,7 @@ from gyriflow.folding.points import IntegrationPoints
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import NODES
 from gyriflow.geometry.tetrahedra import boundary_faces
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 
 def search_of(mesh):

@@ -19,7 +19,7 @@ from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.run import shortened_steps
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 
 RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
 

@@ -15,7 +15,7 @@ from gyriflow.folding.output import growth_along
 from gyriflow.folding.steering import SteeredStep, free_growth, joined, missed_curves, steered_rates
 from gyriflow.folding.stress import packed
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.parameters.folding import parameters_from
+from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
 GROWING = {"no_growth": {"kind": "none"}, "support": "free", "thickness_mm": 2.0}

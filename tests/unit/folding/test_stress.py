@@ -26,7 +26,7 @@ from gyriflow.folding.stress import left_stretch, relaxed
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import MATERIALS, Material, NeoHookean
-from gyriflow.parameters.terms import FREE, MaterialName
+from gyriflow.settings.terms import FREE, MaterialName
 
 MU, K = 300.0, 300.0 * NeoHookean(0.45).bulk_to_shear_ratio
 RNG = np.random.default_rng(3)

@@ -9,18 +9,8 @@ from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.checks import refuse_impossible, zone_report, zone_warnings
 from gyriflow.folding.zones import brain_box, cell_tags, inside_ellipsoid, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, signed_volumes
-from gyriflow.parameters.folding import NoGrowth, parameters_from
-from gyriflow.parameters.terms import (
-    BRIDGE,
-    CLAMPED,
-    CORE,
-    CORTEX,
-    LEFT,
-    LEFT_CONTACT,
-    MEDIAL_WALL,
-    RIGHT,
-    RIGHT_CONTACT,
-)
+from gyriflow.settings.folding import NoGrowth, parameters_from
+from gyriflow.settings.terms import BRIDGE, CLAMPED, CORE, CORTEX, LEFT, LEFT_CONTACT, MEDIAL_WALL, RIGHT, RIGHT_CONTACT
 
 ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 

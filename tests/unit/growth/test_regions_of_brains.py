@@ -7,7 +7,6 @@ import pytest
 from shapes import ellipsoid, scaling
 
 from gyriflow.anatomy.pial import from_labels
-from gyriflow.config.atlas import SULCI
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.deformations import Deformation, transform_points
@@ -28,6 +27,7 @@ from gyriflow.growth.diffeomorphic import register
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.metrics.curvature import curvature
+from gyriflow.settings.atlas import SULCI
 
 BRAIN = ellipsoid([16.0, 22.0, 14.0])
 

@@ -18,7 +18,7 @@ from gyriflow.metrics.norms import (
     structure_volumes,
 )
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
-from gyriflow.parameters.terms import SPREAD_UNKNOWN
+from gyriflow.settings.terms import SPREAD_UNKNOWN
 
 FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))

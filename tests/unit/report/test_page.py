@@ -9,7 +9,6 @@ import pytest
 from markupsafe import Markup
 
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.parameters.terms import SPREAD_UNKNOWN
 from gyriflow.report.page import (
     brains_table,
     caption_html,
@@ -25,6 +24,7 @@ from gyriflow.report.page import (
     worth_told,
 )
 from gyriflow.report.tables import html_table, resolution_over_steps
+from gyriflow.settings.terms import SPREAD_UNKNOWN
 from gyriflow.shipped import SHIPPED
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"

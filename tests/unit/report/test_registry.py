@@ -11,10 +11,10 @@ from matplotlib.figure import Figure as Drawing
 from scripts import SCRIPTS, run_script
 from shapes import box
 
-from gyriflow.config import load
 from gyriflow.io.files import write_json
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, figures_of
+from gyriflow.study.loading import load
 from gyriflow.units import SECONDS_PER_GW
 
 WORDS = yaml.safe_load((SCRIPTS.parent / "report" / "figures.yaml").read_text())

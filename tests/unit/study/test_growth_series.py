@@ -4,12 +4,12 @@ import pytest
 from configurations import LABELLED, both_kinds, labelled, series_for, series_of, study, touched
 from shapes import sphere
 
-from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, flipped
 from gyriflow.io.surfaces import write_surface
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
+from gyriflow.study.loading import load
 
 SURFACE = sphere(30.0, 2)
 RUN = {"start": "a", "folding": {"end_week": 23}}

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from gyriflow.config import load
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
+from gyriflow.study.loading import load
 from gyriflow.study.paths import CURVES, FOLDING
 
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"

@@ -1,0 +1,246 @@
+"""Check a study before it is run: its configuration, its files, what will run, and what that will take."""
+
+import logging
+import math
+import os
+import shutil
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import chdir
+from pathlib import Path
+from textwrap import fill
+from typing import NamedTuple
+
+from ..anatomy.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
+from ..anatomy.layout import doubts_of_scheme, layout_of
+from ..anatomy.plausible import require_plausible_size
+from ..errors import GyriflowError, InputError
+from ..io.downloads import require_checksums
+from ..io.volumes import names_unit, read_label_volume
+from ..io.yaml_files import read_keys
+from ..running.cost import ERROR, LEAST_SURFACE_MIB, SECONDS_PER_JOB, folding_needs, surface_memory_mib
+from ..running.launch import main as launch
+from ..running.status import as_duration
+from ..settings.brains import Brain
+from ..settings.root import Config
+from ..settings.schemes import LabelScheme
+from ..settings.terms import ELEMENTS_NEEDED
+from ..settings.varying import Varying, curve_at
+from ..study.atlases import known_checksums, used_atlases
+from ..study.loading import load
+from ..study.resolve import label_scheme, resolve
+from ..study.study import Study
+from .recognition import scheme_fits
+
+NAMED_RUNS = 6
+THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
+"""Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
+FOLDINGS = ("simulate", "simulate_member")
+
+
+class PlannedJob(NamedTuple):
+    """A job of a dry run, with Snakemake's reason to run it."""
+
+    rule: str
+    wildcards: dict[str, str]
+    threads: int
+    reason: str
+
+
+def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
+    """Yield lines on a study and its files, and on what would run up to some stages, each with whether it is a problem.
+
+    InputError for a configuration that is not valid, with all its problems.
+    """
+    config = load(read_keys(path), path.resolve().parent)
+    study = resolve(config)
+    yield f"{path}: {_contents(study)}", False
+    problems = list(input_problems(config))
+    yield from ((f"  {line}", bad) for line, bad in problems)
+    yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
+    volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
+    if not any(bad for _, bad in problems) and (unnamed := sum(not names_unit(volume) for volume in volumes)):
+        yield (
+            f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm",
+            False,
+        )
+    if missing := sum(len(atlas.missing) for atlas in used_atlases(config)):
+        yield f"  {missing} atlas file{'s are' if missing > 1 else ' is'} missing and will be downloaded", False
+    if not any(bad for _, bad in problems):
+        yield "  input files: all are readable and fit their label schemes", False
+        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
+
+
+def work_of(
+    path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
+) -> Iterator[tuple[str, bool]]:
+    """Yield lines on what would run and what it takes, each with whether that is more than what is there.
+
+    `further` are arguments of Snakemake's. With `show`, it lists every job on the terminal first.
+    """
+    jobs = plan(path, directory, further, show=show)
+    if not jobs:
+        yield "nothing to run: everything is up to date", False
+        return
+    yield f"to run: {len(jobs)} step{'s' if len(jobs) > 1 else ''}", False
+    rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
+    for job in jobs:
+        rules_by_reason[job.reason.partition(":")[0]][job.rule] += 1
+    for reason, rules in rules_by_reason.items():
+        words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
+        yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
+    study = resolve(load(read_keys(path), path.resolve().parent))
+    yield from _needs(jobs, study, directory, cores)
+
+
+def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
+    """Return the jobs that Snakemake would run, without targets; with `show` it lists them on the terminal.
+
+    Ends the program as Snakemake does where it refuses.
+    """
+    jobs = []
+
+    def take(record: logging.LogRecord) -> bool:
+        job = vars(record)
+        if job.get("event") == "job_info" and job["output"]:
+            jobs.append(PlannedJob(job["rule_name"], dict(job["wildcards"] or {}), job["threads"], job["reason"]))
+        return show or record.levelno >= logging.ERROR
+
+    # Snakemake makes folders even where it only looks
+    state = directory.resolve() / ".snakemake"
+    made = [path for path in (*reversed(state.parents), state) if not path.exists()]
+    logger = logging.getLogger("snakemake.logging")
+    logger.addFilter(take)
+    # it also goes into the working directory
+    with chdir(Path.cwd()):
+        where = ["--configfile", str(config.resolve()), "--directory", str(directory.resolve())]
+        code = launch([*where, "--dry-run", *further])
+    logger.removeFilter(take)
+    if made and made[0].exists():
+        shutil.rmtree(made[0])
+    if code:
+        sys.exit(code)
+    return jobs
+
+
+def _contents(study: Study) -> str:
+    runs = list(study.config.runs)
+    names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
+    brains, folded = len(study.brains), len(study.folded)
+    parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
+    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
+    parts += [f"{len(compared.members)} of study {name}" for name, compared in study.comparisons.items()]
+    if study.calibration is not None:
+        parts.append(f"{len(study.calibration.rounds)} of the calibration")
+    return ", ".join(parts)
+
+
+def coarse_cortices(study: Study) -> Iterator[str]:
+    """Yield for each run, before anything is solved, whether its mesh is too coarse for its cortex at the start."""
+    mesh = study.config.mesh
+    needed = ELEMENTS_NEEDED[mesh.order]
+    for one in study.folded:
+        thickness = one.settings.thickness_mm
+        # maps and measured thicknesses are known once the surface is made
+        if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
+            continue
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, one.start.week)
+        if (elements := through / mesh.surface_edge_mm) < 0.99 * needed:
+            enough_mm = math.floor(100 * through / needed) / 100
+            yield (
+                f"run {one.run} from {one.start.id}: about {elements:.1f} elements through the cortex, "
+                f"{needed:g} are needed; mesh.surface_edge_mm: {enough_mm:g} would be fine enough"
+            )
+
+
+def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
+    """Yield what is wrong or doubtful about the input files of the brains, and whether it is wrong.
+
+    Wrong are files that cannot be read and labels of another scheme, doubtful is a size that is not that of the week.
+    """
+    for brain in config.brains:
+        try:
+            for doubt in _check_files(brain, config):
+                yield f"warning: brain {brain.id}: {doubt}", False
+        except GyriflowError as error:
+            yield f"brain {brain.id}: {error}", True
+
+
+def _check_files(brain: Brain, config: Config) -> Iterator[str]:
+    checksums = known_checksums(config)
+    files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
+    require_checksums({path: checksums[path] for path in files})
+    volume = brain.label_volume
+    if volume is not None and Path(volume).is_file():
+        yield from _check_labels(volume, brain, label_scheme(config, brain))
+    for file in brain.files:
+        # files of atlases may be missing yet
+        if file != volume and Path(file).is_file():
+            # takes half a second, which label volumes need not wait for
+            from ..io.surfaces import read_one_hemisphere, read_surface
+
+            if brain.hemisphere is None:
+                read_surface(file)
+            else:
+                read_one_hemisphere(file, brain.hemisphere.side)
+
+
+def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[str]:
+    memory = surface_memory_mib(volume, brain.week)
+    if memory > max(_memory_mib(), LEAST_SURFACE_MIB):
+        yield f"needs about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: resample it to larger voxels"
+    read = read_label_volume(volume, brain.affine_from, cropped=True)
+    # the wall of a hemisphere that is alone may have no cortex
+    whole = brain.hemisphere is None
+    cerebrum = read_cerebrum(read.labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if whole else 0.0)
+    yield from cerebrum.warnings
+    if whole and (doubts := list(doubts_of_scheme(layout_of(read.labels), scheme))):
+        fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
+        if fitting:
+            problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme.name}"
+            raise InputError(problem, path=volume, found="; ".join(doubts))
+        yield from doubts
+    if whole:
+        yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
+
+
+def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
+    foldings = [
+        (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
+        for job in jobs
+        if job.rule in FOLDINGS
+    ]
+    folding_s = sum(needs.seconds for _, needs in foldings)
+    other_s = SECONDS_PER_JOB * (len(jobs) - len(foldings))
+    longest_s = max((needs.seconds / min(job.threads, cores) for job, needs in foldings), default=0.0)
+    seconds = max((folding_s + other_s) / cores, longest_s)
+    hours = (folding_s + other_s) / 3600
+    on = f"{cores} core{'s' if cores > 1 else ''} without other load"
+    yield f"time    about {as_duration(seconds)} on {on}, within a factor of {ERROR:g}", False
+    of_folding = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
+    yield f"work    about {hours:.2g} core hours{of_folding}", False
+    at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
+    memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
+    disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
+    # the memory of this machine says nothing of a cluster's
+    here = cores <= (os.cpu_count() or 1)
+    yield from _fits("memory", memory or LEAST_SURFACE_MIB / 4, _memory_mib() if here else None)
+    there = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    yield from _fits("disk", disk, shutil.disk_usage(there).free / 2**20)
+
+
+def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
+    if there_mib is None:
+        yield f"{name:<7} about {_gib(mib)}, for the foldings that run at the same time", False
+    else:
+        bad = mib > there_mib
+        yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} available{', which is too little' if bad else ''}", bad
+
+
+def _memory_mib() -> float:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**20
+
+
+def _gib(mib: float) -> str:
+    return f"{mib / 1024:.1f} GB" if mib >= 100 else f"{mib:.0f} MB"

@@ -1,0 +1,71 @@
+"""The code that a program depends on: the modules of this package that it imports, directly or through others."""
+
+import hashlib
+import re
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent
+IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^)]*\)|[^\n]*)", re.MULTILINE)
+"""An import: the dots and the module that it is from, and what it names. Parsing all files would take half a second."""
+
+
+def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
+    """Return a hash of all modules of this package that a Python program imports.
+
+    Further `modules` are those that the program imports by a name that it is given. Of its functions, a single one
+    counts where each job calls another one. A parameter of a rule, it reruns what depends on a change of the code.
+    """
+    files = modules_behind(program, function).union(modules, *map(modules_behind, modules))
+    named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
+    return hashlib.sha256(repr(named).encode()).hexdigest()[:12]
+
+
+def modules_behind(program: Path, function: str | None = None) -> set[Path]:
+    """Return the files of all modules of this package that a Python program imports, directly or through others."""
+    reached: set[Path] = set()
+    waiting = set(imported_modules(program, function))
+    while waiting:
+        module = waiting.pop()
+        reached.add(module)
+        waiting |= imported_modules(module) - reached
+    return reached - {program}
+
+
+@cache
+def imported_modules(source: Path, function: str | None = None) -> frozenset[Path]:
+    """Return the files of the modules of this package that a source file imports, at the top or inside functions.
+
+    With a `function`, other functions of the file do not count.
+    """
+    inside = source.resolve().is_relative_to(PACKAGE)
+    here = [PACKAGE.name, *source.resolve().relative_to(PACKAGE).parts[:-1]] if inside else []
+    code = source.read_text()
+    if function is not None:
+        blocks = re.split(r"\n(?=[\w@])", code)
+        code = "\n".join(block for block in blocks if not re.match(rf"(?:def|class) (?!{function}\b)", block))
+    names: list[str] = []
+    for dots, module, imported in IMPORT.findall(code):
+        base = here[: len(here) - len(dots) + 1] if dots else []
+        start = ".".join([*base, module] if module else base)
+        names += [start, *(f"{start}.{name}" if start else name for name in re.findall(r"[\w.]+", imported))]
+    return frozenset(file for name in names for file in _files_of(name))
+
+
+def room_of(module: Path) -> str:
+    """Return the room that a source file belongs to: the folder, or the single module, directly under the package."""
+    return module.resolve().relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+@cache
+def _files_of(name: str) -> list[Path]:
+    package, *parts = name.split(".")
+    if package != PACKAGE.name:
+        return []
+    around = [PACKAGE.joinpath(*parts[:count], "__init__.py") for count in range(len(parts) + 1)]
+    return [path for path in (*around, PACKAGE.joinpath(*parts).with_suffix(".py")) if path.is_file()]
+
+
+@cache
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,8 +1,0 @@
-"""`python -m gyriflow.config > config/schema.json` writes the JSON schema of all keys, for editors."""
-
-import json
-
-from .root import Config
-
-if __name__ == "__main__":
-    print(json.dumps(Config.model_json_schema(), indent=1, ensure_ascii=False))

@@ -1,0 +1,1 @@
+"""Starting Snakemake and following its jobs: launch, terminal, status, provenance, cost, logs, code hashes."""

@@ -1,0 +1,1 @@
+"""Typed models of the configuration. They read no files."""

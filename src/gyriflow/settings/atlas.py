@@ -1,0 +1,214 @@
+"""Atlases: the keys of an `atlas.yaml`, and of the section by which a study uses one."""
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from string import Formatter
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from ..shipped import SHIPPED
+from .base import Problem, Settings, located, nearest, refused
+from .terms import AffineSource, Coordinates
+from .varying import Week
+
+ATLASES = SHIPPED / "atlases"
+"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
+SULCI = ATLASES / "spina-bifida"
+"""The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
+DOWNLOADS = Path("resources", "atlases")
+"""Folder in the working directory for the files of atlases whose section names no other."""
+
+FileKey = Literal["labels", "image", "left", "right", "pial"]
+SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
+"""The keys of files that give a surface, of which a series has one set; `image` goes with labels."""
+WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
+"""How a week may be written in a file's name, as `05.2f`."""
+NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+
+
+def _names_weeks(pattern: str) -> bool:
+    try:
+        fields = [(name, kind, flag) for _, name, kind, flag in Formatter().parse(pattern) if name is not None]
+    except ValueError:
+        return False
+    return bool(fields) and all(
+        name == "week" and flag is None and re.fullmatch(WEEK_FORMAT, kind or "") for name, kind, flag in fields
+    )
+
+
+def _require_weeks_once(weeks: Iterable[Any]) -> None:
+    listed = [str(week) for week in weeks]
+    if not listed or len(set(listed)) < len(listed):
+        raise ValueError("should name one week or more, each once")
+
+
+class AtlasLicence(Settings):
+    """Terms of use, shown before any file is fetched."""
+
+    name: str
+    """Name of the licence, as `CC0 1.0`."""
+    terms: str
+    """Summary in a sentence or two."""
+    url: str | None = None
+    """Address of the full text."""
+    accept: bool = False
+    """Whether users have to accept terms that are narrow or unclear."""
+
+
+class AtlasReference(Settings):
+    """What to cite."""
+
+    citation: str
+    """Authors, title, journal and year."""
+    doi: str | None = None
+    """Digital object identifier."""
+    url: str | None = None
+    """Page of the atlas."""
+
+
+class AtlasFileRecord(Settings):
+    """Size and checksum of a file."""
+
+    bytes: int | None = Field(None, ge=1)
+    """Size of the file."""
+    sha256: str | None = Field(None, pattern="^[0-9a-f]{64}$")
+    """SHA-256; `null`: unknown, the file only has to be readable."""
+
+
+class AtlasSeries(Settings):
+    """One population by week."""
+
+    population: str = Field(min_length=1)
+    """Name of these brains in figures and tables."""
+    scheme: str | None = None
+    """Meaning of the labels, as for `brains`; required with `labels`."""
+    affine_from: AffineSource = "auto"
+    """As for `brains`, with `labels`."""
+    coordinates: Coordinates = "auto"
+    """As for `brains`, with surfaces."""
+    matched: bool = False
+    """Whether surfaces of all weeks have the same vertices; believed until the files are there."""
+    files: dict[FileKey, str]
+    """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels`
+    and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
+    weeks: dict[Week, dict[FileKey, AtlasFileRecord]]
+    """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
+
+    @field_validator("weeks", mode="before")
+    @classmethod
+    def _weeks_without_records(cls, value: Any) -> Any:
+        if isinstance(value, list | dict):
+            _require_weeks_once(value)
+        if isinstance(value, list):
+            return {week: {} for week in value}
+        return {week: records or {} for week, records in value.items()} if isinstance(value, dict) else value
+
+    @field_validator("files")
+    @classmethod
+    def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
+        if set(files) - {"image"} not in SOURCES_OF_SERIES or ("image" in files and "labels" not in files):
+            raise ValueError("should have labels (and perhaps image), or left and right, or pial")
+        for pattern in files.values():
+            if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
+                raise ValueError("should be paths below the folder of the atlas")
+            if not _names_weeks(pattern):
+                raise ValueError("should have {week} in each path, for the gestational week")
+        return files
+
+    def problems(self) -> Iterator[Problem]:
+        if ("labels" in self.files) != (self.scheme is not None):
+            yield Problem("is needed with labels, whose meaning it is, and with nothing else", ("scheme",))
+        if self.matched and "labels" in self.files:
+            yield Problem("has no meaning with labels, which have no vertices", ("matched",))
+
+    @property
+    def needed(self) -> list[FileKey]:
+        # keys of the files that a week must have
+        return [key for key in self.files if key != "image"]
+
+
+class Atlas(Settings):
+    """The file `atlas.yaml` of an atlas: one in the folder `atlases`, or yours."""
+
+    name: str = Field(pattern=NAME)
+    """Name, with which ids of its brains begin."""
+    title: str
+    """What it is."""
+    licence: AtlasLicence
+    """Terms of use."""
+    reference: AtlasReference | None = None
+    """What to cite."""
+    url: str | None = Field(None, pattern="^https?://")
+    """Address of the files' root; `null`: not online."""
+    folder: str | None = None
+    """Folder with local files, relative to `atlas.yaml`."""
+    series: dict[Annotated[str, Field(pattern=NAME)], AtlasSeries] = Field(min_length=1)
+    """Populations by name, each a series over the weeks."""
+
+    def brain_id(self, series: str, week: float) -> str:
+        """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
+        return "-".join([self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"])
+
+
+def shipped_atlases() -> list[str]:
+    """Return the names of the atlases that come with gyriflow."""
+    return sorted(path.parent.name for path in ATLASES.glob("*/atlas.yaml"))
+
+
+# in a study
+
+
+class AtlasSettings(Settings):
+    """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
+
+    `atlas: NAME` is short for a section; several atlases are a list. Missing files are fetched when a stage needs
+    them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+
+    name: str
+    """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the `atlas.yaml` of your own."""
+    series: str | tuple[str, ...] | None = None
+    """Series to use; `null`: all."""
+    weeks: tuple[Week, ...] | None = None
+    """Weeks to use, as in the file names; `null`: all. [GW]"""
+    images: bool = False
+    """Whether T2-weighted volumes are shown with the surfaces' outlines."""
+    folder: str | None = None
+    """Folder where files are found by name, at any depth, and missing ones are put; `null`:
+    `resources/atlases/NAME` in the working directory."""
+    accept_licence: bool = False
+    """Whether you accept the licence, where the `atlas.yaml` asks for it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
+
+    @field_validator("name")
+    @classmethod
+    def _known_name(cls, name: str) -> str:
+        if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
+            raise refused(f"found {name!r}; {nearest(name, shipped)} An atlas of your own is an atlas.yaml")
+        return name
+
+    @field_validator("weeks")
+    @classmethod
+    def _some_weeks_once(cls, weeks: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if weeks is not None:
+            _require_weeks_once(weeks)
+        return weeks
+
+    @property
+    def description(self) -> Path:
+        return Path(self.name) if self.name.endswith((".yaml", ".yml")) else ATLASES / self.name / "atlas.yaml"
+
+    def located(self, base_dir: Path) -> "AtlasSettings":
+        """Return the section with absolute paths."""
+        paths = {} if self.folder is None else {"folder": str(located(base_dir, self.folder))}
+        if self.description == Path(self.name):
+            paths["name"] = str(located(base_dir, self.name))
+        return self.model_copy(update=paths)

@@ -1,0 +1,198 @@
+"""The brains of a study: the data of their pial surfaces, and regions given on them."""
+
+from collections.abc import Iterator
+
+from pydantic import Field
+
+from .base import InputFile, Problem, Settings
+from .schemes import Label
+from .synthetic import ShapeSettings
+from .terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
+from .varying import FileOrPair, Week, files_of
+
+SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
+"""The keys of which a brain has exactly one."""
+
+VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
+"""How the names of volumes end."""
+
+HEMISPHERE_LABELS, HEMISPHERE_SURFACE = "labels of a hemisphere", "a hemisphere's surface"
+OF_LABELS = ("labels", HEMISPHERE_LABELS)
+OF_SURFACES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
+MEANINGS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("scheme", "image", "affine_from"), OF_LABELS),
+    "coordinates": OF_SURFACES,
+    "white": OF_SURFACES,
+    "population": (*OF_LABELS, *OF_SURFACES),
+}
+"""Keys that make sense only with some sources."""
+
+
+class HemisphereFiles(Settings):
+    """The pial surfaces of both hemispheres: GIFTI, FreeSurfer, VTK, STL, PLY or OBJ files."""
+
+    left: InputFile
+    """File of the left hemisphere."""
+    right: InputFile
+    """File of the right hemisphere."""
+
+
+class OneHemisphere(Settings):
+    """The only hemisphere of a brain, after hemispherectomy or where the data has one side."""
+
+    file: InputFile
+    """Its closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other
+    hemisphere."""
+    side: Side
+    """Which hemisphere it is."""
+
+
+class Brain(Settings):
+    """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial` and `shape`."""
+
+    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME)
+    """Name in paths and tables: letters, digits, - _ ."""
+    week: Week
+    """Gestational age. [GW]"""
+    population: str | None = Field(None, min_length=1)
+    """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
+    subject: str | None = Field(None, min_length=1)
+    """Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared
+    with scans of their subject first."""
+    covariates: dict[str, str] = Field({})
+    """What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
+    labels: InputFile | None = None
+    """Tissue label volume (NIfTI or MGZ)."""
+    image: InputFile | None = None
+    """T2-weighted volume (NIfTI) of the labels, shown in a figure."""
+    scheme: str | None = None
+    """What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key
+    `schemes`. Needed with `labels`."""
+    affine_from: AffineSource = "auto"
+    """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
+    hemispheres: HemisphereFiles | None = None
+    """Surface files of both hemispheres."""
+    hemisphere: OneHemisphere | None = None
+    """The only hemisphere, as a surface or as labels."""
+    pial: InputFile | None = None
+    """Closed surface of the whole brain."""
+    white: FileOrPair | None = None
+    """White surface in the same coordinates, for the cortical thickness: a file, with `hemispheres` a list of the
+    left and the right one."""
+    coordinates: Coordinates = "auto"
+    """Axes of surface files; `auto` finds any pose."""
+    shape: ShapeSettings | None = None
+    """A simple geometry in place of a brain."""
+
+    @property
+    def source(self) -> str:
+        return next(name for name in SOURCES if self.gives(name))
+
+    @property
+    def synthetic(self) -> bool:
+        return self.shape is not None
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        return SIDES if self.hemisphere is None else (self.hemisphere.side,)
+
+    @property
+    def label_volume(self) -> str | None:
+        if self.hemisphere is not None and self.scheme is not None:
+            return self.hemisphere.file
+        return self.labels
+
+    @property
+    def has_labels(self) -> bool:
+        return self.label_volume is not None
+
+    @property
+    def has_vertices(self) -> bool:
+        # they may be those of other brains too
+        return not self.has_labels and self.source in ("hemispheres", "hemisphere", "pial")
+
+    @property
+    def files(self) -> list[str]:
+        sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
+        one = None if self.hemisphere is None else self.hemisphere.file
+        return [path for path in (self.labels, self.pial, *sides, one) if path is not None]
+
+    @property
+    def white_files(self) -> dict[str, str]:
+        files = files_of(self.white)
+        return dict(zip(SIDES if len(files) == 2 else ("whole",), files, strict=False))
+
+    @property
+    def _kind(self) -> str:
+        if self.hemisphere is None:
+            return self.source
+        volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
+        return HEMISPHERE_LABELS if volume else HEMISPHERE_SURFACE
+
+    def problems(self) -> Iterator[Problem]:
+        given = [key for key in SOURCES if self.gives(key)]
+        if not given and self.image is not None:
+            yield Problem("gyriflow does not segment images; give a label volume under labels", ("image",))
+        elif len(given) != 1:
+            text = f"found {' and '.join(given) or 'none'} as its source; expected exactly one of {', '.join(SOURCES)}"
+            yield Problem(text)
+        else:
+            for key, kinds in MEANINGS.items():
+                if key in self.model_fields_set and self._kind not in kinds:
+                    yield Problem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
+            pair = self._kind == "hemispheres"
+            if self.white is not None and self._kind in OF_SURFACES and ("left" in self.white_files) != pair:
+                yield Problem("should have as many files as there are pial surfaces", ("white",))
+            if self._kind in OF_LABELS and self.scheme is None:
+                yield Problem("is missing; it says what the labels mean", ("scheme",))
+
+
+# regions
+
+
+class SurfaceRegions(Settings):
+    """Regions at the vertices of a hemisphere's surface."""
+
+    labels: InputFile
+    """GIFTI label file (.label.gii), a label for each vertex."""
+    surface: InputFile
+    """The surface, in the coordinates of the brain's own files."""
+
+
+class GivenRegions(Settings):
+    """Regions of a brain, from a label volume or from labels of both hemispheres' surfaces.
+
+    Left and right regions of one name are compared. Other brains get the regions of the brain nearest in week.
+    """
+
+    volume: InputFile | None = None
+    """Label volume (NIfTI) in the space of the brain's `labels`, with regions along the cortex."""
+    left: SurfaceRegions | None = None
+    """Instead of a volume, labels of the left hemisphere."""
+    right: SurfaceRegions | None = None
+    """Labels of the right hemisphere."""
+    names: dict[Label, str] = Field({})
+    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region,
+    unnamed ones none. Needed with a volume; else the label files' names count."""
+
+    def problems(self) -> Iterator[Problem]:
+        sides = [side for side in SIDES if self.gives(side)]
+        if (self.volume is not None) == bool(sides):
+            yield Problem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
+        elif len(sides) == 1:
+            missing = "right" if sides == ["left"] else "left"
+            yield Problem("is missing; both hemispheres need labels", (missing,))
+        if self.volume is not None and not self.names:
+            yield Problem("is missing; it names the regions of the volume", ("names",))
+
+    @property
+    def files(self) -> dict[str, str]:
+        if self.volume is not None:
+            return {"volume": self.volume}
+        pairs = {"left": self.left, "right": self.right}
+        return {
+            f"{side}_{kind}": getattr(pair, kind)
+            for side, pair in pairs.items()
+            if pair is not None
+            for kind in ("labels", "surface")
+        }

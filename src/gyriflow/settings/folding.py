@@ -1,0 +1,243 @@
+"""The mechanical model, its parameters and its numerics: settings of a study, parameters of a run."""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
+
+from ..errors import InputError
+from .base import Problem, Settings, line, validated
+from .growth import SIZES, Growth
+from .terms import FieldName, MaterialName, Side
+from .varying import Floats, Maps, Varying, VaryingNumber, Week, bounds_of, map_of, require_bounds, value_range, varying
+
+
+def _memory(value: Any) -> float:
+    """Return a time in GW from a number or `infinite`."""
+    if value == "infinite":
+        return math.inf
+    try:
+        time = float(value)
+    except (TypeError, ValueError):
+        time = -1.0
+    if not time >= 0 or isinstance(value, bool):
+        raise ValueError("should be 0 or more, or 'infinite'")
+    return time
+
+
+Memory = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    BeforeValidator(_memory, json_schema_input_type=Annotated[float, Field(ge=0)] | Literal["infinite"]),
+    PlainSerializer(lambda time: "infinite" if math.isinf(time) else time, when_used="json"),
+]
+Share = Annotated[float, Field(ge=-1, le=1)]
+Fraction = Annotated[float, Field(gt=0, le=2)]
+AXES = ("x", "y", "z")
+"""Which end the names of the maps of positions."""
+
+
+class Contact(Settings):
+    """Contact between folds, and between the two hemispheres."""
+
+    kind: Literal["global", "planes", "none"] = "global"
+    """`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's
+    plane, but folds may cross each other (the paper); `none`: no contact."""
+    distance_mm: float | None = Field(None, gt=0, le=5)
+    """With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at most the
+    smallest gap at the start. [mm]"""
+    gap_mm: float = Field(2.5, gt=0, le=20)
+    """Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows between
+    them. [mm]"""
+
+
+class NoGrowth(Settings):
+    """The ellipsoid inside which nothing grows, and whose pial facets are clamped with `support: ellipsoid`."""
+
+    kind: Literal["ellipsoid", "none"] = "ellipsoid"
+    """`ellipsoid`: nothing grows in it or in the bridge between hemispheres; `none`: all tissue grows."""
+    shift: tuple[Share, Share] = (0.05, -0.15)
+    """Shift of its centre from the middle, anterior and superior. [extents along Y, Z]"""
+    semi_axes: tuple[Fraction, Fraction, Fraction] = (0.35, 0.40, 0.50)
+    """Semi-axes along X, Y, Z. [extents]"""
+
+
+class Solver(Settings):
+    """The nonlinear and the linear solver."""
+
+    newton_tolerance: float = Field(1e-4, gt=0, lt=1)
+    """Residual at which Newton stops, over its value at u = 0."""
+    max_newton: int = Field(20, ge=1, le=200)
+    """Newton iterations without progress before a step is halved."""
+    max_halvings: int = Field(6, ge=0, le=30)
+    """Halvings of the time step before the run ends."""
+
+
+class FoldingSettings(Settings):
+    """The mechanical model, its parameters and its numerics.
+
+    The defaults are the paper's, except `contact` (`planes` in the paper) and elements (linear in the paper: `mesh:
+    {order: 1}`).
+    """
+
+    preset: Literal["fetalfoldsim", "measured", "expected"] | None = None
+    """Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`:
+    the paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have;
+    `expected`: to those that the growth of another population, such as an atlas, would give it."""
+    end_week: float = Field(gt=15, le=45)
+    """Gestational age at which the simulation ends. [GW]"""
+    step_s: float = Field(43200.0, gt=0, le=604800)
+    """Time step; shortened where an output week comes first. [s]"""
+    thickness_mm: VaryingNumber = varying(1.5, gt=0, le=10)
+    """Cortical thickness. [mm]"""
+    shear_modulus_cortex_pa: VaryingNumber = varying(1500.0, gt=0, le=1e7)
+    """Shear modulus of the cortex. [Pa]"""
+    shear_modulus_core_pa: VaryingNumber = varying(300.0, gt=0, le=1e7)
+    """Shear modulus of the core. [Pa]"""
+    material: MaterialName = "neo-hookean"
+    """Constitutive law (docs/model.md), as in the paper."""
+    poisson_ratio: float = Field(0.45, ge=0, lt=0.5)
+    """Poisson's ratio ν."""
+    growth_rate_per_s: VaryingNumber = varying(2.0e-7, ge=0, le=1e-5)
+    """Tangential growth rate of the cortex. [1/s]"""
+    radial_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
+    """Radial growth rate of the core, along the cortical normal. [1/s]"""
+    core_growth_rate_per_s: VaryingNumber = varying(0.0, ge=0, le=1e-5)
+    """Isotropic growth rate of the core. [1/s]"""
+    growth: Growth = Growth()
+    """What the brain grows by."""
+    stress_memory_gw: Memory = 0.0
+    """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
+    [GW]"""
+    support: Literal["ellipsoid", "box", "free"] = "ellipsoid"
+    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `box` clamps a flat
+    base and lets upright sides slide; `free` removes rigid motions only."""
+    contact: Contact = Contact()
+    """Contact."""
+    no_growth: NoGrowth = NoGrowth()
+    """Tissue that does not grow."""
+    output_every_gw: float = Field(1.0, ge=0.01, le=10)
+    """Interval between output weeks, besides the first and the last, and where some run predicts the start's growth
+    (`growth.of: atlas`) those of the brains to compare with. [GW]"""
+    fields: tuple[FieldName, ...] = ("displacement", "cortex_weight", "growth")
+    """Fields for ParaView at each output week."""
+    solver: Solver = Solver()
+    """Solvers."""
+    ranks: int = Field(2, ge=1, le=4096)
+    """MPI ranks of a simulation."""
+
+    def problems(self) -> Iterator[Problem]:
+        for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
+            if SIZES[0] in self.growth.own_keys() and self.gives(key):
+                yield Problem(f"has no meaning with the growth model {self.growth.model}", (key,))
+
+    @field_validator("*")
+    @classmethod
+    def _hold_bounds(cls, value: Any, info: ValidationInfo) -> Any:
+        require_bounds(value, bounds_of(cls.model_fields[str(info.field_name)]))
+        return value
+
+
+VARYING = tuple(name for name, field in FoldingSettings.model_fields.items() if bounds_of(field))
+"""Parameters that may vary with week and place."""
+GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_s"))
+
+
+def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
+    """Return the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
+    steps = int((end_week - start_week) / every_gw + 1e-9)
+    weeks = [round(start_week + n * every_gw, 9) for n in range(steps + 1)]
+    return weeks if end_week - weeks[-1] < 1e-6 else [*weeks, end_week]
+
+
+class FoldingParameters(FoldingSettings):
+    """The content of a run's `params.yaml`: settings, start, output weeks and fissure.
+
+    A map has the name of its parameter.
+    """
+
+    start_week: Week
+    """Gestational age at the start. [GW]"""
+    output_weeks: tuple[Week, ...]
+    """Output weeks, from `start_week` to `end_week`. [GW]"""
+    fissure_x_mm: float
+    """Position of the interhemispheric fissure. [mm]"""
+    side: Side | None = None
+    """The only hemisphere that the brain has; `null`: it has both."""
+    targets: dict[Week, str] = Field({})
+    """With `growth.model: shapes`: by week what the names of the maps of the mesh's positions begin with.
+    [GW]"""
+
+    @property
+    def varying_maps(self) -> set[str]:
+        """The names of the maps of parameters that vary over the brain."""
+        return {name for key in VARYING if (name := map_of(getattr(self, key))) is not None}
+
+    @property
+    def maps(self) -> set[str]:
+        """The names of the maps that the parameters need."""
+        return self.varying_maps | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
+
+    def problems(self) -> Iterator[Problem]:
+        weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
+        if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
+            yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
+        yield from value_problems(self, self.start_week, {})
+
+
+def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
+    """Yield the inconsistencies between the settings of a run, over all its weeks and vertices.
+
+    Parameters whose maps are not among `maps` are left out. `start` is the name of the start in messages, such as "the
+    week of the start brain a".
+    """
+    end = p.end_week
+    if end <= start_week:
+        called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
+        yield Problem(f"found {end:g}; it should be above {called}", ("end_week",))
+    values = {
+        key: value
+        for key in VARYING
+        if not (isinstance(value := getattr(p, key), Varying) and value.map not in (None, *maps))
+    }
+    ranges = {key: value_range(value, maps, start_week, end) for key, value in values.items()}
+    for key, unit in (("thickness_mm", "mm"), ("shear_modulus_cortex_pa", "Pa"), ("shear_modulus_core_pa", "Pa")):
+        if key in ranges and (least := ranges[key][0]) <= 0:
+            yield Problem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
+    rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
+    for key, (least, _) in rates.items():
+        if least < 0:
+            yield Problem(f"found {least:g}; it should be 0 or more", (key,))
+    if (growth := p.step_s * sum(most for _, most in rates.values())) >= 1:
+        yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+
+
+def target_map(week: float) -> str:
+    """Return what the names of the maps of positions that a mesh is to have at a week begin with."""
+    return f"target_{week:05.2f}"
+
+
+def target_maps(weeks: Iterable[float], positions: Floats) -> dict[str, Floats]:
+    """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
+    return {
+        f"{target_map(week)}_{axis}": values
+        for week, places in zip(weeks, positions, strict=True)
+        for axis, values in zip(AXES, places.T, strict=True)
+    }
+
+
+def parameters_from(values: Any) -> FoldingParameters:
+    """Return the parameters from nested mappings as read from YAML; InputError naming all problems at once."""
+    return validated(FoldingParameters, values, "folding parameters")
+
+
+def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
+    """Raise InputError where a map is missing, does not fit the mesh, or holds impossible values."""
+    for name in sorted(p.maps):
+        if name not in maps:
+            raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
+        if (shape := maps[name].shape) != (vertices,):
+            raise InputError(f"the map {name} does not fit the mesh", found=shape, expected=f"{vertices} values")
+    if problems := [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]:
+        raise InputError("folding parameters: " + "; ".join(problems))

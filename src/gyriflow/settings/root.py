@@ -1,0 +1,79 @@
+"""The whole configuration."""
+
+from typing import Any
+
+from pydantic import Field, PrivateAttr, field_validator
+
+from .atlas import AtlasSettings
+from .base import Settings
+from .brains import Brain
+from .folding import FoldingSettings
+from .participants import ParticipantsSettings
+from .runs import Calibration, GrowthSettings, Run, RunName, Start, Study, StudyName
+from .schemes import SchemeSettings
+from .stages import MeshSettings, MetricsSettings, SurfaceSettings
+
+
+class Config(Settings):
+    """All keys stand in these sections; `folding` is the base of every run."""
+
+    brains: tuple[Brain, ...] = ()
+    """The brains: those to fold, and others to compare with and to estimate growth from."""
+    atlas: tuple[AtlasSettings, ...] = ()
+    """Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."""
+    participants: ParticipantsSettings | None = None
+    """A table of brains, such as the `participants.tsv` of BIDS."""
+    schemes: dict[str, SchemeSettings] = Field({})
+    """Your own label schemes by name, for the brains' `scheme`."""
+    start: Start | None = None
+    """Id of the brain to fold, a list of ids, `first` (of the list, of an atlas the earliest) or `all`."""
+    surface: SurfaceSettings = SurfaceSettings()
+    """Pial surfaces."""
+    mesh: MeshSettings = MeshSettings()
+    """Tetrahedral mesh."""
+    growth: GrowthSettings = GrowthSettings()
+    """Growth rates."""
+    folding: FoldingSettings | None = None
+    """Folding simulation; `null`, and no `start` or other key of folding: brains are measured only."""
+    runs: dict[RunName, Run] = Field({})
+    """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
+    studies: dict[StudyName, Study] = Field({})
+    """Studies by name: runs that differ in a few parameters, compared with real brains."""
+    calibrate: Calibration | None = None
+    """A search for the parameters that meet a real brain best."""
+    metrics: MetricsSettings = MetricsSettings()
+    """Metrics."""
+    _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
+
+    @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return [value] if isinstance(value, str | dict) else value
+
+    def brain(self, name: str) -> Brain:
+        """Return the brain of an id; KeyError if there is none."""
+        for brain in self.brains:
+            if brain.id == name:
+                return brain
+        raise KeyError(name)
+
+    @property
+    def left_out(self) -> dict[str, dict[str, Any]]:
+        """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
+        return self._left_out
+
+    @property
+    def measured_only(self) -> "Config":
+        """This configuration with nothing to fold, and surfaces as they are for its runs."""
+        surface = self.surface.model_copy(update={"open_sulci": self.opens_sulci})
+        nothing: dict[str, Any] = {"start": None, "folding": None, "runs": {}, "studies": {}, "calibrate": None}
+        return self.model_copy(update={**nothing, "surface": surface})
+
+    @property
+    def opens_sulci(self) -> bool:
+        """Whether sulci that labels keep shut are opened.
+
+        They are not where brains are folded: elements are wider than slits, and what a mesh with shut sulci grows
+        towards or is compared with has to have them shut, too.
+        """
+        return self.surface.open_sulci and not self.runs

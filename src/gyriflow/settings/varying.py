@@ -1,0 +1,144 @@
+"""Parameters that may vary: a number, a curve over weeks, a map over the brain, or map times curve."""
+
+import operator
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic.fields import FieldInfo
+
+from .base import InputFile, Problem, Settings
+
+Floats = NDArray[np.float64]
+Maps = Mapping[str, Floats]
+"""Values at the mesh's vertices by parameter name; they move with the tissue."""
+WEEKS = (15.0, 45.0)
+"""First and last gestational week that gyriflow knows."""
+Week = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
+FileOrPair = Annotated[
+    Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
+    Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
+]
+
+
+class Varying(Settings):
+    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or both, which are multiplied.
+
+    A map is a GIFTI file with a value per vertex of `surface` (or one for each hemisphere), or a NIfTI volume in world
+    coordinates. Maps move with the tissue.
+    """
+
+    weeks: dict[Week, float] | None = None
+    """Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside. [GW]"""
+    map: FileOrPair | None = None
+    """File with the values, or a list of the left and the right one."""
+    surface: FileOrPair | None = None
+    """Surface file of the map, or the left and the right one."""
+
+    @field_validator("weeks", mode="before")
+    @classmethod
+    def _numbers_by_week(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            if any(isinstance(number, bool) for number in value.values()):
+                raise ValueError("should hold numbers, not true or false")
+            if len({float(week) for week in value}) < len(value):
+                raise ValueError("should name each week once")
+        return value
+
+    @field_validator("weeks")
+    @classmethod
+    def _by_week(cls, value: dict[float, float] | None) -> dict[float, float] | None:
+        return None if value is None else dict(sorted(value.items()))
+
+    def problems(self) -> Iterator[Problem]:
+        if not self.weeks and self.map is None:
+            yield Problem("found no values; expected a number, `weeks` or a `map`")
+        maps, surfaces = files_of(self.map), files_of(self.surface)
+        if surfaces and not maps:
+            yield Problem("has a `surface` but no `map`", ("surface",))
+        elif surfaces and len(maps) != len(surfaces):
+            yield Problem("should have as many files as `map`", ("surface",))
+        elif surfaces and any(path.endswith((".nii", ".nii.gz")) for path in maps):
+            yield Problem("has no meaning where the map is a volume", ("surface",))
+        elif not surfaces and (len(maps) > 1 or any(path.endswith(".gii") for path in maps)):
+            yield Problem("is missing; it is the surface whose vertices the map belongs to", ("surface",))
+
+
+def files_of(files: str | tuple[str, str] | None) -> list[str]:
+    """Return the files of a map or of its surface as a list."""
+    return [files] if isinstance(files, str) else list(files or ())
+
+
+VaryingNumber = Annotated[
+    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
+    Discriminator(lambda value: "(table)" if isinstance(value, dict | Varying) else "(number)"),
+]
+"""A number, a curve or a map."""
+
+
+BOUND_TEXTS = {
+    "gt": ("exclusiveMinimum", "greater than", operator.gt),
+    "ge": ("minimum", "greater than or equal to", operator.ge),
+    "le": ("maximum", "less than or equal to", operator.le),
+}
+"""The bounds of parameters that may vary: how they are called in JSON schemas and messages, and when they hold."""
+
+
+def varying(default: float, **bounds: float) -> Any:
+    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
+    return Field(default, json_schema_extra={BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()})
+
+
+def bounds_of(field: FieldInfo) -> dict[str, float]:
+    """Return the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
+    extra: Any = field.json_schema_extra or {}
+    return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
+
+
+def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
+    """Raise ValueError where a number, or one of a curve without a map, is out of its bounds."""
+    if isinstance(value, Varying):
+        numbers = [] if value.map is not None else list((value.weeks or {}).values())
+    else:
+        numbers = [value]
+    for name, bound in bounds.items():
+        _, text, holds = BOUND_TEXTS[name]
+        if not all(holds(number, bound) for number in numbers):
+            raise ValueError(f"should be {text} {bound:g}")
+
+
+def map_of(value: float | Varying) -> str | None:
+    """Return the name of the map of a parameter in a run's parameters, None where it has none."""
+    return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
+
+
+def weeks_of(value: float | Varying) -> dict[float, float]:
+    """Return the curve of a parameter, {week: value} in ascending order; empty where it has none."""
+    return (value.weeks or {}) if isinstance(value, Varying) else {}
+
+
+def curve_at(value: float | Varying, week: float) -> float:
+    """Return the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
+    if not isinstance(value, Varying):
+        return value
+    curve = weeks_of(value)
+    return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
+
+
+def value_at(value: float | Varying, week: float, maps: Maps) -> float | Floats:
+    """Return a parameter's value at a week: a number, or (n,) values where there is a map."""
+    name = map_of(value)
+    return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
+
+
+def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
+    """Return the smallest and the largest value of a parameter from a week to a week, over all places."""
+    name = map_of(value)
+    places = np.ones(1) if name is None else maps[name]
+    # the extremes of a curve lie at its weeks, or at the ends
+    weeks = [start, *(week for week in weeks_of(value) if start < week < end), end]
+    curve = [curve_at(value, week) for week in weeks]
+    products = np.outer(curve, [places.min(), places.max()])
+    return float(products.min()), float(products.max())

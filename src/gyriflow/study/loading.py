@@ -1,0 +1,168 @@
+"""Validates a configuration from plain dictionaries and reports its problems together."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+from ..io.yaml_files import read_keys
+from ..settings.atlas import Atlas, AtlasSettings
+from ..settings.base import PROBLEM, Key, line, messages
+from ..settings.folding import VARYING
+from ..settings.participants import ParticipantsSettings
+from ..settings.root import Config
+from ..settings.runs import PRESETS
+from .atlases import UsedAtlas, atlas_brains, atlas_problems
+from .checks import problems_between
+from .participants import participants_brains
+
+REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
+OF_FOLDING = ("start", "folding", "runs", "studies", "calibrate")
+"""Sections of which a study has none that only measures."""
+
+
+def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
+    """Return the validated configuration, with input files as absolute paths.
+
+    Parameters
+    ----------
+    raw
+        The configuration as read from YAML.
+    base_dir
+        Folder of the configuration file, for relative paths.
+    keep_going
+        Whether rows of `participants` that lack their age or data are left out, as `Config.left_out`; else they are
+        problems.
+
+    Raises
+    ------
+    InputError
+        Naming all problems of keys at once, or where each key is valid all problems between keys, each with its key,
+        what was found and what is allowed.
+    """
+    folder = Path(base_dir)
+    plain = _plain(raw)
+    if any(plain.get(section) is not None for section in OF_FOLDING):
+        plain = _with_presets({"folding": {}} | plain)
+    atlases, problems = _atlases(plain.get("atlas"), folder)
+    # None tells the checks that not all ids of brains are known
+    plain["atlas"] = None if problems else [used.settings for used in atlases]
+    entries, left_out = _participants(plain.get("participants"), folder, problems)
+    if further := [*(entry for used in atlases for entry in atlas_brains(used)), *entries]:
+        plain["brains"] = [*(plain.get("brains") or ()), *further]
+    if not (keep_going and plain.get("brains")):
+        problems += [row["cause"] for row in left_out.values()]
+    awaited = [str(file.path) for used in atlases for file in used.files]
+    hints = ["config/README.md says where all keys are described"]
+    try:
+        config = Config.model_validate(plain, context={"folder": str(folder), "awaited": awaited})
+    except ValidationError as error:
+        problems += _lines(messages(error, Config))
+        if any(details["type"] != PROBLEM for details in error.errors()):
+            hints.append("once each key is valid, they are checked against each other")
+    else:
+        problems += _lines([(problem.key, problem.text) for problem in problems_between(config)])
+    if not problems:
+        config.left_out.update(left_out)
+        return config
+    if left_out and not keep_going:
+        hints.append("with --keep-going, rows that can't be used are left out")
+    counted = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
+    raise InputError("\n  ".join([f"the configuration has {counted}:", *problems]) + "\n" + "; ".join(hints))
+
+
+def _participants(
+    section: Any, folder: Path, problems: list[str]
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+    if section is None:
+        return [], {}
+    try:
+        entries, left_out, wrong = participants_brains(ParticipantsSettings.model_validate(section), folder)
+    except ValidationError:
+        # said with all other keys
+        return [], {}
+    except InputError as error:
+        problems.append(f"participants.file: {error}")
+        return [], {}
+    problems += wrong
+    return entries, left_out
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _with_presets(plain: dict[str, Any]) -> dict[str, Any]:
+    """Return the configuration with complete runs: what `folding` says, a run's preset over it, its own over both.
+
+    A preset of `folding` lies under its other keys. What is no section is left for its refusal.
+    """
+    folding, runs = plain["folding"], plain.get("runs") or REFERENCE_RUNS
+    if not isinstance(folding, dict):
+        return plain | {"runs": runs}
+    base = _merge(PRESETS.get(str(folding.get("preset")), {}), folding)
+    if isinstance(runs, dict):
+        runs = {name: _run(folding, base, run) if isinstance(run, dict | None) else run for name, run in runs.items()}
+    return plain | {"folding": base, "runs": runs}
+
+
+def _run(folding: dict[str, Any], base: dict[str, Any], run: dict[str, Any] | None) -> dict[str, Any]:
+    run = run or {}
+    if "preset" not in run:
+        return _merge(base, run)
+    return _merge(_merge(folding, PRESETS.get(str(run["preset"]), {})), run)
+
+
+def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    both = dict(base)
+    for key, value in override.items():
+        if key == "growth":
+            both[key] = _merged_growth(base.get(key), value)
+            continue
+        nested = isinstance(value, dict) and isinstance(base.get(key), dict) and key not in VARYING
+        both[key] = _merge(base[key], value) if nested else value
+    return both
+
+
+def _merged_growth(base: Any, override: Any) -> Any:
+    old, new = ({"model": given} if isinstance(given, str) else given for given in (base, override))
+    if not isinstance(old, dict) or not isinstance(new, dict):
+        return new
+    return new if new.get("model", old.get("model")) != old.get("model") else {**old, **new}
+
+
+def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
+    several = isinstance(raw, list)
+    sections = raw if several else [] if raw is None else [raw]
+    atlases: list[UsedAtlas] = []
+    problems: list[str] = []
+    for number, section in enumerate(sections):
+        path: Key = ("atlas", number) if several else ("atlas",)
+        try:
+            settings = AtlasSettings.model_validate(section).located(folder)
+        except ValidationError as error:
+            problems += [line((*path, *place), text) for place, text in messages(error, AtlasSettings)]
+            continue
+        try:
+            used = UsedAtlas(settings, Atlas.model_validate(read_keys(settings.description)))
+        except InputError as error:
+            problems.append(line((*path, "name"), str(error)))
+        except ValidationError as error:
+            problems += [f"{settings.description}: {line(place, text)}" for place, text in messages(error, Atlas)]
+        else:
+            wrong = [line((*path, *problem.key), problem.text) for problem in atlas_problems(used)]
+            problems += wrong
+            atlases += [] if wrong else [used]
+    return atlases, problems
+
+
+def _lines(problems: list[tuple[Key, str]]) -> list[str]:
+    others = [(path, text) for path, text in dict.fromkeys(problems) if path[0] != "atlas"]
+    of_folding = {(path[1:], text) for path, text in others if path[0] == "folding"}
+    return [line(path, text) for path, text in others if path[0] != "runs" or (path[2:], text) not in of_folding]

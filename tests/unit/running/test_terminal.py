@@ -1,0 +1,247 @@
+"""What a run tells by Snakemake's records, on a terminal and in a file; how far a study is, and whose results."""
+
+import io
+import logging
+
+import pytest
+from configurations import LABELLED
+
+from gyriflow.errors import InputError
+from gyriflow.io.files import read_json, write_json
+from gyriflow.running.launch import hold_lock
+from gyriflow.running.provenance import require_own_results
+from gyriflow.running.status import STATE, status
+from gyriflow.running.terminal import RunDisplay
+from gyriflow.step import EXIT_FILE, recorded_exit_code
+from gyriflow.study.loading import load
+
+STEP = '{{"event": "step", "week": {week}, "end_week": 23, "left_s": {left}}}\n'
+
+
+class Run:
+    """A run that Snakemake tells of, and what its display has written."""
+
+    def __init__(self, folder, stream):
+        self.now = 0.0
+        self.folder = folder
+        self.display = RunDisplay(stream, folder / ".snakemake" / "log" / "x.log", lambda: self.now)
+
+    def tell(self, event=None, text="", level=logging.INFO, **said):
+        record = logging.LogRecord("snakemake", level, "", 0, text, (), None)
+        vars(record).update(said | {"event": event})
+        self.display.show(record)
+
+    def begin(self, rule, number=1, **wildcards):
+        log = self.folder / f"{rule}.log"
+        self.tell("job_info", jobid=number, rule_name=rule, wildcards=wildcards, output=["x"], log=[str(log)])
+        return log
+
+    def end(self, number=1, done=1, total=1):
+        self.tell("job_finished", job_id=number)
+        self.tell("progress", done=done, total=total)
+
+    def fail(self, rule, message="", log=(), number=1):
+        self.tell("job_error", jobid=number, rule_name=rule, log=log, rule_msg=message)
+
+    @property
+    def lines(self):
+        return self.display.console.file.getvalue().splitlines()
+
+    @property
+    def state(self):
+        return read_json(self.folder / STATE)
+
+
+@pytest.fixture
+def run(tmp_path):
+    (tmp_path / ".snakemake").mkdir()
+    return Run(tmp_path, io.StringIO())
+
+
+def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
+    run.tell("run_info", stats={"measure": 100, "total": 100})
+    for number in range(100):
+        run.begin("measure", number, brain=f"b{number}")
+        run.display.tick()
+        run.now += 2.0
+        run.end(number, number + 1, 100)
+    run.tell(text="a warning of Snakemake's", level=logging.WARNING)
+    run.display.end()
+    assert run.lines[0].startswith("gyriflow: 100 steps to do; details in ")
+    assert run.lines[1] == "  0 %  measure b0"
+    assert run.lines[11] == " 50 %  2 min left  measure b50"
+    assert run.lines[-2] == "a warning of Snakemake's"
+    assert run.lines[-1].startswith("gyriflow: done in ")
+    assert len(run.lines) == 23
+    assert "\x1b" not in "".join(run.lines)
+    assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
+
+
+def test_a_folding_tells_its_size_weeks_and_warnings(run):
+    run.tell("run_info", stats={"simulate": 1})
+    log = run.begin("simulate", run="r", brain="a")
+    size = '{"event": "size", "elements": 12, "unknowns": 9, "ranks": 1, "memory_mib": 70}\n'
+    coarse = '{"event": "warning", "message": "coarse"}\n'
+    log.with_suffix(".jsonl").write_text(size + coarse + STEP.format(week=21.5, left=75.0))
+    log.write_text("warning: coarse\n2026-11-22 00:54:57,955 WARNING trimesh: not ours\n")
+    run.now = 25.0
+    run.display.tick()
+    run.end()
+    assert run.lines[1:] == [
+        "       simulate r a: 12 elements, 1 rank, about 70 MiB",
+        "warning simulate r a: coarse",
+        # a quarter of its time has passed
+        " 25 %  simulate r a: GW 21.50 of 23",
+    ]
+    assert run.state["running"] == ["simulate r a: GW 21.50 of 23"]
+
+
+def test_a_failure_begins_with_its_cause_after_the_warnings(run):
+    run.tell("run_info", stats={"pial_from_labels": 1, "simulate": 1})
+    log = run.begin("pial_from_labels", brain="a")
+    warned = "2026-11-22 00:54:57,001 WARNING gyriflow.io: thin cortex\n"
+    log.write_text(warned + "2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    run.fail("pial_from_labels", log=[str(log)])
+    run.tell(text="Exiting because a job execution failed. Look below", level=logging.ERROR)
+    run.display.end()
+    assert run.lines[1:] == [
+        "warning pial_from_labels a: thin cortex",
+        "failed  pial_from_labels a: a.nii: is no image",
+        f"        log: {log}",
+        "gyriflow: finished after 5 s with 1 failed, 0 of 2 steps done; run the same command again to resume",
+    ]
+    assert run.state["failed"] == [{"what": "pial_from_labels a", "why": "a.nii: is no image", "logs": [str(log)]}]
+
+
+@pytest.mark.fault(38)
+@pytest.mark.parametrize(
+    ("message", "cause", "code"),
+    [
+        ("died with <Signals.SIGKILL: 9>.", "it was killed, most probably because memory ran out", 137),
+        ("died with <Signals.SIGSEGV: 11>.", "it crashed (SIGSEGV)", None),
+        ("died with <Signals.SIGTERM: 15>.", "it was stopped", None),
+        # as snakemake-executor-plugin-slurm 2.8 puts it
+        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended its job 12: CANCELLED", None),
+        ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", "a.nii: is no image", None),
+    ],
+)
+def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message, cause, code):
+    monkeypatch.setenv(EXIT_FILE, str(run.folder / "code"))
+    log = run.begin("measure", brain="a")
+    log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
+    run.fail("measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)])
+    assert run.lines[0].startswith(f"failed  measure a: {cause}")
+    assert recorded_exit_code(run.folder / "code") == code
+
+
+def test_what_was_stopped_is_no_failure(run):
+    run.tell("run_info", stats={"simulate": 2})
+    run.begin("simulate", run="r", brain="a")
+    run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
+    run.fail("simulate")
+    run.display.end()
+    assert run.lines[-1] == "gyriflow: stopped after 5 s, 0 of 2 steps done"
+    assert run.state["interrupted"]
+    assert run.state["failed"] == []
+
+
+def test_an_error_of_no_job_is_told(run):
+    run.tell("run_info", stats={"measure": 1})
+    run.tell("error", text="WorkflowError: no such profile", level=logging.ERROR)
+    run.display.end()
+    assert run.lines[1:] == ["WorkflowError: no such profile"]
+
+
+RUNNING = {
+    "began": "2026-01-01 10:00:00",
+    "ended": None,
+    "done": 3,
+    "total": 10,
+    "left_s": 240.0,
+    "running": ["folding, run r, brain a: GW 21.50 of 23"],
+    "failed": [],
+    "details": "run.log",
+    "interrupted": False,
+}
+
+
+@pytest.fixture
+def study(tmp_path):
+    for name in ("brains/a/surface/pial.surf.gii", "brains/b/logs/x", "runs/r/a/logs/simulate.log"):
+        (tmp_path / "results" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "results" / name).touch()
+    write_json(tmp_path / STATE, RUNNING)
+    return tmp_path
+
+
+def text(folder):
+    return "\n".join(status(folder))
+
+
+def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
+    with hold_lock(study):
+        said = text(study)
+    assert "running since 2026-01-01 10:00:00: 3 of 10 steps done, about 4 min left" in said
+    assert "now: folding, run r, brain a: GW 21.50 of 23" in said
+
+
+def test_a_run_that_was_killed_is_called_interrupted(study):
+    assert "interrupted: the run of 2026-01-01 10:00:00 ended abruptly, 3 of 10 steps done" in text(study)
+    assert "now:" not in text(study)
+    write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
+    assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
+
+
+def test_stages_of_brains_and_runs_are_told_from_their_files(study):
+    rows = [line.split() for line in text(study).splitlines()]
+    assert ["a", "done", "-", "-"] in rows
+    assert ["b", "-", "-", "-"] in rows
+    assert ["r", "a", "-", "-", "-", "-"] in rows
+    progress = study / "results/runs/r/a/logs/simulate.jsonl"
+    progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
+    assert "GW 21.50 of 23 " in text(study)
+    write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
+    assert "done, GW 23.00 " in text(study)
+    assert "report:" not in text(study)
+
+
+def test_a_folder_without_a_study_is_named(tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
+        text(tmp_path)
+
+
+def configured(*ids, week=21):
+    brains = [{"id": name, "week": week, **LABELLED} for name in ids]
+    return load({"brains": brains, "start": ids[0], "folding": {"end_week": 30}})
+
+
+@pytest.fixture
+def made(tmp_path):
+    """A folder with results of a study of brains a and b."""
+    require_own_results(tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True)
+    (tmp_path / "results" / "brains" / "a").mkdir(parents=True)
+    return tmp_path
+
+
+def test_another_study_is_refused_with_what_to_do(made):
+    with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Choose .*--directory"):
+        require_own_results(made, [made / "two.yaml"], configured("c"), record=True)
+    # a brain of the same name may be another one
+    with pytest.raises(InputError, match="another study"):
+        require_own_results(made, [made / "two.yaml"], configured("a", week=25), record=False)
+
+
+@pytest.mark.parametrize(
+    ("file", "ids"),
+    [("one.yaml", ["c"]), ("two.yaml", ["b", "c"])],
+    ids=["the same file, changed", "a copy of it, changed"],
+)
+def test_a_study_that_was_changed_goes_on(made, file, ids):
+    require_own_results(made, [made / file], configured(*ids), record=True)
+    # whose they are now
+    require_own_results(made, [made / file], configured(*ids), record=False)
+
+
+def test_results_that_were_deleted_are_nobodys(made):
+    (made / "results" / "brains" / "a").rmdir()
+    require_own_results(made, [made / "two.yaml"], configured("c"), record=True)

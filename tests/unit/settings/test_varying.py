@@ -1,0 +1,58 @@
+"""Parameters as numbers, curves, maps and their products."""
+
+import numpy as np
+import pytest
+
+from gyriflow.errors import InputError
+from gyriflow.settings.folding import parameters_from, require_maps
+from gyriflow.settings.varying import value_at, value_range
+
+RUN = {"start_week": 21.0, "end_week": 31.0, "fissure_x_mm": 0.0, "output_weeks": [21.0, 31.0]}
+MAP = {"thickness_mm": np.array([1.0, 2.0, 4.0])}
+
+
+def value(given):
+    """Return a parameter as a run has it."""
+    return parameters_from(RUN | {"thickness_mm": given}).thickness_mm
+
+
+def test_a_curve_is_linear_between_its_weeks_and_constant_beyond():
+    assert value_at(value("2e-3"), 33.0, {}) == 2e-3
+    curve = value({"weeks": {25: 3.0, "21": 1.0}})
+    assert [value_at(curve, week, {}) for week in (20.0, 21.0, 22.0, 25.0, 40.0)] == [1.0, 1.0, 1.5, 3.0, 3.0]
+
+
+def test_a_map_is_multiplied_with_the_curve():
+    both = value({"weeks": {21: 1.0, 31: 2.0}, "map": "thickness_mm"})
+    np.testing.assert_allclose(value_at(both, 26.0, MAP), [1.5, 3.0, 6.0])
+    assert value_range(both, MAP, 21.0, 40.0) == (1.0, 8.0)
+    assert value_range(both, MAP, 21.0, 26.0) == (1.0, 6.0)
+    np.testing.assert_allclose(value_at(value({"map": "thickness_mm"}), 26.0, MAP), MAP["thickness_mm"])
+
+
+@pytest.mark.parametrize(
+    "given", ["thick", True, {}, {"weeks": {}}, {"weeks": [1, 2]}, {"week": {21: 1}}, None, "estimated"]
+)
+def test_what_is_no_number_curve_or_map_is_refused(given):
+    with pytest.raises(InputError, match="thickness_mm"):
+        value(given)
+
+
+def test_values_are_checked_over_all_weeks_and_places():
+    with pytest.raises(InputError, match=r"growth_rate_per_s: should be .* 0"):
+        parameters_from(RUN | {"growth_rate_per_s": {"weeks": {21: 1e-7, 30: -1e-7}}})
+    rates = parameters_from(RUN | {"growth_rate_per_s": {"map": "rate"}})
+    with pytest.raises(InputError, match=r"growth_rate_per_s: found -1e-08; it should be 0 or more"):
+        require_maps(rates, {"rate": np.array([1e-7, -1e-8])}, 2)
+    mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
+    require_maps(mapped, MAP, 3)
+    with pytest.raises(InputError, match=r"thickness_mm: reaches 0 mm"):
+        require_maps(mapped, {"thickness_mm": np.array([1.0, 0.0, 1.0])}, 3)
+
+
+def test_a_missing_or_unfitting_map_is_refused():
+    mapped = parameters_from(RUN | {"thickness_mm": {"map": "thickness_mm"}})
+    with pytest.raises(InputError, match="the map thickness_mm is missing"):
+        require_maps(mapped, {}, 3)
+    with pytest.raises(InputError, match="does not fit the mesh"):
+        require_maps(mapped, MAP, 4)

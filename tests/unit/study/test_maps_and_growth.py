@@ -1,0 +1,99 @@
+"""Maps and growth in a configuration: what the steps of the workflow are handed."""
+
+import pytest
+from configurations import LABELLED, both_kinds, problems
+
+from gyriflow.study import resolve
+from gyriflow.study.loading import load
+
+BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, **LABELLED}, {"id": "c", "week": 22, **LABELLED}]
+
+
+def study(folding, **others):
+    return {"brains": BRAINS, "start": "a", "folding": {"end_week": 24} | folding, **others}
+
+
+def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
+    for name in ("left.gii", "right.gii", "left.surf.gii", "right.surf.gii", "soft.nii.gz"):
+        (tmp_path / name).touch()
+    mapped = {
+        "thickness_mm": {"map": ["left.gii", "right.gii"], "surface": ["left.surf.gii", "right.surf.gii"]},
+        "growth_rate_per_s": {"map": "left.gii", "surface": "left.surf.gii", "weeks": {30: 0.5, 21: 1}},
+        "shear_modulus_core_pa": {"map": "soft.nii.gz"},
+        "radial_growth_rate_per_s": {"weeks": {25: 1e-7}},
+    }
+    with_maps, plain = resolve(
+        load(study(mapped, runs={"mapped": {}, "plain": dict.fromkeys(mapped, 1e-8)}), tmp_path)
+    ).folded
+    settings = with_maps.parameters
+    assert {name: settings[name] for name in mapped} == {
+        "thickness_mm": {"map": "thickness_mm"},
+        "growth_rate_per_s": {"weeks": {21.0: 1.0, 30.0: 0.5}, "map": "growth_rate_per_s"},
+        "shear_modulus_core_pa": {"map": "shear_modulus_core_pa"},
+        "radial_growth_rate_per_s": {"weeks": {25.0: 1e-7}},
+    }
+    assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
+    assert "ranks" not in settings
+    assert with_maps.map_sources == {
+        "thickness_mm": {
+            "map": [str(tmp_path / "left.gii"), str(tmp_path / "right.gii")],
+            "surface": [str(tmp_path / "left.surf.gii"), str(tmp_path / "right.surf.gii")],
+        },
+        "growth_rate_per_s": {"map": [str(tmp_path / "left.gii")], "surface": [str(tmp_path / "left.surf.gii")]},
+        "shear_modulus_core_pa": {"map": [str(tmp_path / "soft.nii.gz")], "surface": []},
+    }
+    assert plain.map_sources == {}
+    assert plain.parameters["thickness_mm"] == 1e-8
+
+
+@pytest.mark.parametrize(
+    ("growth", "found"),
+    [
+        (
+            {"brains": {"one": ["v21", "x"], "two": ["v21", "v22"]}},
+            ["growth.brains.one: found 'x', which is no brain; known are v21, v22, s21, s22"],
+        ),
+        (
+            {"brains": {"one": ["v21", "s21"], "two": ["v21", "v22"]}},
+            ["growth.brains.one: found brains of 1 week(s); growth needs two or more"],
+        ),
+        ({"brains": []}, ["growth.brains: found brains of 0 week(s); growth needs two or more"]),
+        ({"brains": ["s21", "v22"]}, []),
+        ({"series": "volumes"}, ["growth.series: found 'volumes'; the series are surface, volume"]),
+        ({"brains": {"one": "v21"}}, ["growth.brains.one: Input should be a valid tuple; found 'v21'"]),
+    ],
+)
+def test_series_that_cannot_be_used_are_refused(tmp_path, growth, found):
+    assert problems(both_kinds(tmp_path, (21, 22)) | {"growth": growth}, tmp_path) == found
+
+
+CURVE = {21: 99, 30: 252}
+
+
+@pytest.mark.parametrize(
+    ("growth", "told"),
+    [
+        ("shapes", ""),
+        ({"model": "shapes", "of": "atlas"}, ""),
+        ({"model": "sizes", "area_cm2": CURVE}, ""),
+        ({"area_cm2": CURVE}, "growth.area_cm2: has no meaning with the model rates"),
+        ({"model": "shapes", "area_cm2": CURVE}, "growth.area_cm2: has no meaning with the model shapes"),
+        ({"model": "sizes", "of": "atlas"}, "growth.of: has no meaning with the model sizes"),
+        ({"model": "shapes", "of": "atlas", "thickness_mm": "measured"}, "unknown to a prediction"),
+        ("shape", "folding.growth.model: Input should be"),
+    ],
+)
+def test_a_growth_model_has_its_own_keys(growth, told):
+    found = problems(study({"growth": growth}))
+    assert not found if not told else any(told in line for line in found)
+
+
+def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
+    runs = {"thin": {"growth": {"thickness_mm": {21: 3}}}, "sizes": {"growth": "sizes"}, "same": {"growth": "shapes"}}
+    config = load(study({"preset": "expected", "growth": {"thickness_mm": {21: 2}}}, runs=runs))
+    found = {name: config.runs[name].growth for name in runs}
+    assert [(growth.model, growth.of, growth.thickness_mm) for growth in found.values()] == [
+        ("shapes", "atlas", {21: 3}),
+        ("sizes", "self", None),
+        ("shapes", "atlas", {21: 2}),
+    ]

@@ -1,0 +1,134 @@
+"""Studies and calibrations in a configuration: the runs that they make, and what is refused."""
+
+import pytest
+from configurations import LABELLED
+
+from gyriflow.errors import InputError
+from gyriflow.study import resolve
+from gyriflow.study.loading import load
+
+BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 25, **LABELLED}]
+RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
+THICKNESS = {
+    "base": "reference",
+    "vary": {"thickness_mm": [0.8, 1.5]},
+    "fixed": {"shear_modulus_cortex_pa": 3000},
+    "compare_week": 25,
+}
+STIFFNESS = {"base": "reference", "vary": {"shear_modulus_cortex_pa": [300, 1500, 3000]}, "compare_week": 25}
+CALIBRATION = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 25}
+
+
+def config(**sections):
+    return load({"brains": BRAINS, "start": "first", "folding": {"end_week": 26}, "runs": RUNS, **sections})
+
+
+def resolved(**sections):
+    return resolve(config(**sections))
+
+
+def members(study, name):
+    return [one.run for one, _ in study.comparisons[name].members]
+
+
+def refusal(**sections):
+    with pytest.raises(InputError) as error:
+        config(**sections)
+    return str(error.value)
+
+
+def test_a_study_makes_a_run_of_each_combination():
+    found = resolved(studies={"both": THICKNESS | {"vary": {"thickness_mm": [1, 2], "contact.gap_mm": [2, 3]}}})
+    runs = {one.run: one.settings for one, _ in found.comparisons["both"].members}
+    assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
+    assert [(run.thickness_mm, run.contact.gap_mm) for run in runs.values()] == [(1, 2), (1, 3), (2, 2), (2, 3)]
+    assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
+    assert {run.end_week for run in runs.values()} == {25}
+    # they are no runs that everything is made of
+    assert found.pairs == [("reference", "a"), ("short", "a")]
+
+
+def test_equal_runs_are_solved_once():
+    found = resolved(studies={"thickness": THICKNESS | {"compare_week": 25}, "stiffness": STIFFNESS})
+    # 1500 Pa is the reference, 3000 Pa stands in the other study too
+    assert members(found, "stiffness") == ["stiffness-300", "reference", "thickness-1.5"]
+    assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
+
+
+def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
+    brains = [*BRAINS, {"id": "c", "week": 24.5, **LABELLED}]
+    studies = {"thickness": THICKNESS | {"compare_week": 24.5}, "stiffness": STIFFNESS}
+    simulations = resolved(brains=brains, studies=studies).simulations
+    assert simulations["thickness-1.5", "a"].settings.end_week == 25
+    assert simulations["thickness-1.5", "a"].weeks == (21, 22, 23, 24, 24.5, 25)
+    assert simulations["thickness-0.8", "a"].weeks[-1] == 24.5
+    # the reference itself has no surface of that week, so that it cannot stand in
+    other = resolved(brains=brains, studies={"stiffness": STIFFNESS | {"compare_week": 24.5}})
+    assert members(other, "stiffness")[1] == "stiffness-1500"
+
+
+def test_comparison_prefers_the_starts_population(tmp_path):
+    brains = []
+    for name, week, population in (("a", 21, "one"), ("b", 25, "two"), ("c", 25, "one")):
+        (tmp_path / f"{name}.stl").touch()
+        brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
+    for known, asked, real in ((brains, {}, "c"), (brains[:2], {}, "b"), (brains, {"compare_with": ["b"]}, "b")):
+        found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
+        assert [brain.id for brain in found.comparisons["thickness"].real["a"]] == [real]
+
+
+def test_the_run_of_a_single_value_may_differ_further():
+    study = THICKNESS | {
+        "fixed": {"shear_modulus_cortex_pa": 3000, "step_s": 86400},
+        "fixed_at": {1.5: {"step_s": 43200}},
+    }
+    found = [
+        (one.run, one.settings.step_s, values)
+        for one, values in resolved(studies={"s": study}).comparisons["s"].members
+    ]
+    assert found == [("s-0.8", 86400, {"thickness_mm": 0.8}), ("s-1.5", 43200, {"thickness_mm": 1.5})]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"vary": {"thicknes_mm": [1]}}, "studies.s.vary.thicknes_mm: there is no such key"),
+        ({"vary": {"thickness_mm": [-1]}}, "studies.s.vary.thickness_mm: should be greater than 0"),
+        ({"vary": {"thickness_mm": [1, 1]}}, "each once"),
+        ({"vary": {"preset": ["measured"]}}, "studies.s.vary.preset: cannot differ"),
+        ({"vary": {}}, "studies.s.vary: found nothing"),
+        ({"fixed": {"contact.gap": 2}}, "studies.s.fixed.contact.gap: there is no such key"),
+        ({"fixed_at": {1.2: {"step_s": 43200}}}, "studies.s.fixed_at: found 1.2; expected a value of the first varied"),
+        ({"fixed_at": {1.5: {"steps": 1}}}, "studies.s.fixed_at.steps: there is no such key"),
+        ({"base": "ref"}, "studies.s.base: found 'ref'; expected a run: reference, short"),
+        ({"compare_week": 24}, "studies.s.compare_week: found 24; there are brains of 21, 25 GW"),
+        ({"compare_with": ["a"]}, "studies.s.compare_with: found a, of 21 GW"),
+    ],
+)
+def test_what_is_wrong_with_a_study_is_said(change, said):
+    assert said in refusal(studies={"s": THICKNESS | change})
+
+
+def test_folders_of_results_are_no_names_of_studies():
+    assert "the name is taken" in refusal(studies={"figures": THICKNESS})
+    assert "rename one" in refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"parameters": {"thickness_mm": [3, 1]}}, "the lowest and the highest"),
+        ({"parameters": {"thickness_mm": [-1, 1]}}, "parameters.thickness_mm: should be greater than 0"),
+        ({"parameters": {"poisson": [0, 0.4]}}, "no such key"),
+        ({"parameters": {"growth_rate_per_s.amplitude": [0.5, 2]}}, "growth_rate_per_s is no curve in the base run"),
+        ({"parameters": {"growth.area_cm2.amplitude": [0.5, 2]}}, "growth.area_cm2 is no curve in the base run"),
+        ({"parameters": {"stiffness_ratio": [0, 2]}}, "above 0"),
+        ({"rounds": [30, 11]}, "at most 40"),
+        ({"score": {}}, "calibrate.score: found nothing"),
+        ({"score": {"beauty": 1}}, "beauty"),
+        ({"compare_week": 24}, "calibrate.compare_week: found 24"),
+        ({"base": "ref"}, "calibrate.base: found 'ref'"),
+    ],
+)
+def test_what_is_wrong_with_a_calibration_is_said(change, said):
+    assert said in refusal(calibrate=CALIBRATION | change)
