@@ -8,8 +8,8 @@ from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of, measured_name
 from gyriflow.study.paths import *
-from gyriflow.running.launch import GOES_ON, LOOKS, MEASURES_ONLY, hold_lock, refused_brains
-from gyriflow.running.provenance import input_contents, require_own_results
+from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
+from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.step import record_exit_code
 from gyriflow.units import week_tag
 
@@ -22,7 +22,7 @@ shell.prefix(
 
 
 # whether this is the process that runs the study; others run a job of it, or only look
-RUNS = workflow.is_main_process and LOOKS not in os.environ
+RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
 
 
 def validated_study():
@@ -40,11 +40,11 @@ def validated_study():
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
-        found = load(config, base, keep_going=GOES_ON in os.environ)
-        study = resolve(found.measured_only if MEASURES_ONLY in os.environ else found, refused_brains())
+        found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
+        study = resolve(found.measured_only if MEASURE_ONLY_VAR in os.environ else found, refused_brains())
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
-            require_own_results(Path.cwd(), files, found, record=RUNS)
+            check_results_belong_to(Path.cwd(), files, found, record=RUNS)
         return study, input_contents(Path.cwd(), found, record=RUNS)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)

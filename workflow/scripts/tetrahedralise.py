@@ -2,7 +2,7 @@
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.io.files import emptied, write_json
+from gyriflow.io.files import remove_tree, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
 from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
@@ -11,7 +11,7 @@ from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    refused = emptied(params.refused)
+    refused = remove_tree(params.refused)
     surface = read_surface(snakemake.input[0])
     mesh = tetrahedralise(surface, **params.settings)
     summary, fields = quality_summary(mesh, surface), {"radius_ratio": radius_ratios(mesh)}

@@ -205,11 +205,11 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
     The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
     `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished.
     """
-    from ..running.launch import MEASURES_ONLY
+    from ..running.launch import MEASURE_ONLY_VAR
     from .init import write_configuration
 
     config = data / CONFIG if data.is_dir() else data
-    os.environ[MEASURES_ONLY] = "1"
+    os.environ[MEASURE_ONLY_VAR] = "1"
     with TemporaryDirectory() as scratch:
         if not config.exists():
             config = Path(scratch) / CONFIG if dry_run else config
@@ -275,7 +275,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     and with --fold simulations, too. The level group adds the tables and the report of all participants, with the same
     options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
-    from ..io.exports import hand_over
+    from ..io.exports import publish_derivatives
     from .init import remember, remembered, write_bids
 
     work = work or out / "work"
@@ -293,7 +293,7 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
     code = _run(config, work, cores, dry_run, ["--cores", str(cores), "--keep-going"], *targets)
     if not dry_run and (exported / "dataset_description.json").is_file():
-        hand_over(exported, out, data, brains, whole=level == "group")
+        publish_derivatives(exported, out, data, brains, whole=level == "group")
         click.echo(f"derivatives: {out}")
     sys.exit(code)
 

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
-from ..settings.base import nearest
+from ..settings.base import did_you_mean
 from ..study.participants import Scan, covariates, read_scans
 
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
@@ -98,7 +98,7 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
 def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of one label volume: its id, file and scheme; InputError where that is unknown or not one."""
     if scheme not in (None, *SCHEMES):
-        raise InputError(f"--scheme: found {scheme!r}; {nearest(str(scheme), SCHEMES)}")
+        raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
     entry, fits = {"id": _id(file), "labels": str(file), "scheme": UNSET}, scheme_fits(read_label_volume(file).labels)
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:

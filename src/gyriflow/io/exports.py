@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
 from ..settings.terms import MEASURED, STRUCTURES, Side
-from .files import AnyPath, read_json, replaced, write_json, write_text
+from .files import AnyPath, atomic_write, read_json, write_json, write_text
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, read_label_volume, write_label_volume
 
@@ -231,7 +231,9 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
     return LabelVolume(layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine)
 
 
-def hand_over(exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool) -> None:
+def publish_derivatives(
+    exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool
+) -> None:
     """Bring the BIDS derivative of a study to another folder, where what it has of other subjects stays.
 
     Beside each subject's files come the quality pages of its `brains`, with the `whole` study its tables, report and
@@ -302,10 +304,10 @@ def _alphanumeric(text: str) -> str:
 
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         table.to_csv(temporary, sep="\t", index=False, float_format="%.10g", na_rep="n/a")
 
 
 def _copy(source: AnyPath, target: AnyPath) -> None:
-    with replaced(target) as temporary:
+    with atomic_write(target) as temporary:
         shutil.copyfile(source, temporary)

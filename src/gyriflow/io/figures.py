@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from PIL import Image
 
-from .files import AnyPath, replaced, write_text
+from .files import AnyPath, atomic_write, write_text
 
 WIDTHS = (1800, 1400, 1100, 800)
 """Widths in pixels that pictures are tried with, until all of them together fit."""
@@ -32,12 +32,12 @@ def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
 
     Pictures within the vectors keep all of their pixels.
     """
-    with replaced(png) as temporary:
+    with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):
         picture.set_interpolation("none")
     # without a date, so that the same figure gives the same file
-    with replaced(pdf) as temporary:
+    with atomic_write(pdf) as temporary:
         figure.savefig(temporary, dpi=DPI, metadata={"CreationDate": None})
 
 

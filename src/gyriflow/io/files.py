@@ -48,7 +48,7 @@ def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> Non
 
 
 @contextmanager
-def replaced(path: AnyPath) -> Iterator[Path]:
+def atomic_write(path: AnyPath) -> Iterator[Path]:
     """Yield a temporary path beside `path` that takes its place when the block ends well.
 
     After an error an earlier file stays as it was. Missing folders are made. StorageError where the system refuses to
@@ -68,7 +68,7 @@ def replaced(path: AnyPath) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def emptied(folder: AnyPath) -> Path:
+def remove_tree(folder: AnyPath) -> Path:
     """Return the path of a folder that is removed with all in it, so that nothing of an earlier run is left there."""
     shutil.rmtree(folder, ignore_errors=True)
     return Path(folder)
@@ -107,13 +107,13 @@ def read_text(path: AnyPath) -> str:
 
 def write_text(path: AnyPath, text: str) -> None:
     """Write a text file."""
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
     """Write a table as CSV without its index, ten significant digits."""
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.10g")
 
 
@@ -152,7 +152,7 @@ def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
     """Yield an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""
     import h5py
 
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         # in memory first: HDF5 crashes later on where a write of its own has failed, as on a full disk
         with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
             yield file

@@ -23,7 +23,7 @@ from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
 from ..settings.terms import STRUCTURES, Side
-from .files import AnyPath, read_json, reading, replaced, require_finite
+from .files import AnyPath, atomic_write, read_json, reading, require_finite
 
 log = logging.getLogger(__name__)
 
@@ -106,7 +106,7 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
         import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-        with replaced(path) as temporary:
+        with atomic_write(path) as temporary:
             body.export(temporary)
         return
     if suffix != ".gii":
@@ -122,7 +122,7 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
         intent="NIFTI_INTENT_TRIANGLE",
         meta=GiftiMetaData({"TopologicalType": "Closed" if is_closed(mesh) else "Open"}),
     )
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         nib.save(GiftiImage(darrays=[points, triangles]), temporary)
 
 
@@ -146,7 +146,7 @@ def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Struct
         GiftiDataArray(np.asarray(values, np.float32), intent="NIFTI_INTENT_SHAPE", meta=GiftiMetaData({"Name": name}))
         for name, values in maps.items()
     ]
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         nib.save(GiftiImage(darrays=arrays, meta=GiftiMetaData(_named(structure))), temporary)
 
 
@@ -291,7 +291,7 @@ def write_vertex_labels(
     array = GiftiDataArray(
         np.asarray(labels, dtype=np.int32), intent="NIFTI_INTENT_LABEL", meta=GiftiMetaData({"Name": "regions"})
     )
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         nib.save(GiftiImage(darrays=[array], labeltable=table, meta=GiftiMetaData(_named(structure))), temporary)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..settings.terms import AffineSource
-from .files import AGAIN, AnyPath, reading, replaced, require_finite
+from .files import AGAIN, AnyPath, atomic_write, reading, require_finite
 
 log = logging.getLogger(__name__)
 
@@ -124,7 +124,7 @@ def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
     if not np.allclose(image.get_qform(), volume.affine, atol=1e-3):
         image.set_qform(None, code="unknown")
         image.set_sform(volume.affine, code="scanner")
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         nib.save(image, temporary)
 
 

@@ -1,8 +1,8 @@
-"""`python -m gyriflow.running.launch ARG...`: Snakemake with this checkout's workflow, called by `./run snakemake`.
+"""Start Snakemake with this checkout's workflow (`./run snakemake ARG...`, `python -m gyriflow.running.launch ARG...`).
 
-It clears a lock that an interrupted run has left (never that of a live run) and ends with the exit code of the first
-failed step. Where steps are run, the terminal shows a bar, warnings and failures, and a log all else; `--verbose`,
-`--quiet`, `--printshellcmds` or `--logger` give Snakemake's own messages. All else is Snakemake's own command line.
+The launcher removes the lock of an interrupted run (never that of a live one) and returns the exit code of the first
+failed step. The terminal shows a progress bar, warnings and failures; everything else goes to a log. `--verbose`,
+`--quiet`, `--printshellcmds` and `--logger` bring back Snakemake's own messages. All other options are Snakemake's.
 """
 
 import fcntl
@@ -24,7 +24,7 @@ from typing import IO
 from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
 from ..io.yaml_files import read_keys
-from ..settings.base import nearest
+from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
@@ -37,32 +37,44 @@ SETTINGS = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
 }
-"""Variables of MPI and BLAS where the user sets no others, as `./run` and the conda environment have them."""
+"""Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
-LOOKS_ONLY = ("dryrun", "nolock", "summary", "detailed_summary", "rulegraph", "dag", "filegraph", "list_rules", "lint")
-"""Options of Snakemake's under which it takes no lock."""
-SAYS_ITSELF = (
+READ_ONLY_OPTIONS = (
+    "dryrun",
+    "nolock",
+    "summary",
+    "detailed_summary",
+    "rulegraph",
+    "dag",
+    "filegraph",
+    "list_rules",
+    "lint",
+)
+"""Options with which Snakemake runs nothing and takes no lock."""
+VERBOSE_OPTIONS = (
     *("verbose", "quiet", "printshellcmds", "logger", "debug", "debug_dag", "unlock", "touch", "report", "archive"),
     *("delete_all_output", "delete_temp_output", "cleanup_metadata", "list_changes", "list_input_changes"),
     *("list_params_changes", "generate_unit_tests"),
 )
-"""Options under which Snakemake's own messages are wanted, or no steps are run."""
-GOES_ON, LOOKS, MEASURES_ONLY = "GYRIFLOW_KEEP_GOING", "GYRIFLOW_LOOKS_ONLY", "GYRIFLOW_MEASURES_ONLY"
-"""Environment variables that are set where a call goes on after a failed step or row of a table, where it runs nothing,
-and where it folds nothing."""
-REFUSED_FILE = "GYRIFLOW_REFUSED_FILE"
-"""Environment variable with a file that says which brains were refused, and why: the study is finished without them."""
-FULL_BYTES = 4 * 2**20
-"""With less space left, a run that ended without a code of its own has met a full disk."""
+"""Options that ask for Snakemake's own messages, or for something else than running steps."""
+KEEP_GOING_VAR = "GYRIFLOW_KEEP_GOING"
+"""Environment variable: continue after a failed step, or after a row of a table that cannot be used."""
+DRY_RUN_VAR = "GYRIFLOW_DRY_RUN"
+"""Environment variable: run nothing."""
+MEASURE_ONLY_VAR = "GYRIFLOW_MEASURE_ONLY"
+"""Environment variable: fold nothing."""
+REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
+"""Environment variable with the path of a JSON file: refused brains and causes. The study is finished without them."""
+MIN_FREE_BYTES = 4 * 2**20
+"""If less disk space is left, a run that failed without an exit code of its own has filled the disk."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
-HELD: list[IO[str]] = []
-"""Files whose locks this process holds."""
+_held_locks: list[IO[str]] = []
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
-    """Return a file whose lock lives as long as it is open, or None where another process holds it.
+    """Lock a working directory; return the open lock file, or None if another process holds the lock.
 
-    StorageError where the folder cannot be written.
+    The lock lasts until the file is closed. StorageError if the directory cannot be written.
     """
     path = directory / ".snakemake" / "gyriflow.lock"
     try:
@@ -75,20 +87,21 @@ def hold_lock(directory: Path) -> IO[str] | None:
     except BlockingIOError:
         file.close()
         return None
-    HELD.append(file)
+    _held_locks.append(file)
     return file
 
 
-def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
-    """Remove Snakemake's locks in a working directory in which no run is live.
+def clear_stale_lock(directory: Path, max_wait_s: float = 3.0) -> None:
+    """Remove Snakemake's locks from a working directory in which no run is live.
 
-    StorageError where a run is live there (one that is just ending is waited for), or the folder cannot be written.
+    A run that is about to end is waited for, at most `max_wait_s` seconds. StorageError if a run is still live, or if
+    the directory cannot be written.
     """
-    deadline = time.monotonic() + patience_s
+    deadline = time.monotonic() + max_wait_s
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
-            remedy = "Wait for it to end, or give this run a folder of its own with --directory"
-            problem = "another gyriflow run is live in this working directory"
+            remedy = "Wait for it to end, or choose another folder with --directory"
+            problem = "another gyriflow run is using this working directory"
             raise StorageError(problem, path=directory.resolve(), remedy=remedy)
         time.sleep(0.2)
     with file:
@@ -96,38 +109,41 @@ def clear_stale_lock(directory: Path, patience_s: float = 3.0) -> None:
         for lock in stale:
             lock.unlink()
     if stale:
-        print("gyriflow: cleared the lock of an interrupted run, which is resumed", file=sys.stderr)
+        print("gyriflow: removed the lock of an interrupted run; resuming it", file=sys.stderr)
 
 
-def refuse_bad_configfiles(files: Sequence[Path], directory: Path) -> None:
-    """Raise InputError where a configuration file, named or found here, is missing, no YAML, or has a key twice."""
+def check_configfiles(files: Sequence[Path], directory: Path) -> None:
+    """Raise InputError if a configuration file is missing, is not YAML or has a duplicate key.
+
+    Without `files`, the directory's own config/config.yaml is checked if it exists.
+    """
     default = directory / "config" / "config.yaml"
     for file in files or ([default] if default.is_file() else []):
         try:
             read_keys(file)
         except InputError as error:
-            remedy = "" if file.exists() else ". Targets stand before --configfile, or after another option"
+            remedy = "" if file.exists() else ". Put targets before --configfile, or after another option"
             raise InputError(f"configuration {error}{remedy}") from error
 
 
-def refuse_unknown_options(unknown: Sequence[str], usage: str) -> None:
-    """Raise InputError where an argument that Snakemake does not know is an option; `usage` names those it knows."""
-    known = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
+def check_options(unknown: Sequence[str], usage: str) -> None:
+    """Raise InputError if an `unknown` argument is an option; Snakemake's `usage` lists the valid ones."""
+    options = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
     for name in (argument.partition("=")[0] for argument in unknown if argument.startswith("-")):
-        raise InputError(f"unknown option {name}; {nearest(name, known)}")
+        raise InputError(f"unknown option {name}; {did_you_mean(name, options)}")
 
 
-def unknown_target(name: str) -> InputError:
-    """Return the error of a target that no rule makes."""
+def unknown_target_error(name: str) -> InputError:
+    """Return the error for a target that no rule makes."""
     rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
-    known = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
-    return InputError(f"there is no stage or result {name}; {nearest(name, known)}")
+    targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+    return InputError(f"there is no stage or result {name}; {did_you_mean(name, targets)}")
 
 
-def send_prints_to(log: Path) -> None:
-    """Send what this process' libraries and children print to a file; Python's own streams stay on the terminal."""
+def redirect_output(log: Path) -> None:
+    """Append to a file what libraries and child processes print. Python's own streams stay on the terminal."""
     log.parent.mkdir(parents=True, exist_ok=True)
-    # for those alone who own it: it may hold names of subjects
+    # readable by its owner only, since it may contain names of subjects
     file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     for number, stream in ((1, "stdout"), (2, "stderr")):
         getattr(sys, stream).flush()
@@ -136,14 +152,14 @@ def send_prints_to(log: Path) -> None:
 
 
 def refused_brains() -> dict[str, str]:
-    """Return the cause by the id of each brain that an earlier pass of this call has refused."""
-    path = os.environ.get(REFUSED_FILE)
+    """Return the causes of the brains that an earlier pass of this call refused, by id."""
+    path = os.environ.get(REFUSED_FILE_VAR)
     return read_json(path) if path else {}
 
 
 def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
-    """Return the cause by the id of each brain of which a step has failed since a time (s, of the epoch)."""
-    from .jobs import gather_messages  # takes a second, which a good run need not wait for
+    """Return the causes of the brains that had a failed step since a time (s since the epoch), by id."""
+    from .jobs import gather_messages  # takes a second to import, and only failed runs need it
 
     brains = [folder.name for folder in directory.glob("results/brains/*")]
     messages = gather_messages(directory, brains, [], since_s=since_s)
@@ -152,60 +168,57 @@ def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
 
 
 def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> None:
-    """Run the same call again without refused brains, so that they don't hold up the tables and figures of the rest.
+    """Run the same call again without the refused brains, so that the others get their tables and figures.
 
-    Where the call asks for files of such a brain there is nothing to finish.
+    Nothing is run if the call asks for files of a refused brain.
     """
     if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
         return
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)
-    # the locks of the Snakemake run that this process has ended
-    while HELD:
-        HELD.pop().close()
-    # after an interruption the same command goes on from here
+    # release the locks of the Snakemake run that has just ended
+    while _held_locks:
+        _held_locks.pop().close()
+    # an interrupted second pass is resumed by the same command
     with suppress(KeyboardInterrupt):
         again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
-        environment = os.environ | {REFUSED_FILE: str(path)}
+        environment = os.environ | {REFUSED_FILE_VAR: str(path)}
         subprocess.run(again, env=environment, stdout=sys.stdout, stderr=sys.stderr, check=False)
     path.unlink(missing_ok=True)
 
 
 def exit_code(code: int, recorded: int | None, directory: Path) -> int:
-    """Return the code of a run from Snakemake's and that of the first failed step; say so where the disk is full."""
-    if code and recorded in (None, 1) and shutil.disk_usage(directory).free < FULL_BYTES:
-        full = f"{directory.resolve()}: the disk is full. Free space, then run the same command again"
-        print(f"gyriflow: {full}", file=sys.stderr)
+    """Return the exit code of a run, given Snakemake's `code` and the one `recorded` by the first failed step.
+
+    A full disk is reported and gives the code of a StorageError.
+    """
+    if code and recorded in (None, 1) and shutil.disk_usage(directory).free < MIN_FREE_BYTES:
+        message = f"{directory.resolve()}: the disk is full. Free some space, then run the same command again"
+        print(f"gyriflow: {message}", file=sys.stderr)
         return StorageError.exit_code
     return (recorded or code) if code else 0
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Run Snakemake and return the exit code: its own, or that of the first failed step."""
-    # the name under which usage and mistakes in it are told
-    sys.argv[0] = "snakemake"
-    from snakemake import cli  # takes a second, which the Snakefile's own import of this module need not wait for
-
-    parser = cli.get_argument_parser()
-    options, unknown = parser.parse_known_args(arguments)
-    refuse_unknown_options(unknown, parser.format_usage())
-    directory = options.directory or Path()
-    refuse_bad_configfiles(options.configfile or [], directory)
-    looks = any(getattr(options, name, None) not in (None, False) for name in LOOKS_ONLY)
-    if not looks:
-        clear_stale_lock(directory)
+def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
+    """Set the environment variables that the Snakefile and the steps of the workflow read."""
     os.environ |= SETTINGS | os.environ
-    # steps call `python`, which is to be this one
+    # steps call `python`; let it be this one
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
-    os.environ |= {name: "1" for name, applies in ((GOES_ON, options.keep_going), (LOOKS, looks)) if applies}
-    # beside the results, where jobs on other machines of a cluster find it too
-    exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
+    os.environ |= {name: "1" for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run)) if is_set}
     os.environ[EXIT_FILE] = str(exit_file)
-    interrupts: list[int] = []
-    unknown_targets: list[str] = []
-    began = time.time()
 
-    def names_no_target(record: logging.LogRecord) -> bool:
+
+def call_snakemake(arguments: Sequence[str]) -> int:
+    """Run Snakemake in this process; return its exit code, or `INTERRUPTED` after an interrupt.
+
+    InputError if a target does not exist.
+    """
+    from snakemake import cli
+
+    unknown_targets: list[str] = []
+    interrupts: list[int] = []
+
+    def is_shown(record: logging.LogRecord) -> bool:
         names = NO_RULE.findall(record.getMessage())
         unknown_targets.extend(names)
         return not names
@@ -215,34 +228,59 @@ def main(arguments: Sequence[str]) -> int:
         signal.default_int_handler(number, frame)
 
     signal.signal(signal.SIGINT, interrupt)
-    own_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
-    complete = [*([] if own_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]
-    if not looks and not any(getattr(options, name, None) for name in SAYS_ITSELF):
-        details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
-        complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
-        send_prints_to(details)
-    logging.getLogger("snakemake.logging").addFilter(names_no_target)
+    logging.getLogger("snakemake.logging").addFilter(is_shown)
     try:
-        cli.main(complete)
+        cli.main(arguments)
+        code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
-        code = INTERRUPTED
-    recorded = recorded_exit_code(exit_file)
-    exit_file.unlink(missing_ok=True)
-    if unknown_targets:
-        raise unknown_target(unknown_targets[0])
-    if code and interrupts:
-        print("gyriflow: interrupted; the same command resumes from here", file=sys.stderr)
         return INTERRUPTED
-    may_finish = options.keep_going and not looks and REFUSED_FILE not in os.environ
-    if code and may_finish and (brains := failed_brains(directory, began)):
+    if unknown_targets:
+        raise unknown_target_error(unknown_targets[0])
+    return INTERRUPTED if code and interrupts else code
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run Snakemake; return the exit code of the first failed step, or else Snakemake's own."""
+    # the program name in Snakemake's usage messages
+    sys.argv[0] = "snakemake"
+    from snakemake import cli  # takes a second to import; the Snakefile imports this module without needing it
+
+    parser = cli.get_argument_parser()
+    options, unknown = parser.parse_known_args(arguments)
+    check_options(unknown, parser.format_usage())
+    directory = options.directory or Path()
+    check_configfiles(options.configfile or [], directory)
+    dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
+    if not dry_run:
+        clear_stale_lock(directory)
+    # in the working directory, where jobs on other machines of a cluster find it too
+    exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
+    set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
+    has_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
+    complete = [*([] if has_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]
+    if not dry_run and not any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
+        details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
+        complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]
+        redirect_output(details)
+    began_s = time.time()
+    try:
+        code = call_snakemake(complete)
+    finally:
+        recorded = recorded_exit_code(exit_file)
+        exit_file.unlink(missing_ok=True)
+    if code == INTERRUPTED:
+        print("gyriflow: interrupted; run the same command again to resume", file=sys.stderr)
+        return INTERRUPTED
+    can_finish = options.keep_going and not dry_run and REFUSED_FILE_VAR not in os.environ
+    if code and can_finish and (brains := failed_brains(directory, began_s)):
         finish_without(brains, arguments, directory)
     return exit_code(code, recorded, directory)
 
 
 if __name__ == "__main__":
-    # the Snakefile imports this module by its name, beside the program: both are to hold the same locks
+    # the Snakefile imports this module by name; run that copy, so that both share the same locks
     from gyriflow.running.launch import main
 
     try:

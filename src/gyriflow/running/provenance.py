@@ -41,7 +41,7 @@ def software() -> dict[str, Any]:
     }
 
 
-def require_own_results(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
+def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
     """Raise InputError where the results in a working directory are those of another study.
 
     Another study is one of other configuration files without a brain in common; a configuration that was changed,

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from ..shipped import SHIPPED
-from .base import Problem, Settings, located, nearest, refused
+from .base import KeyProblem, Settings, did_you_mean, located, refused
 from .terms import AffineSource, Coordinates
 from .varying import Week
 
@@ -117,11 +117,11 @@ class AtlasSeries(Settings):
                 raise ValueError("should have {week} in each path, for the gestational week")
         return files
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         if ("labels" in self.files) != (self.scheme is not None):
-            yield Problem("is needed with labels, whose meaning it is, and with nothing else", ("scheme",))
+            yield KeyProblem("is needed with labels, whose meaning it is, and with nothing else", ("scheme",))
         if self.matched and "labels" in self.files:
-            yield Problem("has no meaning with labels, which have no vertices", ("matched",))
+            yield KeyProblem("has no meaning with labels, which have no vertices", ("matched",))
 
     @property
     def needed(self) -> list[FileKey]:
@@ -192,7 +192,7 @@ class AtlasSettings(Settings):
     @classmethod
     def _known_name(cls, name: str) -> str:
         if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
-            raise refused(f"found {name!r}; {nearest(name, shipped)} An atlas of your own is an atlas.yaml")
+            raise refused(f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is an atlas.yaml")
         return name
 
     @field_validator("weeks")

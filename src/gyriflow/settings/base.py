@@ -30,7 +30,7 @@ PROBLEM = "problem"
 
 
 @dataclass(frozen=True)
-class Problem:
+class KeyProblem:
     """A mistake, and the path of its key below the settings that are checked."""
 
     text: str
@@ -57,7 +57,7 @@ class Settings(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _refuse_what_yaml_or_a_system_takes_amiss(cls, value: Any, info: ValidationInfo) -> Any:
+    def _reject_booleans_and_nul(cls, value: Any, info: ValidationInfo) -> Any:
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
             raise ValueError("should be a number or text, not true or false")
@@ -76,11 +76,11 @@ class Settings(BaseModel):
             raise ValidationError.from_exception_data(cls.__name__, errors)
         return settings
 
-    def problems(self) -> Iterable[Problem]:
+    def problems(self) -> Iterable[KeyProblem]:
         """Return what is wrong between keys that are valid each."""
         return ()
 
-    def gives(self, key: str) -> bool:
+    def is_set(self, key: str) -> bool:
         """Return whether a key was given with a value other than null."""
         return key in self.model_fields_set and getattr(self, key) is not None
 
@@ -114,7 +114,7 @@ def dotted(path: Key) -> str:
     return text.removeprefix(".")
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
+def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
     names = list(names)
     longer = [other for other in names if other.endswith(f"_{name}")]
@@ -127,7 +127,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
     path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
-        text = f"unknown key; {nearest(str(path[-1]), keys_at(kind, path[:-1]))}"
+        text = f"unknown key; {did_you_mean(str(path[-1]), keys_at(kind, path[:-1]))}"
     elif details["type"] not in (PROBLEM, "missing"):
         text += f"; found {details['input']!r}"
     return path, text

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from .base import InputFile, Problem, Settings
+from .base import InputFile, KeyProblem, Settings
 from .schemes import Label
 from .synthetic import ShapeSettings
 from .terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
@@ -86,7 +86,7 @@ class Brain(Settings):
 
     @property
     def source(self) -> str:
-        return next(name for name in SOURCES if self.gives(name))
+        return next(name for name in SOURCES if self.is_set(name))
 
     @property
     def synthetic(self) -> bool:
@@ -129,22 +129,22 @@ class Brain(Settings):
         volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
         return HEMISPHERE_LABELS if volume else HEMISPHERE_SURFACE
 
-    def problems(self) -> Iterator[Problem]:
-        given = [key for key in SOURCES if self.gives(key)]
+    def problems(self) -> Iterator[KeyProblem]:
+        given = [key for key in SOURCES if self.is_set(key)]
         if not given and self.image is not None:
-            yield Problem("gyriflow does not segment images; give a label volume under labels", ("image",))
+            yield KeyProblem("gyriflow does not segment images; give a label volume under labels", ("image",))
         elif len(given) != 1:
             text = f"found {' and '.join(given) or 'none'} as its source; expected exactly one of {', '.join(SOURCES)}"
-            yield Problem(text)
+            yield KeyProblem(text)
         else:
             for key, kinds in MEANINGS.items():
                 if key in self.model_fields_set and self._kind not in kinds:
-                    yield Problem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
+                    yield KeyProblem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
             pair = self._kind == "hemispheres"
             if self.white is not None and self._kind in OF_SURFACES and ("left" in self.white_files) != pair:
-                yield Problem("should have as many files as there are pial surfaces", ("white",))
+                yield KeyProblem("should have as many files as there are pial surfaces", ("white",))
             if self._kind in OF_LABELS and self.scheme is None:
-                yield Problem("is missing; it says what the labels mean", ("scheme",))
+                yield KeyProblem("is missing; it says what the labels mean", ("scheme",))
 
 
 # regions
@@ -175,15 +175,15 @@ class GivenRegions(Settings):
     """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region,
     unnamed ones none. Needed with a volume; else the label files' names count."""
 
-    def problems(self) -> Iterator[Problem]:
-        sides = [side for side in SIDES if self.gives(side)]
+    def problems(self) -> Iterator[KeyProblem]:
+        sides = [side for side in SIDES if self.is_set(side)]
         if (self.volume is not None) == bool(sides):
-            yield Problem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
+            yield KeyProblem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
         elif len(sides) == 1:
             missing = "right" if sides == ["left"] else "left"
-            yield Problem("is missing; both hemispheres need labels", (missing,))
+            yield KeyProblem("is missing; both hemispheres need labels", (missing,))
         if self.volume is not None and not self.names:
-            yield Problem("is missing; it names the regions of the volume", ("names",))
+            yield KeyProblem("is missing; it names the regions of the volume", ("names",))
 
     @property
     def files(self) -> dict[str, str]:

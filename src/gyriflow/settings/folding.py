@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .base import Problem, Settings, line, validated
+from .base import KeyProblem, Settings, line, validated
 from .growth import SIZES, Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import Floats, Maps, Varying, VaryingNumber, Week, bounds_of, map_of, require_bounds, value_range, varying
@@ -127,10 +127,10 @@ class FoldingSettings(Settings):
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if SIZES[0] in self.growth.own_keys() and self.gives(key):
-                yield Problem(f"has no meaning with the growth model {self.growth.model}", (key,))
+            if SIZES[0] in self.growth.own_keys() and self.is_set(key):
+                yield KeyProblem(f"has no meaning with the growth model {self.growth.model}", (key,))
 
     @field_validator("*")
     @classmethod
@@ -179,14 +179,14 @@ class FoldingParameters(FoldingSettings):
         """The names of the maps that the parameters need."""
         return self.varying_maps | {f"{name}_{axis}" for name in self.targets.values() for axis in AXES}
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
-            yield Problem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
+            yield KeyProblem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
         yield from value_problems(self, self.start_week, {})
 
 
-def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[Problem]:
+def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str = "") -> Iterator[KeyProblem]:
     """Yield the inconsistencies between the settings of a run, over all its weeks and vertices.
 
     Parameters whose maps are not among `maps` are left out. `start` is the name of the start in messages, such as "the
@@ -195,7 +195,7 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     end = p.end_week
     if end <= start_week:
         called = f"{start_week:g}, {start}" if start else f"start_week, {start_week:g}"
-        yield Problem(f"found {end:g}; it should be above {called}", ("end_week",))
+        yield KeyProblem(f"found {end:g}; it should be above {called}", ("end_week",))
     values = {
         key: value
         for key in VARYING
@@ -204,13 +204,13 @@ def value_problems(p: FoldingSettings, start_week: float, maps: Maps, start: str
     ranges = {key: value_range(value, maps, start_week, end) for key, value in values.items()}
     for key, unit in (("thickness_mm", "mm"), ("shear_modulus_cortex_pa", "Pa"), ("shear_modulus_core_pa", "Pa")):
         if key in ranges and (least := ranges[key][0]) <= 0:
-            yield Problem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
+            yield KeyProblem(f"reaches {least:g} {unit}; it should stay above 0", (key,))
     rates = {key: ranges[key] for key in GROWTH_RATES if key in ranges}
     for key, (least, _) in rates.items():
         if least < 0:
-            yield Problem(f"found {least:g}; it should be 0 or more", (key,))
+            yield KeyProblem(f"found {least:g}; it should be 0 or more", (key,))
     if (growth := p.step_s * sum(most for _, most in rates.values())) >= 1:
-        yield Problem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
+        yield KeyProblem(f"found {p.step_s:g}; tissue would grow by {growth:.3g} in a step, beyond 1", ("step_s",))
 
 
 def target_map(week: float) -> str:

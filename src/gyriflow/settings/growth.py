@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from .base import Problem, Settings
+from .base import KeyProblem, Settings
 from .varying import Week
 
 SizeCurve = Annotated[
@@ -55,9 +55,9 @@ class Growth(Settings):
         values = self.model_dump(mode="json")
         return {key: value for key, value in values.items() if self.model in MODELS_OF_KEY.get(key, (self.model,))}
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         for key, models in MODELS_OF_KEY.items():
             if self.model not in models and getattr(self, key) != type(self).model_fields[key].default:
-                yield Problem(f"has no meaning with the model {self.model}; expected {' or '.join(models)}", (key,))
+                yield KeyProblem(f"has no meaning with the model {self.model}; expected {' or '.join(models)}", (key,))
         if self.of == "atlas" and self.thickness_mm == "measured":
-            yield Problem("is measured on the start's own later brains, unknown to a prediction", ("thickness_mm",))
+            yield KeyProblem("is measured on the start's own later brains, unknown to a prediction", ("thickness_mm",))

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from .base import Problem, Settings
+from .base import KeyProblem, Settings
 from .brains import Brain
 from .folding import FoldingSettings
 from .growth import SIZES
@@ -73,10 +73,10 @@ class Run(FoldingSettings):
     """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."""
 
     # unlike `folding`, it may have rates that its growth model does not use; parameters hold the sizes of the shapes
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         for key in SIZES:
             if self.growth.model == "shapes" and getattr(self.growth, key) != "measured":
-                yield Problem("has no meaning with the model shapes; expected sizes", ("growth", key))
+                yield KeyProblem("has no meaning with the model shapes; expected sizes", ("growth", key))
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
@@ -218,17 +218,19 @@ class Calibration(Compared):
     seed: int = Field(0, ge=0)
     """Seed of the sequence and of the Gaussian process."""
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
-            yield Problem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
+            yield KeyProblem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
         if not self.rounds or self.rounds[0] < LEAST_FIRST_RUNS or sum(self.rounds) > MOST_RUNS:
             text = f"found {list(self.rounds)}; expected {LEAST_FIRST_RUNS} runs or more in the first round"
-            yield Problem(f"{text} and at most {MOST_RUNS} in all", ("rounds",))
+            yield KeyProblem(f"{text} and at most {MOST_RUNS} in all", ("rounds",))
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
-                yield Problem(f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key))
+                yield KeyProblem(
+                    f"found {list(bounds)}; expected the lowest and the highest value", ("parameters", key)
+                )
         if not self.score:
-            yield Problem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
+            yield KeyProblem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
 
     @property
     def runs(self) -> dict[str, int]:

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from ..shipped import SHIPPED
-from .base import Problem, Settings
+from .base import KeyProblem, Settings
 
 SCHEME_FILES = {path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))}
 """The files of the schemes that come with gyriflow, by name."""
@@ -46,22 +46,22 @@ class SchemeSettings(Settings):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
         return dict(sorted((named | self.known).items()))
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         if not self.cerebrum:
-            yield Problem("found no labels; it should have one or more", ("cerebrum",))
+            yield KeyProblem("found no labels; it should have one or more", ("cerebrum",))
         for key in ("cerebrum", "cortex", "left", "right", "white_matter", "ventricles"):
             labels = getattr(self, key)
             if twice := sorted({label for label in labels if labels.count(label) > 1}):
-                yield Problem(f"found {_as_text(twice)} more than once", (key,))
+                yield KeyProblem(f"found {_as_text(twice)} more than once", (key,))
             if outside := sorted(set(labels) - set(self.cerebrum)):
-                yield Problem(f"found {_as_text(outside)}; it should have labels of the cerebrum only", (key,))
+                yield KeyProblem(f"found {_as_text(outside)}; it should have labels of the cerebrum only", (key,))
         if self.cortex and set(self.cerebrum) <= set(self.cortex):
-            yield Problem("found all of the cerebrum; the tissue inside the cortex is missing", ("cortex",))
+            yield KeyProblem("found all of the cerebrum; the tissue inside the cortex is missing", ("cortex",))
         if both := sorted(set(self.left) & set(self.right)):
-            yield Problem(f"found {_as_text(both)}, which are in left too", ("right",))
+            yield KeyProblem(f"found {_as_text(both)}, which are in left too", ("right",))
         if bool(self.left) != bool(self.right):
             missing = "right" if self.left else "left"
-            yield Problem("is missing; the hemispheres are separated by both left and right", (missing,))
+            yield KeyProblem("is missing; the hemispheres are separated by both left and right", (missing,))
 
 
 class LabelScheme(SchemeSettings):

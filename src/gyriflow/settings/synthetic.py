@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from .base import Problem, Settings
+from .base import KeyProblem, Settings
 
 MOST_UNEQUAL_AXES = 2.0
 """Longest over shortest semi-axis of a shape: beyond this the ends are too sharp for even triangles."""
@@ -29,12 +29,12 @@ class ShapeSettings(Settings):
     def kind(self) -> str:
         return "sphere" if len(set(self.semi_axes_mm)) == 1 else "ellipsoid"
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
         if longest > MOST_UNEQUAL_AXES * shortest:
             text = f"found {longest:g} as the longest; expected at most {MOST_UNEQUAL_AXES:g} times the shortest"
-            yield Problem(text, ("semi_axes_mm",))
+            yield KeyProblem(text, ("semi_axes_mm",))
         # the default suits the default sizes; only a given value can be wrong
-        if self.gives("noise_mm") and self.noise_mm > MOST_NOISE * shortest:
+        if self.is_set("noise_mm") and self.noise_mm > MOST_NOISE * shortest:
             text = f"found {self.noise_mm:g}; expected at most {MOST_NOISE * shortest:g}, a fiftieth of the shortest"
-            yield Problem(f"{text} semi-axis", ("noise_mm",))
+            yield KeyProblem(f"{text} semi-axis", ("noise_mm",))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, field_validator
 from pydantic.fields import FieldInfo
 
-from .base import InputFile, Problem, Settings
+from .base import InputFile, KeyProblem, Settings
 
 Floats = NDArray[np.float64]
 Maps = Mapping[str, Floats]
@@ -52,18 +52,18 @@ class Varying(Settings):
     def _by_week(cls, value: dict[float, float] | None) -> dict[float, float] | None:
         return None if value is None else dict(sorted(value.items()))
 
-    def problems(self) -> Iterator[Problem]:
+    def problems(self) -> Iterator[KeyProblem]:
         if not self.weeks and self.map is None:
-            yield Problem("found no values; expected a number, `weeks` or a `map`")
+            yield KeyProblem("found no values; expected a number, `weeks` or a `map`")
         maps, surfaces = files_of(self.map), files_of(self.surface)
         if surfaces and not maps:
-            yield Problem("has a `surface` but no `map`", ("surface",))
+            yield KeyProblem("has a `surface` but no `map`", ("surface",))
         elif surfaces and len(maps) != len(surfaces):
-            yield Problem("should have as many files as `map`", ("surface",))
+            yield KeyProblem("should have as many files as `map`", ("surface",))
         elif surfaces and any(path.endswith((".nii", ".nii.gz")) for path in maps):
-            yield Problem("has no meaning where the map is a volume", ("surface",))
+            yield KeyProblem("has no meaning where the map is a volume", ("surface",))
         elif not surfaces and (len(maps) > 1 or any(path.endswith(".gii") for path in maps)):
-            yield Problem("is missing; it is the surface whose vertices the map belongs to", ("surface",))
+            yield KeyProblem("is missing; it is the surface whose vertices the map belongs to", ("surface",))
 
 
 def files_of(files: str | tuple[str, str] | None) -> list[str]:

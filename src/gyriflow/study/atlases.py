@@ -11,7 +11,7 @@ from typing import Any
 from ..io.files import files_below
 from ..io.yaml_files import read_keys
 from ..settings.atlas import DOWNLOADS, Atlas, AtlasFileRecord, AtlasSettings, FileKey
-from ..settings.base import Problem
+from ..settings.base import KeyProblem
 from ..settings.root import Config
 
 
@@ -127,29 +127,29 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
     return list(entries.values())
 
 
-def atlas_problems(used: UsedAtlas) -> Iterator[Problem]:
+def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
     """Yield what is wrong between a section, its atlas and its folder."""
     atlas, settings, licence = used.atlas, used.settings, used.atlas.licence
     if unknown := [name for name in used.series if name not in atlas.series]:
-        yield Problem(f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}", ("series",))
+        yield KeyProblem(f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}", ("series",))
         return
     if used.folder.exists() and not used.folder.is_dir():
-        yield Problem(f"{used.folder} is a file; expected a folder", ("folder",))
+        yield KeyProblem(f"{used.folder} is a file; expected a folder", ("folder",))
         return
     if licence.accept and not settings.accept_licence:
         name = ", ".join(filter(None, (licence.name, licence.url)))
         text = f"found false; true accepts the licence of {atlas.name} ({name}): {licence.terms}"
-        yield Problem(text, ("accept_licence",))
+        yield KeyProblem(text, ("accept_licence",))
     available = set.union(*map(used.known_weeks, used.series))
     if unknown_weeks := set(settings.weeks or ()) - available:
         of = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
         text = f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(available)}. A week is never rounded"
-        yield Problem(text, ("weeks",))
+        yield KeyProblem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:
-            yield Problem(f"found {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
+            yield KeyProblem(f"found {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
         elif not file.copies and file.url is None:
-            yield Problem(f"{file.path} is missing, and {atlas.name} has no url for it", ("weeks",))
+            yield KeyProblem(f"{file.path} is missing, and {atlas.name} has no url for it", ("weeks",))
 
 
 def retrieval_note(used: UsedAtlas) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pydantic import ValidationError
 
 from ..io.yaml_files import SCHEMES
-from ..settings.base import Key, Problem, messages, nearest
+from ..settings.base import Key, KeyProblem, did_you_mean, messages
 from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
@@ -33,36 +33,36 @@ RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "r
 """Folders of the study's results that are no studies."""
 
 
-def problems_between(config: Config) -> list[Problem]:
+def problems_between(config: Config) -> list[KeyProblem]:
     """Return what is wrong between the sections of a configuration, each problem once."""
     every = (names, starts, runs, growth, studies, calibration, metrics)
     return list(dict.fromkeys(problem for check in every for problem in check(config)))
 
 
-def names(config: Config) -> Iterator[Problem]:
+def names(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong with the names of brains, runs, studies and schemes, some of which are folders."""
     if not config.brains and not config.atlas:
-        yield Problem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
+        yield KeyProblem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
     counts = Counter(brain.id for brain in config.brains)
     for name, count in counts.items():
         if count > 1:
-            yield Problem(f"{count} brains have the id {name}; ids are unique", ("brains",))
+            yield KeyProblem(f"{count} brains have the id {name}; ids are unique", ("brains",))
         if name in RESERVED_BRAINS:
-            yield Problem(f"the id {name} is reserved; choose another", ("brains",))
+            yield KeyProblem(f"the id {name} is reserved; choose another", ("brains",))
     for first, second in _equal_but_for_case(counts):
-        yield Problem(f"the ids {first} and {second} are the same folder on some disks; rename one", ("brains",))
+        yield KeyProblem(f"the ids {first} and {second} are the same folder on some disks; rename one", ("brains",))
     for first, second in _equal_but_for_case(config.runs):
         text = f"is the same folder as that of the run {first} on some disks; rename one"
-        yield Problem(text, ("runs", second))
+        yield KeyProblem(text, ("runs", second))
     reserved = {"runs": (MEASURED,), "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
         for name in sorted(set(getattr(config, section)) & set(taken)):
-            yield Problem("the name is taken; choose another", (section, name))
+            yield KeyProblem("the name is taken; choose another", (section, name))
     schemes = dict.fromkeys([*SCHEMES, *config.schemes])
     for number, brain in enumerate(config.brains):
         if brain.scheme not in (None, *schemes):
             expected = f"expected one of {', '.join(schemes)}, or a name of schemes"
-            yield Problem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
+            yield KeyProblem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
 
 
 def _equal_but_for_case(given: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -72,34 +72,34 @@ def _equal_but_for_case(given: Iterable[str]) -> Iterator[tuple[str, str]]:
             yield other, name
 
 
-def starts(config: Config) -> Iterator[Problem]:
+def starts(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong with the start brains of the study and of its runs."""
     yield from _start_problems(config.start, config, ("start",))
     for name, run in config.runs.items():
         yield from _start_problems(run.start, config, ("runs", name, "start"))
     if config.start is None and any(run.start is None for run in config.runs.values()):
-        yield Problem("is missing; it is the id of the brain that is folded, a list of ids, or all", ("start",))
+        yield KeyProblem("is missing; it is the id of the brain that is folded, a list of ids, or all", ("start",))
 
 
-def _start_problems(start: Start | None, config: Config, key: Key) -> Iterator[Problem]:
+def _start_problems(start: Start | None, config: Config, key: Key) -> Iterator[KeyProblem]:
     if start is None or start in (ALL, FIRST) or not config.brains:
         return
     ids = [start] if isinstance(start, str) else list(start)
     if not ids:
-        yield Problem("found no ids; expected one or more", key)
+        yield KeyProblem("found no ids; expected one or more", key)
     if twice := [name for name, count in Counter(ids).items() if count > 1]:
-        yield Problem(f"found {', '.join(twice)} more than once", key)
+        yield KeyProblem(f"found {', '.join(twice)} more than once", key)
     yield from _unknown(ids, config, key)
 
 
-def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[Problem]:
+def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProblem]:
     brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
         if name not in brains:
-            yield Problem(f"found {name!r}, which is no brain; {nearest(name, brains)}", key)
+            yield KeyProblem(f"found {name!r}, which is no brain; {did_you_mean(name, brains)}", key)
 
 
-def runs(config: Config) -> Iterator[Problem]:
+def runs(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong between the settings of each run and its start brains."""
     by_id = {brain.id: brain for brain in config.brains}
     for name, run in config.runs.items():
@@ -108,13 +108,13 @@ def runs(config: Config) -> Iterator[Problem]:
         # without a start, what holds at the end is checked
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
-                yield Problem(problem.text, _place(name, problem.key, config))
+                yield KeyProblem(problem.text, _place(name, problem.key, config))
         for key in VARYING if len(brains) > 1 else ():
             value = getattr(run, key)
             if isinstance(value, Varying) and value.surface is not None:
                 ids = ", ".join(brain.id for brain in brains)
                 text = f"has a map on a surface, which belongs to one brain; the run starts from {ids}"
-                yield Problem(text, _place(name, (key,), config))
+                yield KeyProblem(text, _place(name, (key,), config))
 
 
 def _place(run: str, key: Key, config: Config) -> Key:
@@ -122,7 +122,7 @@ def _place(run: str, key: Key, config: Config) -> Key:
     return ("folding", *key) if all(value == values[0] for value in values) else ("runs", run, *key)
 
 
-def growth(config: Config) -> Iterator[Problem]:
+def growth(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong between the brains, and the series that growth is measured on."""
     given = config.growth.brains
     named = dict(given) if isinstance(given, Mapping) else {}
@@ -138,16 +138,16 @@ def growth(config: Config) -> Iterator[Problem]:
     for key, ids in lists.items():
         brains = [config.brain(brain) for brain in ids]
         if (weeks := len({brain.week for brain in brains})) < 2:
-            yield Problem(f"found brains of {weeks} week(s); growth needs two or more", key)
+            yield KeyProblem(f"found brains of {weeks} week(s); growth needs two or more", key)
         mixed = sorted({brain.population or "of no known population" for brain in brains})
         if named and len(mixed) > 1:
-            yield Problem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
+            yield KeyProblem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
     series, wanted = growth_series(config.brains, config.growth.brains), config.growth.series
     if wanted is not None and series and wanted not in series:
-        yield Problem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "series"))
+        yield KeyProblem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "series"))
 
 
-def metrics(config: Config) -> Iterator[Problem]:
+def metrics(config: Config) -> Iterator[KeyProblem]:
     """Yield brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
     given = config.metrics
     atlases = {used.atlas.name for used in used_atlases(config)}
@@ -155,7 +155,7 @@ def metrics(config: Config) -> Iterator[Problem]:
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
     values = {brain.covariates.get(given.colour_by or "") for brain in config.brains} - {None}
     if given.colour_by and not 1 < len(values) <= MOST_COLOURED:
-        yield Problem(
+        yield KeyProblem(
             f"found {len(values)} values of {given.colour_by!r}; colours tell 2 to {MOST_COLOURED} apart",
             ("metrics", "colour_by"),
         )
@@ -164,14 +164,14 @@ def metrics(config: Config) -> Iterator[Problem]:
     yield from _unknown([given.template] if given.template else (), config, ("metrics", "template"))
     # the carrying of regions and their asymmetry are of both sides
     if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
-        yield Problem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
+        yield KeyProblem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
     scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
     for (subject, week), count in scans.items():
         if count > 1:
-            yield Problem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))
+            yield KeyProblem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))
 
 
-def studies(config: Config) -> Iterator[Problem]:
+def studies(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong between the studies, the runs and the brains."""
     study_of_run: dict[str, str] = {}
     for name, study in config.studies.items():
@@ -182,64 +182,64 @@ def studies(config: Config) -> Iterator[Problem]:
             for run, _ in variants(name, study):
                 if run in config.runs or study_of_run.setdefault(run, name) != name:
                     where = "runs" if run in config.runs else f"the study {study_of_run[run]}"
-                    yield Problem(f"has a run of the name {run}, as {where} has; rename one", key)
+                    yield KeyProblem(f"has a run of the name {run}, as {where} has; rename one", key)
 
 
-def _member_problems(study: Study, base: Run, key: Key) -> Iterator[Problem]:
+def _member_problems(study: Study, base: Run, key: Key) -> Iterator[KeyProblem]:
     if not study.vary:
-        yield Problem("found nothing; expected keys of folding with lists of values", (*key, "vary"))
+        yield KeyProblem("found nothing; expected keys of folding with lists of values", (*key, "vary"))
     for value in study.fixed_at:
         if value not in next(iter(study.vary.values()), ()):
-            yield Problem(f"found {value:g}; expected a value of the first varied key", (*key, "fixed_at"))
+            yield KeyProblem(f"found {value:g}; expected a value of the first varied key", (*key, "fixed_at"))
     for varied, values in study.vary.items():
         if not values or len(set(values)) < len(values):
-            yield Problem(f"found {list(values)}; expected one or more values, each once", (*key, "vary", varied))
+            yield KeyProblem(f"found {list(values)}; expected one or more values, each once", (*key, "vary", varied))
     fixed_at = {name: value for settings in study.fixed_at.values() for name, value in settings.items()}
     sections: dict[str, Mapping[str, object]] = {"vary": study.vary, "fixed": study.fixed, "fixed_at": fixed_at}
     places = {name: (*key, section, name) for section, names in sections.items() for name in names}
     if wrong := [name for name in places if name in NOT_VARIED]:
-        yield Problem("cannot differ within a study; choose another base", places[wrong[0]])
+        yield KeyProblem("cannot differ within a study; choose another base", places[wrong[0]])
         return
     for _, chosen in variants("", study):
         try:
             settings = changed(base, study.changes(chosen))
         except KeyError as error:
-            yield Problem("there is no such key of folding", places[error.args[0]])
+            yield KeyProblem("there is no such key of folding", places[error.args[0]])
             return
         except ValidationError as error:
             for path, text in messages(error, Run):
                 name = ".".join(map(str, path))
-                yield Problem(text, places.get(name, (*key, "fixed", name)))
+                yield KeyProblem(text, places.get(name, (*key, "fixed", name)))
         else:
             for problem in value_problems(settings, settings.end_week - 1e-9, {}):
-                yield Problem(problem.text, (*key, "vary", *problem.key))
+                yield KeyProblem(problem.text, (*key, "vary", *problem.key))
 
 
-def _comparison_problems(compared: Compared, config: Config, key: Key) -> Iterator[Problem]:
+def _comparison_problems(compared: Compared, config: Config, key: Key) -> Iterator[KeyProblem]:
     weeks, week = {brain.id: brain.week for brain in config.brains}, compared.compare_week
     if compared.base not in config.runs:
-        yield Problem(f"found {compared.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))
+        yield KeyProblem(f"found {compared.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))
     for brain in compared.compare_with or ():
         if weeks.get(brain) != week:
             what = f"of {weeks[brain]:g} GW" if brain in weeks else "which is no brain"
-            yield Problem(f"found {brain}, {what}; expected brains of {week:g} GW", (*key, "compare_with"))
+            yield KeyProblem(f"found {brain}, {what}; expected brains of {week:g} GW", (*key, "compare_with"))
     if compared.compare_with is None and week not in weeks.values():
         there = ", ".join(f"{other:g}" for other in sorted(set(weeks.values())))
-        yield Problem(f"found {week:g}; there are brains of {there} GW to compare with", (*key, "compare_week"))
+        yield KeyProblem(f"found {week:g}; there are brains of {there} GW to compare with", (*key, "compare_week"))
 
 
-def calibration(config: Config) -> Iterator[Problem]:
+def calibration(config: Config) -> Iterator[KeyProblem]:
     """Yield what is wrong between the calibration, the runs and the brains."""
     calibrate = config.calibrate
     if calibrate is None:
         return
     yield from _comparison_problems(calibrate, config, ("calibrate",))
     for name in sorted(set(calibrate.runs) & set(config.runs)):
-        yield Problem("the name is that of a run of the calibration; choose another", ("runs", name))
+        yield KeyProblem("the name is that of a run of the calibration; choose another", ("runs", name))
     if calibrate.base in config.runs:
         for key, bounds in calibrate.parameters.items():
             for text in _parameter_problems(key, bounds, config.runs[calibrate.base]):
-                yield Problem(text, ("calibrate", "parameters", key))
+                yield KeyProblem(text, ("calibrate", "parameters", key))
 
 
 def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterator[str]:

@@ -260,9 +260,9 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
     bids_folder(tmp_path)
     told = {}
     monkeypatch.setattr(launch, "main", lambda asked: told.update(os.environ, asked=asked) or 0)
-    monkeypatch.setenv(launch.MEASURES_ONLY, "")
+    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
     done = CliRunner().invoke(main, ["measure", str(tmp_path), "-d", str(tmp_path)])
-    assert (done.exit_code, told[launch.MEASURES_ONLY], told["asked"][-1]) == (0, "1", "all")
+    assert (done.exit_code, told[launch.MEASURE_ONLY_VAR], told["asked"][-1]) == (0, "1", "all")
     written = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
     assert list(written) == ["brains"]
     study = resolve(load(written, tmp_path))

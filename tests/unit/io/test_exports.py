@@ -13,7 +13,7 @@ from shapes import hemisphere, scaling, sphere
 from gyriflow.errors import InputError
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
-from gyriflow.io.exports import ExportedBrain, export_bids, hand_over
+from gyriflow.io.exports import ExportedBrain, export_bids, publish_derivatives
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import (
     read_surface,
@@ -117,7 +117,7 @@ def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     (folder / "sub-07").mkdir(parents=True)
     (folder / "sub-01" / "ses-9").mkdir(parents=True)
     source.mkdir()
-    hand_over(exported, folder, source, ["sub-01_ses-1"], whole=False)
+    publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=False)
     assert {path.name for path in folder.iterdir()} >= {"sub-07", "sub-01", "sub-02", ".bidsignore"}
     assert not (folder / "sub-01" / "ses-9").exists()
     assert (folder / "sub-01" / "figures" / "sub-01_ses-1_quality.png").exists()
@@ -126,7 +126,7 @@ def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     (exported.parent / "report" / "brains").mkdir(parents=True)
     for name in ("sub-01_ses-1", "crl-22"):
         (exported.parent / "report" / "brains" / f"{name}.html").touch()
-    hand_over(exported, folder, source, ["sub-01_ses-1"], whole=True)
+    publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=True)
     assert (folder / "participants.tsv").exists()
     # the report leads to brains of an atlas, too
     assert {path.name for path in (folder / "brains").iterdir()} == {"sub-01_ses-1.html", "crl-22.html"}

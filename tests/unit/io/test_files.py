@@ -9,14 +9,14 @@ import pytest
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
-from gyriflow.io.files import contents, read_json, read_tab_separated, replaced, write_json
+from gyriflow.io.files import atomic_write, contents, read_json, read_tab_separated, write_json
 from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
 
 
 @pytest.mark.promise(1)
 def test_replaced_file_appears_only_when_the_block_ends_well(tmp_path):
     path = tmp_path / "new" / "a.surf.gii"
-    with replaced(path) as temporary:
+    with atomic_write(path) as temporary:
         temporary.write_text("whole")
         assert not path.exists()
         assert temporary.parent == path.parent
@@ -32,7 +32,7 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
     path.write_text("earlier")
 
     def stopped_half_way():
-        with replaced(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_text("half")
             raise KeyboardInterrupt
 
@@ -45,7 +45,7 @@ def test_failed_write_keeps_the_earlier_file_and_leaves_nothing(tmp_path):
 @pytest.mark.fault(36)
 def test_full_disk_is_a_storage_error_that_names_the_file(tmp_path):
     path = tmp_path / "a.csv"
-    with pytest.raises(StorageError, match=r"a\.csv.*No space left") as caught, replaced(path):
+    with pytest.raises(StorageError, match=r"a\.csv.*No space left") as caught, atomic_write(path):
         raise OSError(errno.ENOSPC, "No space left on device")
     assert caught.value.exit_code == 5
 

@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
-from gyriflow.code_hash import code_hash, imported_modules, modules_behind, room_of
 from gyriflow import code_hash as sources
+from gyriflow.code_hash import code_hash, imported_modules, modules_behind, room_of
 from gyriflow.running.jobs import KILLED, cause, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time"

@@ -9,7 +9,7 @@ from configurations import LABELLED
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
 from gyriflow.running.launch import hold_lock
-from gyriflow.running.provenance import require_own_results
+from gyriflow.running.provenance import check_results_belong_to
 from gyriflow.running.status import STATE, status
 from gyriflow.running.terminal import RunDisplay
 from gyriflow.step import EXIT_FILE, recorded_exit_code
@@ -218,17 +218,17 @@ def configured(*ids, week=21):
 @pytest.fixture
 def made(tmp_path):
     """A folder with results of a study of brains a and b."""
-    require_own_results(tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True)
+    check_results_belong_to(tmp_path, [tmp_path / "one.yaml"], configured("a", "b"), record=True)
     (tmp_path / "results" / "brains" / "a").mkdir(parents=True)
     return tmp_path
 
 
 def test_another_study_is_refused_with_what_to_do(made):
     with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Choose .*--directory"):
-        require_own_results(made, [made / "two.yaml"], configured("c"), record=True)
+        check_results_belong_to(made, [made / "two.yaml"], configured("c"), record=True)
     # a brain of the same name may be another one
     with pytest.raises(InputError, match="another study"):
-        require_own_results(made, [made / "two.yaml"], configured("a", week=25), record=False)
+        check_results_belong_to(made, [made / "two.yaml"], configured("a", week=25), record=False)
 
 
 @pytest.mark.parametrize(
@@ -237,11 +237,11 @@ def test_another_study_is_refused_with_what_to_do(made):
     ids=["the same file, changed", "a copy of it, changed"],
 )
 def test_a_study_that_was_changed_goes_on(made, file, ids):
-    require_own_results(made, [made / file], configured(*ids), record=True)
+    check_results_belong_to(made, [made / file], configured(*ids), record=True)
     # whose they are now
-    require_own_results(made, [made / file], configured(*ids), record=False)
+    check_results_belong_to(made, [made / file], configured(*ids), record=False)
 
 
 def test_results_that_were_deleted_are_nobodys(made):
     (made / "results" / "brains" / "a").rmdir()
-    require_own_results(made, [made / "two.yaml"], configured("c"), record=True)
+    check_results_belong_to(made, [made / "two.yaml"], configured("c"), record=True)
