@@ -29,7 +29,9 @@ from .atlases import used_atlases
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Names that stand for something else in results, tables and settings."""
-RESERVED_STUDIES = ("benchmarks", "calibration", "figures", "growth", "logs", "registration", "tables")
+RESERVED_STUDIES = (
+    *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
+)
 """Folders of the study's results that are no studies."""
 
 

@@ -56,8 +56,11 @@ def test_a_diverged_run_keeps_others_away():
     runs = scored(sobol_design(BOUNDS, 12, seed=0))
     thick = runs["thickness_mm"] > 2.4
     runs.loc[thick, "score"] = np.nan
-    chosen = propose(fit(runs, BOUNDS, seed=0), 3)
-    assert (chosen["thickness_mm"] < 2.4).all()
+    surrogate = fit(runs, BOUNDS, seed=0)
+    best, worst = runs["score"].min(), runs["score"].max()
+    assert surrogate.scores[thick] == pytest.approx(worst + (worst - best))
+    assert surrogate.scores[~thick] == pytest.approx(runs["score"][~thick])
+    assert (propose(surrogate, 3)["thickness_mm"] < 2.4).all()
     with pytest.raises(ValueError, match="0 runs with a score"):
         fit(runs.assign(score=np.nan), BOUNDS, seed=0)
 

@@ -284,3 +284,12 @@ def test_what_deviates_in_one_place_does_so_there_alone():
     pole, opposite = BALL.vertices[:, 2].argmax(), BALL.vertices[:, 2].argmin()
     assert maps["log_area"][pole] == pytest.approx(2 * np.log(1.1), abs=0.01)
     assert maps["log_area"][opposite] == pytest.approx(0.0, abs=0.01)
+
+
+def test_areas_are_compared_after_a_gaussian_of_3_mm():
+    degree, height = 8, 0.005
+    wave = np.polynomial.Legendre.basis(degree)(BALL.vertices[:, 2] / 20)
+    found = deviation_maps(BALL, scaled(1 + height * wave[:, None]))["log_area"]
+    # heat over the time σ²/2 in eight implicit steps, along the sphere's own wave
+    decay = (1 + degree * (degree + 1) / 20**2 * 3**2 / 2 / 8) ** -8
+    assert found @ wave / (wave @ wave) == pytest.approx(2 * height * decay, rel=0.1)

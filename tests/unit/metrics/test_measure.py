@@ -221,6 +221,12 @@ def test_regions_have_their_area_and_means() -> None:
     assert value["top", "mean_thickness"] == 1.0
     assert value["bottom", "mean_thickness"] == 3.0
     assert found.set_index("metric").loc["mean_thickness", "unit"].tolist() == ["mm", "mm"]
+    lengths = {"thickness_mm": "mm", "sulcal_depth_mm": "mm", "distance_mm": "mm", "thickness_difference_mm": "mm"}
+    units = {"shape_index": "1", "curvedness": "1/mm", "mean_curvature": "1/mm", "log_area": "1", **lengths}
+    every = {name: np.ones(len(labels)) for name in units}
+    rows = region_metrics({"left": mesh}, {"left": every}, {"left": np.full(len(labels), 7)}, {7: "all"})
+    means = {f"mean_{name.removesuffix('_mm').removeprefix('mean_')}": unit for name, unit in units.items()}
+    assert dict(zip(rows["metric"], rows["unit"], strict=True)) == {"area": "cm2", "area_share": "1", **means}
     with pytest.raises(InputError, match="without a name: 9"):
         region_metrics({"left": mesh}, {"left": maps}, {"left": labels}, {7: "top"})
 

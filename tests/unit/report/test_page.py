@@ -281,6 +281,8 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verd
     assert verdict in run_verdict(run)
     assert verdict or run_verdict(run) == "reached 23 GW"
     assert "inverted" in run_verdict(run | {"min_J": -0.1})
+    assert "beyond their planes" not in run_verdict(run | {"initial_penetration_mm": 0.45})
+    assert "0.55 mm beyond their planes" in run_verdict(run | {"initial_penetration_mm": 0.55})
 
 
 def test_the_methods_say_what_was_run():

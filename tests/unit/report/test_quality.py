@@ -83,6 +83,10 @@ def test_line_and_edge_agree_in_every_plane(figure, number, name, axes):
     drawn, centre, half = figure
     panel = drawn.axes[number]
     assert panel.get_title().startswith(name)
+    # letters stand at the ends of the axis: left is at low x, posterior at low y
+    ends = sorted((text.get_position()[0], text.get_text()) for text in panel.texts if len(text.get_text()) == 1)
+    assert "".join(end for _, end in ends) == ("PA" if name == "sagittal" else "LR")
+    assert np.diff(panel.get_xlim()) > 0
     (lines,) = [item for item in panel.collections if isinstance(item, LineCollection)]
     points = np.concatenate(lines.get_segments())
     # the sagittal plane is half-way to the right, where the ellipse is smaller

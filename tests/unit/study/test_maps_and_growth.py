@@ -97,3 +97,14 @@ def test_a_run_keeps_the_keys_of_its_growth_model_and_leaves_those_of_another():
         ("sizes", "self", None),
         ("shapes", "atlas", {21: 2}),
     ]
+
+
+def test_a_run_s_preset_lies_over_folding_and_its_own_keys_over_both():
+    runs = {"plain": {}, "paper": {"preset": "fetalfoldsim"}, "own": {"preset": "fetalfoldsim", "thickness_mm": 3}}
+    config = load(study({"preset": "expected", "thickness_mm": 2.2, "step_s": 3600}, runs=runs))
+    found = {name: (run.thickness_mm, run.step_s, run.support, run.end_week) for name, run in config.runs.items()}
+    assert found == {
+        "plain": (2.2, 3600, "free", 24),
+        "paper": (1.5, 43200, "ellipsoid", 24),
+        "own": (3, 43200, "ellipsoid", 24),
+    }

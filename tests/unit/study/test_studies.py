@@ -1,11 +1,17 @@
 """Studies and calibrations in a configuration: the runs that they make, and what is refused."""
 
+import re
+from pathlib import Path
+
 import pytest
 from configurations import LABELLED
 
 from gyriflow.errors import InputError
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
+from gyriflow.study.paths import STUDY, job_files
+
+ROOT = Path(__file__).parents[3]
 
 BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 25, **LABELLED}]
 RUNS = {"reference": {"preset": "fetalfoldsim"}, "short": {"end_week": 22}}
@@ -110,7 +116,12 @@ def test_what_is_wrong_with_a_study_is_said(change, said):
 
 
 def test_folders_of_results_are_no_names_of_studies():
-    assert "the name is taken" in refusal(studies={"figures": THICKNESS})
+    sources = [*ROOT.glob("workflow/rules/*.smk"), *ROOT.glob("src/gyriflow/study/*.py")]
+    paths = [*(path.read_text() for path in sources), *job_files("rule", f"{STUDY}/metrics.csv")]
+    folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
+    assert folders > {"logs", "benchmarks", "figures", "calibration", "registration"}
+    for folder in folders:
+        assert f"studies.{folder}" in refusal(studies={folder: THICKNESS})
     assert "rename one" in refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}})
 
 

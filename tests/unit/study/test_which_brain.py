@@ -1,0 +1,188 @@
+"""Which brain stands for what where a study has three or more: order in the configuration never decides by chance."""
+
+import pytest
+from configurations import LABELLED, labelled, study
+
+from gyriflow.errors import InputError
+from gyriflow.study import resolve
+from gyriflow.study.figures import figures_of
+from gyriflow.study.loading import load
+
+NORMS = "norms_figure"
+
+
+def resolved(brains, refused=(), **changes):
+    return resolve(load(study(brains, **changes)), refused)
+
+
+def brain(name, week, side=None, **more):
+    """Return a brain of labels, or of the surface of one hemisphere."""
+    half = {"hemisphere": {"file": __file__, "side": side}}
+    return {"id": name, "week": week, **(half if side else LABELLED), **more}
+
+
+def sphere(name, week):
+    return {"id": name, "week": week, "shape": {}}
+
+
+def ids(brains):
+    return [found.id for found in brains]
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
+def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared_in(order):
+    brains = labelled(21, 22, 23, 24)
+    others = [brain("other", 23.5, population="ill"), brain("half", 23.6, side="left"), sphere("ball", 23.7)]
+    brains = [given | {"population": "well"} for given in brains]
+    found = resolved([*(brains[number] for number in order), *others])
+    assert {week: ids(pair) for (_, week), pair in found.references.items()} == {
+        "22.00": ["b", "a"],
+        "23.00": ["c", "b"],
+        "24.00": ["d", "c"],
+    }
+
+
+def test_the_observed_brain_of_a_week_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
+    brains = [brain("start", 21, subject="s"), sphere("ball", 22), brain("x", 22), brain("own", 22, subject="s")]
+    run = resolved([*brains, brain("y", 22)], start="start").simulations["reference", "start"]
+    assert (ids(run.compared["22.00"]), run.real["22.00"].id) == (["own", "ball", "x", "y"], "own")
+    # another subject's scan is no brain to be compared with
+    run = resolved([*brains[:3], brain("theirs", 22, subject="t")], start="start").simulations["reference", "start"]
+    assert (ids(run.compared["22.00"]), run.real["22.00"].id) == (["ball", "x"], "x")
+
+
+@pytest.mark.parametrize(
+    ("start", "others"),
+    [
+        ("whole", ["whole", "whole-well", "whole-ill", "scan", "theirs"]),
+        ("whole-well", ["whole-well"]),
+        ("left", ["left", "left-well"]),
+        ("left-well", ["left-well"]),
+        ("right", ["right"]),
+        ("scan", ["whole", "whole-well", "whole-ill", "scan"]),
+    ],
+)
+def test_brains_are_comparable_by_their_hemispheres_population_and_subject(start, others):
+    brains = [
+        brain("whole", 21),
+        brain("whole-well", 22, population="well"),
+        brain("whole-ill", 22, population="ill"),
+        *(brain(side, 22, side=side) for side in ("left", "right")),
+        brain("left-well", 23, side="left", population="well"),
+        brain("scan", 22, subject="s"),
+        brain("theirs", 23, subject="t"),
+    ]
+    found = resolved(brains, start="whole").brains
+    assert ids(found[start].comparable(found.values())) == others
+
+
+def test_half_a_brain_grows_by_no_atlas_of_whole_ones():
+    """The only atlas of another population has both hemispheres."""
+    own = [brain("half", 22, side="left", population="own"), brain("full", 22, population="own")]
+    atlas = [brain(f"atlas{week}", week, population="atlas") for week in (22, 23, 24)]
+    halves = [brain(f"left{week}", week, side="left", population="halves") for week in (22, 23, 24)]
+    runs = {"runs": {"e": {"preset": "expected"}}}
+    with pytest.raises(InputError, match="half"):
+        resolved([*own, *atlas], start="half", **runs)
+    found = resolved([*own, *atlas, *halves], start=["half", "full"], **runs)
+    assert ids(found.chains["half", "atlas"].later) == ["left22", "left23", "left24"]
+    assert ids(found.chains["full", "atlas"].later) == ["atlas22", "atlas23", "atlas24"]
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
+def test_regions_come_from_the_brain_nearest_in_week_that_has_any(order):
+    brains = labelled(21, 22, 26, names="ace")
+    brains = [*(brains[number] for number in order), *labelled(21.4, 23, 24.5, 25.5, names="bdfg")]
+    regions = {name: {"volume": __file__, "names": {1: "frontal"}} for name in "ace"}
+    found = resolved(brains, metrics={"regions": regions})
+    assert {name: found.giver_of_regions(name).id for name in "bdfg"} == {"b": "a", "d": "c", "f": "e", "g": "e"}
+
+
+def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start():
+    brains = [brain("ill21", 21, population="ill"), sphere("ball", 21)]
+    brains += [brain(f"well{week}", week, population="well") for week in (21, 22)]
+    brains += [brain("half", 22, side="right", population="well"), brain("ill23", 23, population="ill")]
+    assert resolved(brains, start="well22").norm_reference == ["well21", "well22"]
+    assert resolved(brains, start="ill23").norm_reference == ["ill21", "ill23"]
+    assert resolved(brains, start=["ill21", "well21"]).norm_reference == ["ill21", "ill23"]
+
+
+@pytest.mark.parametrize(("subjects", "drawn"), [(4, False), (5, True)])
+def test_norms_are_drawn_of_five_subjects_however_often_each_was_scanned(subjects, drawn):
+    brains = [brain(f"s{n}w{week}", week, subject=f"s{n}") for n in range(subjects) for week in (21, 22)]
+    found = resolved(brains, start="s0w21", runs={"reference": {"end_week": 22}})
+    assert (NORMS in {figure.name for figure in figures_of(found)}) == drawn
+
+
+def test_a_chain_goes_from_its_own_start_to_the_first_brain_past_its_own_end():
+    brains = labelled(21, 22, 23, 24, 25)
+    runs = {
+        "early": {"preset": "measured", "start": ["a", "b"], "end_week": 22.5},
+        "late": {"preset": "measured", "start": "b", "end_week": 23.5},
+    }
+    found = resolved(brains[::-1], runs=runs, start="a")
+    assert ids(found.chains["a", "self"].brains) == ["a", "b", "c"]
+    # both runs from a start follow one chain, to the later of their ends
+    assert ids(found.chains["b", "self"].brains) == ["b", "c", "d"]
+    assert found.carried == ["b", "a"]
+    # a brain that is refused is passed over
+    assert ids(resolved(brains, ["c"], runs=runs).chains["b", "self"].brains) == ["b", "d"]
+
+
+def test_a_start_that_no_brain_leads_to_the_end_is_left_out_alone():
+    brains = [brain(f"{who}{week}", week, population=who) for who in "xyz" for week in (21, 23, 24)]
+    asked = {"runs": {"m": {"preset": "measured"}, "r": {"start": "x21"}}, "start": ["x21", "y21", "z21"]}
+    assert resolved(brains, **asked).pairs == [("m", "x21"), ("m", "y21"), ("m", "z21"), ("r", "x21")]
+    found = resolved(brains, ["y24"], **asked)
+    assert (found.pairs, list(found.unreachable)) == ([("m", "x21"), ("m", "z21"), ("r", "x21")], ["y21"])
+    assert "y21 (21 GW), y23 (23 GW)" in str(found.unreachable["y21"])
+    # a start takes its runs of other growth with it
+    found = resolved(brains, ["x24"], **asked)
+    assert (found.pairs, list(found.unreachable)) == ([("m", "y21"), ("m", "z21")], ["x21"])
+
+
+def test_a_start_follows_the_sizes_of_the_series_that_is_preferred_its_own_or_the_only_other():
+    series = [brain(f"{who}{week}", week, population=who) for who in "xyz" for week in (21, 23)]
+    sizes = {"runs": {"s": {"growth": "sizes"}}}
+
+    def followed(brains, start, **more):
+        found = resolved(brains, start=start, **sizes, **more)
+        (run,) = found.folded
+        return run.series, found.growth_of(run)
+
+    assert followed(series, "y21") == ("y", "own")
+    assert followed(series, "y21", growth={"series": "z"}) == ("z", "series z")
+    lone = brain("lone", 21, population="w")
+    assert followed([lone, *series[:2]], "lone")[1].startswith("series")
+    assert followed([lone, *series], "lone") == (None, "")
+
+
+def test_starts_are_in_the_order_of_the_brains_and_the_first_is_the_earliest_listed():
+    brains = labelled(23, 21, 22)
+    assert resolved(brains, start="first").pairs == [("reference", "a")]
+    assert ids(resolved(brains, start=["c", "a"]).starts) == ["a", "c"]
+    runs = {"one": {"start": "c"}, "every": {"start": "all"}}
+    assert resolved(brains, runs=runs).pairs == [("one", "c"), *(("every", name) for name in "abc")]
+    assert resolved(brains, ["a"], start="first").pairs == []
+
+
+def test_a_prediction_ends_beside_the_brain_of_the_atlas_nearest_to_its_end():
+    atlas = [brain(f"atlas{week}", week, population="atlas") for week in (22, 23, 24, 25)]
+    found = resolved([brain("own", 22.4, population="own"), *atlas], start="own", runs={"e": {"preset": "expected"}},
+                     folding={"end_week": 23.4})  # fmt: skip
+    assert found.prediction is found.folded[0]
+    assert found.atlas_brain(found.prediction).id == "atlas23"
+    assert found.described_prediction["beside"] == "atlas23"
+
+
+def test_a_study_is_compared_with_the_brains_of_its_week_of_the_start_s_population_or_those_named():
+    brains = [brain("start", 21, population="x"), brain("x23", 23, population="x"), brain("y23", 23, population="y"),
+              brain("x24", 24, population="x"), brain("none", 21)]  # fmt: skip
+    varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 23}
+    named = {"base": "reference", "vary": {"thickness_mm": [3.0]}, "compare_week": 23, "compare_with": ["y23"]}
+    found = resolved(brains, start=["start", "none"], studies={"by-week": varied, "by-name": named}).comparisons
+    assert {name: ids(real) for name, real in found["by-week"].real.items()} == {
+        "start": ["x23"],
+        "none": ["x23", "y23"],
+    }
+    assert {name: ids(real) for name, real in found["by-name"].real.items()} == {"start": ["y23"], "none": ["y23"]}
