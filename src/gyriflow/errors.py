@@ -4,7 +4,7 @@ from os import PathLike
 
 
 class GyriflowError(Exception):
-    """An error: a problem, as a short clause, with the path concerned, what was found and expected, and what to do."""
+    """An error with a problem (a short clause), the file concerned, what was found and expected, and a remedy."""
 
     exit_code = 1
 
@@ -35,7 +35,7 @@ class InputError(GyriflowError):
 
 
 class MeshError(GyriflowError):
-    """A surface or a mesh that cannot be made good."""
+    """A surface or a mesh that cannot be repaired."""
 
     exit_code = 3
 

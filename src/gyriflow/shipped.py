@@ -1,12 +1,12 @@
-"""Where the data and the workflow that come with the package lie: in a checkout, or installed."""
+"""Location of the data and the workflow that come with the package, in a checkout or installed."""
 
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = PACKAGE / "shipped"
-"""The folder in a wheel that holds what stands beside `src` in a checkout."""
+"""In an installed package, the folder with what a checkout has next to `src`."""
 SHIPPED = INSTALLED if INSTALLED.is_dir() else PACKAGE.parents[1]
 """The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config` and `profiles`."""
 DEMO = SHIPPED / "config" / "config.yaml"
 CONFIG = "gyriflow.yaml"
-"""Name of the configuration that is taken where none is named."""
+"""Name of the default configuration."""

@@ -1,6 +1,6 @@
-"""What every step of the workflow shares: its log, short messages for errors, and the exit code it passes on.
+"""Run a step of the workflow: its log, short error messages, and its exit code.
 
-`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the code and exits with it.
+`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code and exits with it.
 """
 
 import logging
@@ -14,23 +14,25 @@ from pathlib import Path
 from .errors import GyriflowError
 
 EXIT_FILE = "GYRIFLOW_EXIT_FILE"
-"""Environment variable with the file in which `gyriflow.running.launch` finds the first failed step's exit code."""
+"""Environment variable with the path of the file for the first failed step's exit code."""
 INTERRUPTED = 130
 KILLED = 137
-OUT_OF_MEMORY = "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+KILLED_MESSAGE = (
+    "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+)
 
 
 def record_exit_code(code: int) -> None:
-    """Hand an exit code to the launcher, if there is one; of several failures the first counts."""
+    """Record an exit code for the launcher, if there is one. The first of several failures counts."""
     path = os.environ.get(EXIT_FILE)
     if path:
-        # a step that failed earlier has made the file; where it cannot be made, Snakemake's own code has to do
+        # the file exists if another step failed before; without it, Snakemake's own code is used
         with suppress(OSError), Path(path).open("x") as file:
             file.write(str(code))
 
 
 def recorded_exit_code(path: Path) -> int | None:
-    """Return the exit code of the first failed step, or None where none was recorded."""
+    """Return the exit code of the first failed step, or None if none was recorded."""
     with suppress(OSError, ValueError):
         return int(path.read_text())
     return None
@@ -38,10 +40,10 @@ def recorded_exit_code(path: Path) -> int | None:
 
 @contextmanager
 def step(log: str, *inputs: str) -> Iterator[None]:
-    """Run a step with its messages in the file `log`.
+    """Run a step and write its messages to the file `log`.
 
-    A GyriflowError ends the program with its exit code and one message on the terminal and in the log; another error
-    ends it with a traceback there. Where an error names no file, the message begins with the step's `inputs`.
+    A GyriflowError ends the program with its exit code and one message, on the terminal and in the log. Any other
+    error ends it with a traceback. The message begins with the step's `inputs` if the error names no file.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
     logging.basicConfig(level=logging.INFO, format=form, filename=log, filemode="w", force=True)
@@ -71,9 +73,9 @@ def step(log: str, *inputs: str) -> Iterator[None]:
 
 def _end_shell_step(code: int, log: str) -> int:
     if code == KILLED:
-        print(OUT_OF_MEMORY, file=sys.stderr)
+        print(KILLED_MESSAGE, file=sys.stderr)
         with Path(log).open("a") as file:
-            file.write(OUT_OF_MEMORY + "\n")
+            file.write(KILLED_MESSAGE + "\n")
     record_exit_code(code)
     return code
 

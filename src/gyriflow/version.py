@@ -1,4 +1,4 @@
-"""The version of this package: of an installed one as it was built, of a checkout by its last tag."""
+"""Version of this package: as built, or in a checkout from the last tag."""
 
 import subprocess
 from functools import cache
@@ -7,7 +7,7 @@ from importlib import metadata
 from .shipped import INSTALLED, SHIPPED
 
 RELEASE = "0.1.0"
-"""The version that is being made; what a checkout without tags or git is called."""
+"""The next release; also the version of a checkout without tags or git."""
 
 
 @cache

@@ -19,9 +19,9 @@ from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
 from ..io.volumes import names_unit, read_label_volume
 from ..io.yaml_files import read_keys
-from ..running.cost import ERROR, LEAST_SURFACE_MIB, SECONDS_PER_JOB, folding_needs, surface_memory_mib
+from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
-from ..running.status import as_duration
+from ..running.status import format_duration
 from ..settings.brains import Brain
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
@@ -188,7 +188,7 @@ def _check_files(brain: Brain, config: Config) -> Iterator[str]:
 
 def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[str]:
     memory = surface_memory_mib(volume, brain.week)
-    if memory > max(_memory_mib(), LEAST_SURFACE_MIB):
+    if memory > max(_memory_mib(), MIN_SURFACE_MIB):
         yield f"needs about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: resample it to larger voxels"
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
@@ -207,7 +207,7 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
 
 def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
     foldings = [
-        (job, folding_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
+        (job, simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
         for job in jobs
         if job.rule in FOLDINGS
     ]
@@ -217,7 +217,7 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     seconds = max((folding_s + other_s) / cores, longest_s)
     hours = (folding_s + other_s) / 3600
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield f"time    about {as_duration(seconds)} on {on}, within a factor of {ERROR:g}", False
+    yield f"time    about {format_duration(seconds)} on {on}, within a factor of {ERROR_FACTOR:g}", False
     of_folding = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
     yield f"work    about {hours:.2g} core hours{of_folding}", False
     at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
@@ -225,7 +225,7 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
     # the memory of this machine says nothing of a cluster's
     here = cores <= (os.cpu_count() or 1)
-    yield from _fits("memory", memory or LEAST_SURFACE_MIB / 4, _memory_mib() if here else None)
+    yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, _memory_mib() if here else None)
     there = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
     yield from _fits("disk", disk, shutil.disk_usage(there).free / 2**20)
 

@@ -313,9 +313,9 @@ def status(directory: Path) -> None:
 @click.option("--print", "only_print", is_flag=True, help="Print the path of the report instead of opening it.")
 def view(directory: Path, only_print: bool) -> None:
     """Open the report of a study."""
-    from ..running.status import report_of
+    from ..running.status import find_report
 
-    report = report_of(directory)
+    report = find_report(directory)
     click.echo(report)
     if not only_print:
         click.launch(str(report))

@@ -1,4 +1,4 @@
-"""Whose results are in a folder, what the inputs hold, and the versions of everything that made them."""
+"""Record which study a folder's results belong to, the contents of its inputs, and the software versions."""
 
 import platform
 import sys
@@ -20,13 +20,13 @@ PACKAGES = (
     *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk"),
     *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )
-"""Packages whose versions are recorded: those that results depend on."""
+"""Packages whose versions are recorded because results depend on them."""
 STUDY = Path("results", "study", "study.json")
-"""Where, in a working directory, it is recorded whose results it has."""
+"""Record of the study that the results belong to, in the working directory."""
 
 
 def software() -> dict[str, Any]:
-    """Return the versions of gyriflow, Python and the packages that results depend on, the commit, and now (UTC)."""
+    """Return the versions of gyriflow, Python and the `PACKAGES`, the commit, and the present time (UTC)."""
     packages: dict[str, str | None] = dict.fromkeys(PACKAGES)
     for name in PACKAGES:
         with suppress(metadata.PackageNotFoundError):
@@ -42,10 +42,10 @@ def software() -> dict[str, Any]:
 
 
 def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
-    """Raise InputError where the results in a working directory are those of another study.
+    """Raise InputError if the results in a working directory belong to another study.
 
-    Another study is one of other configuration files without a brain in common; a configuration that was changed,
-    copied or moved goes on. With `record` the study is written down as the one whose results these are.
+    Two studies differ if they share neither configuration files nor a brain, so a configuration may be edited, copied
+    or moved. With `record`, this study is recorded as the owner of the results.
     """
     path = directory / STUDY
     brains: list[list[Any]] = [
@@ -53,28 +53,29 @@ def check_results_belong_to(directory: Path, files: Sequence[Path], config: Conf
     ]
     study: dict[str, Any] = {"configuration": [str(file.resolve()) for file in files], "brains": brains}
     recorded = read_json(path) if path.is_file() else study
-    there = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
-    shared = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
-    if there and not shared:
-        results_of = f"{', '.join(there)} of {', '.join(recorded['configuration'])}"
+    existing = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
+    is_same_study = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
+    if existing and not is_same_study:
+        results_of = f"{', '.join(existing)} of {', '.join(recorded['configuration'])}"
         expected = f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}"
-        remedy = f"Choose another --directory; or delete these results, or study/{path.name} to have both here."
-        problem, results = "the results here are those of another study", path.parents[1].resolve()
+        remedy = f"Choose another --directory, or delete these results (or only study/{path.name}, to keep both here)."
+        problem, results = "the results here belong to another study", path.parents[1].resolve()
         raise InputError(problem, path=results, found=results_of, expected=expected, remedy=remedy)
     if record and (recorded != study or not path.is_file()):
         write_json(path, study)
 
 
 def texts_in(value: Any) -> list[str]:
-    """Return all texts in nested mappings and lists, such as a brain's entry, names of files among them."""
+    """Return all strings in nested mappings and lists, such as the file names in a brain's entry."""
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else []
     return [value] if isinstance(value, str) else [text for item in items for text in texts_in(item)]
 
 
 def input_contents(directory: Path, config: Config, record: bool) -> dict[str, str]:
-    """Return the SHA-256 of each input file of a study by its path; that of its atlas where the file is not there yet.
+    """Return the SHA-256 of each input file of a study, by path.
 
-    With `record` they are kept in the results, with sizes and times, so that unchanged files are not read again.
+    For a file of an atlas that is not downloaded yet, it is the atlas' own record. With `record`, hashes are stored in
+    the results with sizes and times, so that unchanged files are not read again.
     """
     path = directory / "results" / "study" / "inputs.json"
     recorded: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""How far a study is, from its working directory alone: the run that is live or was the last, and the results there."""
+"""Progress of a study, read from its working directory: the live or last run, and the results so far."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -19,33 +19,35 @@ from .launch import hold_lock
 from .provenance import STUDY
 
 STATE = Path(".snakemake", "gyriflow-run.json")
-"""Where, in a working directory, the state of its live or last run is."""
+"""State of the live or last run, in the working directory."""
 REPORT = Path("results", "report", "report.html")
-OF_BRAINS = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
-OF_RUNS = {
+BRAIN_RESULTS = {"surface": "surface/pial.surf.gii", "mesh": "mesh/brain.xdmf", "metrics": "metrics/metrics.csv"}
+RUN_RESULTS = {
     "surfaces": "surfaces/week-*/pial.surf.gii",
     "metrics": "metrics/week-*/metrics.csv",
     "figures": "figures/*.png",
 }
-NOT_YET = "-"
+MISSING = "-"
 
 
 def status(directory: Path) -> Iterator[str]:
-    """Yield lines on how far the study in a working directory is; InputError where there is none."""
+    """Yield lines about the progress of the study in a working directory; InputError if there is none."""
     results, state = directory / "results", None
     with suppress(InputError):
         state = read_json(directory / STATE)
     configured = _configured(directory)
     if not results.is_dir() and state is None and not configured:
-        raise InputError("holds no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
+        raise InputError("contains no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
     yield from _lines(state, is_live(directory))
     brains = [
         {"brain": folder.name}
-        | {name: "done" if (folder / file).is_file() else NOT_YET for name, file in OF_BRAINS.items()}
+        | {name: "done" if (folder / file).is_file() else MISSING for name, file in BRAIN_RESULTS.items()}
         for folder in _folders(results / "brains")
     ]
-    begun = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
-    runs = [_row(run, results / "runs" / run / brain) for run, brain in [*configured, *sorted(begun - set(configured))]]
+    started = {(run.name, folder.name) for run in _folders(results / "runs") for folder in _folders(run)}
+    runs = [
+        _row(run, results / "runs" / run / brain) for run, brain in [*configured, *sorted(started - set(configured))]
+    ]
     for rows in (brains, runs):
         if rows:
             yield "\n" + tabulate(rows, headers="keys", tablefmt="plain", disable_numparse=True)
@@ -53,8 +55,8 @@ def status(directory: Path) -> Iterator[str]:
         yield f"\nreport: {(directory / REPORT).absolute()}"
 
 
-def as_duration(seconds: float) -> str:
-    """Return a duration in words, no more exact than an estimate is."""
+def format_duration(seconds: float) -> str:
+    """Format a duration, rounded as an estimate."""
     if seconds < 90:
         return f"{max(5 * round(seconds / 5), 5)} s"
     if seconds < 90 * 60:
@@ -62,14 +64,14 @@ def as_duration(seconds: float) -> str:
     return f"{seconds / 3600:.1f} h" if seconds < 36 * 3600 else f"{seconds / 86400:.1f} days"
 
 
-def at_week(step: Mapping[str, Any]) -> str:
-    """Return how far a folding is, by one of its events."""
+def format_progress(step: Mapping[str, Any]) -> str:
+    """Format the progress of a simulation from one of its step events."""
     return f"GW {step['week']:.2f} of {step['end_week']:g}"
 
 
 def is_live(directory: Path) -> bool:
-    """Return whether a run works in a directory at this moment."""
-    # a directory that cannot be written has no run of this user
+    """Return whether a run is using a directory at this moment."""
+    # this user has no run in a directory that cannot be written
     with suppress(StorageError):
         if (directory / ".snakemake" / "gyriflow.lock").is_file():
             lock = hold_lock(directory)
@@ -79,8 +81,8 @@ def is_live(directory: Path) -> bool:
     return False
 
 
-def report_of(directory: Path) -> Path:
-    """Return the report of the study in a working directory, or in an export; InputError where it has none."""
+def find_report(directory: Path) -> Path:
+    """Return the report of the study in a working directory or an export; InputError if there is none."""
     for report in (directory / REPORT, directory / "report" / REPORT.name):
         if report.is_file():
             return report.absolute()
@@ -89,7 +91,7 @@ def report_of(directory: Path) -> Path:
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
     path = directory / CONFIG
-    # what is wrong with a configuration is for the command that runs it to say
+    # the command that runs a configuration reports what is wrong with it
     with suppress(InputError):
         if (record := directory / STUDY).is_file():
             path = Path(read_json(record)["configuration"][-1])
@@ -100,13 +102,13 @@ def _configured(directory: Path) -> list[tuple[str, str]]:
 
 def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
     if state is None:
-        yield "a run is live" if live else "nothing is running"
+        yield "a run is in progress" if live else "nothing is running"
         return
     steps = f"{state['done']} of {state['total']} steps done"
     if live:
-        left = f", about {as_duration(state['left_s'])} left" if state["left_s"] is not None else ""
+        left = f", about {format_duration(state['left_s'])} left" if state["left_s"] is not None else ""
         yield f"running since {state['began']}: {steps}{left}"
-        yield from (f"  now: {job}" for job in state["running"])
+        yield from (f"  running: {job}" for job in state["running"])
     elif state["interrupted"]:
         yield f"interrupted at {state['ended']}, {steps}; run the same command again to resume"
     elif state["ended"] is None:
@@ -114,21 +116,21 @@ def _lines(state: dict[str, Any] | None, live: bool) -> Iterator[str]:
     else:
         yield f"last run: {state['began']} to {state['ended']}, {steps}"
     for failure in state["failed"]:
-        yield f"  failed: {failure['what']}: {failure['why']}"
+        yield f"  failed: {failure['job']}: {failure['cause']}"
         yield from (f"          log: {log}" for log in failure["logs"])
     yield f"  details: {state['details']}"
 
 
 def _row(run: str, folder: Path) -> dict[str, str]:
-    counts = {name: str(len(list(folder.glob(pattern))) or NOT_YET) for name, pattern in OF_RUNS.items()}
-    return {"run": run, "brain": folder.name, "folding": _folding(folder)} | counts
+    counts = {name: str(len(list(folder.glob(pattern))) or MISSING) for name, pattern in RUN_RESULTS.items()}
+    return {"run": run, "brain": folder.name, "folding": _simulation_progress(folder)} | counts
 
 
-def _folding(folder: Path) -> str:
+def _simulation_progress(folder: Path) -> str:
     with suppress(InputError, KeyError, IndexError):
         return f"done, GW {week_tag(read_json(folder / 'folding' / 'summary.json')['weeks'][-1])}"
     steps = [event for event in events_in(read_log(folder / "logs" / "simulate.jsonl")) if event["event"] == "step"]
-    return at_week(steps[-1]) if steps else NOT_YET
+    return format_progress(steps[-1]) if steps else MISSING
 
 
 def _folders(folder: Path) -> list[Path]:

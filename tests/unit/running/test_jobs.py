@@ -7,7 +7,7 @@ import pytest
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, imported_modules, modules_behind, room_of
-from gyriflow.running.jobs import KILLED, cause, gather_messages, read_benchmarks, read_messages
+from gyriflow.running.jobs import OUT_OF_MEMORY, cause, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time"
 PATTERNS = {
@@ -93,7 +93,7 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
             "unexpected ValueError: no such week",
         ),
         ("mpiexec: one\n\ntwo\n", "mpiexec: one\ntwo"),
-        ("2026-11-22 00:54:57,955 INFO gyriflow.io: read\n", KILLED),
+        ("2026-11-22 00:54:57,955 INFO gyriflow.io: read\n", OUT_OF_MEMORY),
         ("", ""),
     ],
 )  # fmt: skip

@@ -67,7 +67,7 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
         run.end(number, number + 1, 100)
     run.tell(text="a warning of Snakemake's", level=logging.WARNING)
     run.display.end()
-    assert run.lines[0].startswith("gyriflow: 100 steps to do; details in ")
+    assert run.lines[0].startswith("gyriflow: 100 steps to run; log: ")
     assert run.lines[1] == "  0 %  measure b0"
     assert run.lines[11] == " 50 %  2 min left  measure b50"
     assert run.lines[-2] == "a warning of Snakemake's"
@@ -110,7 +110,7 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         f"        log: {log}",
         "gyriflow: finished after 5 s with 1 failed, 0 of 2 steps done; run the same command again to resume",
     ]
-    assert run.state["failed"] == [{"what": "pial_from_labels a", "why": "a.nii: is no image", "logs": [str(log)]}]
+    assert run.state["failed"] == [{"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}]
 
 
 @pytest.mark.fault(38)
@@ -121,7 +121,7 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
         ("died with <Signals.SIGSEGV: 11>.", "it crashed (SIGSEGV)", None),
         ("died with <Signals.SIGTERM: 15>.", "it was stopped", None),
         # as snakemake-executor-plugin-slurm 2.8 puts it
-        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended its job 12: CANCELLED", None),
+        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended job 12: CANCELLED", None),
         ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", "a.nii: is no image", None),
     ],
 )
@@ -140,7 +140,7 @@ def test_what_was_stopped_is_no_failure(run):
     run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
     run.fail("simulate")
     run.display.end()
-    assert run.lines[-1] == "gyriflow: stopped after 5 s, 0 of 2 steps done"
+    assert run.lines[-1] == "gyriflow: interrupted after 5 s, 0 of 2 steps done"
     assert run.state["interrupted"]
     assert run.state["failed"] == []
 
@@ -182,7 +182,7 @@ def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
     with hold_lock(study):
         said = text(study)
     assert "running since 2026-01-01 10:00:00: 3 of 10 steps done, about 4 min left" in said
-    assert "now: folding, run r, brain a: GW 21.50 of 23" in said
+    assert "running: folding, run r, brain a: GW 21.50 of 23" in said
 
 
 def test_a_run_that_was_killed_is_called_interrupted(study):
@@ -206,7 +206,7 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):
-    with pytest.raises(InputError, match=f"{tmp_path}: holds no study"):
+    with pytest.raises(InputError, match=f"{tmp_path}: contains no study"):
         text(tmp_path)
 
 
