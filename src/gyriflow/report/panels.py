@@ -25,6 +25,9 @@ _PANEL_IN = 1.75
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
 _EDGE_IN = 0.1
+_TOP_IN = 0.1
+# of a heading
+_LETTER_IN = 0.055
 _LABEL_LETTERS = 26
 # part of the width that the scale bar may take; colour bars follow
 _SCALE_SHARE = 0.36
@@ -64,13 +67,36 @@ class Row:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Sizes in inches; `left` is where the first panel begins, `panels` are the widths of all columns."""
+    """Sizes in inches.
+
+    `left` is where the first panel begins, `panels` are the widths of all columns, in `blocks` that stand below each
+    other. `foot` is the height of what stands below all of them.
+    """
 
     width: float
     left: float
     panels: Sequence[float]
+    blocks: Sequence[slice]
     foot: float
     inches_per_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Columns that stand beside each other: their headings, rows, and the heights in inches of these.
+
+    `heights` are those of each row's pictures and of the captions below them.
+    """
+
+    columns: slice
+    heads: Sequence[str]
+    rows: Sequence[Row]
+    heights: Sequence[tuple[float, float]]
+
+    @property
+    def height(self) -> float:
+        """Height of all rows."""
+        return sum(pictures + captions for pictures, captions in self.heights)
 
 
 def round_length(limit_mm: float) -> float:
@@ -98,14 +124,40 @@ def panel_grid(
     legend : entries of a legend
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
-    shown = [panel for row in rows for panel in row.panels if panel is not None]
+    layout = _lay_out(rows, has_bar=colour_bar is not None, entries=len(legend))
+    heads = [wrap(head, int(panel / _LETTER_IN)) for head, panel in zip(columns, layout.panels, strict=True)]
+    blocks = [_block(rows, heads, block, layout.inches_per_mm) for block in layout.blocks]
+    head_in = _dots(0.2 + 0.12 * max(head.count("\n") for head in heads))
+    total = _TOP_IN + layout.foot + len(blocks) * head_in + sum(block.height for block in blocks)
+    figure = Figure(figsize=(layout.width, total))
+    top, letters = total - _TOP_IN, iter(ascii_lowercase)
+    for block in blocks:
+        _draw_heads(figure, block, layout, middle=top - head_in / 2)
+        top -= head_in
+        for row, (pictures, captions) in zip(block.rows, block.heights, strict=True):
+            # a letter for each of several rows, or for each panel of a single one
+            count = 1 if len(rows) > 1 else len(block.heads) if len(columns) > 1 else 0
+            _draw_row(
+                figure, row, block.columns, layout, list(islice(letters, count)), bottom=top - pictures, height=pictures
+            )
+            top -= pictures + captions
+    _draw_scale_bar(figure, layout, {end for row in rows for panel in row.panels if panel for end in panel.view.ends})
+    if colour_bar:
+        _draw_colour_bar(figure, layout, *colour_bar)
+    if legend:
+        figure.legend(handles=legend, ncols=_legend_columns(layout.width), loc="lower right", borderaxespad=0.2)
+    return figure
+
+
+def _lay_out(rows: Sequence[Row], *, has_bar: bool, entries: int) -> _Layout:
+    """Return the sizes of a grid above so many entries of a legend: one scale, as large as the page allows."""
     # half of what each column shows in mm: its widest brain and a margin
     of_columns = zip(*(row.panels for row in rows), strict=True)
     widest = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in of_columns]
     halves = _MARGIN * np.maximum(widest, _NARROWEST * max(widest))
-    # blocks of columns, of as equal numbers as possible, stand below each other
-    size = -(-len(columns) // -(-len(columns) // MOST_COLUMNS))
-    blocks = [slice(start, start + size) for start in range(0, len(columns), size)]
+    # blocks of columns, of as equal numbers as possible
+    size = -(-len(halves) // -(-len(halves) // MOST_COLUMNS))
+    blocks = [slice(start, start + size) for start in range(0, len(halves), size)]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
     most_mm = max(2 * halves[block].sum() for block in blocks)
@@ -113,47 +165,19 @@ def panel_grid(
     panels = [_dots(2 * half * inches_per_mm) for half in halves]
     most_in = max(sum(panels[block]) for block in blocks)
     width = _dots(max(SINGLE_COLUMN_IN, label_in + most_in))
-    left_in = _dots(label_in + (width - label_in - most_in) / 2)
-    legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
-    foot_in = max(0.66 if colour_bar or legend else 0.46, 0.15 * -(-len(legend) // legend_columns) + 0.16)
-    layout = _Layout(width, left_in, panels, _dots(foot_in), inches_per_mm)
+    left = _dots(label_in + (width - label_in - most_in) / 2)
+    foot = max(0.66 if has_bar or entries else 0.46, 0.15 * -(-entries // _legend_columns(width)) + 0.16)
+    return _Layout(width, left, panels, blocks, _dots(foot), inches_per_mm)
 
-    # a letter of a column's heading is about 0.055 in wide
-    columns = [wrap(column, int(panel / 0.055)) for column, panel in zip(columns, panels, strict=True)]
-    head_in = _dots(0.1)
-    block_head_in = _dots(0.2 + 0.12 * max(column.count("\n") for column in columns))
-    # what a block shows nothing of has no row in it
-    drawn = [[row for row in rows if row.absent or any(row.panels[block])] for block in blocks]
-    heights = [[_heights_in(row, block, inches_per_mm) for row in of] for block, of in zip(blocks, drawn, strict=True)]
-    total = head_in + layout.foot + len(blocks) * block_head_in
-    total += sum(height + caption for of_block in heights for height, caption in of_block)
 
-    figure = Figure(figsize=(width, total))
-    top = total - head_in
-    letters = iter(ascii_lowercase)
-    for block, in_block, of_block in zip(blocks, drawn, heights, strict=True):
-        left = left_in
-        for head, panel in zip(columns[block], panels[block], strict=True):
-            x, y = (left + panel / 2) / width, (top - block_head_in / 2) / total
-            figure.text(x, y, head, ha="center", va="center", fontsize=7)
-            left += panel
-        top -= block_head_in
-        for row, (height, caption) in zip(in_block, of_block, strict=True):
-            marks = 1 if len(rows) > 1 else len(row.panels[block]) if len(columns) > 1 else 0
-            marked = list(islice(letters, marks))
-            _draw_row(figure, row, block, layout, marked, bottom=top - height, height=height)
-            top -= height + caption
-    _draw_scale_bar(figure, layout, {end for panel in shown for end in panel.view.ends})
-    if colour_bar:
-        start = _SCALE_SHARE * width + 0.1
-        place = start / width, 0.5 / total, (width - start - 0.3) / width, 0.08 / total
-        bar = figure.colorbar(colour_bar[0], cax=figure.add_axes(place), orientation="horizontal")
-        bar.set_label(colour_bar[1], labelpad=1)
-        bar.ax.tick_params(pad=1, length=2)
-        bar.outline.set_linewidth(0.5)
-    if legend:
-        figure.legend(handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2)
-    return figure
+def _legend_columns(width: float) -> int:
+    return 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+
+
+def _block(rows: Sequence[Row], heads: Sequence[str], columns: slice, inches_per_mm: float) -> _Block:
+    """Return a block without the rows of which it shows nothing."""
+    shown = [row for row in rows if row.absent or any(row.panels[columns])]
+    return _Block(columns, heads[columns], shown, [_heights_in(row, columns, inches_per_mm) for row in shown])
 
 
 def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
@@ -169,6 +193,14 @@ def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, fl
 def _dots(inches: float) -> float:
     """Round a length in inches to whole dots."""
     return round(inches * _DOTS_PER_INCH) / _DOTS_PER_INCH
+
+
+def _draw_heads(figure: Figure, block: _Block, layout: _Layout, *, middle: float) -> None:
+    left, height = layout.left, figure.get_figheight()
+    for head, panel in zip(block.heads, layout.panels[block.columns], strict=True):
+        place = (left + panel / 2) / layout.width, middle / height
+        figure.text(*place, head, ha="center", va="center", fontsize=7)
+        left += panel
 
 
 def _draw_row(
@@ -219,6 +251,15 @@ def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
         ring.set(edgecolor=colour, linewidth=thickness, linestyle=line if colour == "black" else "-")
         ring.set(clip_on=False, zorder=5)
         axes.add_patch(ring)
+
+
+def _draw_colour_bar(figure: Figure, layout: _Layout, scale: ScalarMappable, label: str) -> None:
+    start, total = _SCALE_SHARE * layout.width + 0.1, figure.get_figheight()
+    place = start / layout.width, 0.5 / total, (layout.width - start - 0.3) / layout.width, 0.08 / total
+    bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
+    bar.set_label(label, labelpad=1)
+    bar.ax.tick_params(pad=1, length=2)
+    bar.outline.set_linewidth(0.5)
 
 
 def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:

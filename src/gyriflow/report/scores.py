@@ -195,7 +195,7 @@ def nearest_chart(
     Raises
     ------
     InputError
-        If no distance is knhere.
+        If no distance is known.
     """
     rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)].dropna(subset="distance")
     if rows.empty:
