@@ -11,7 +11,6 @@ from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.step import record_exit_code
-from gyriflow.units import week_tag
 
 # scripts and programs find the package without its being installed, in conda environments of single rules too
 shell.prefix(

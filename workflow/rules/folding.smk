@@ -145,7 +145,7 @@ def reaches(run, brain, week):
     if run in CONFIG.runs:
         return True
     summary = checkpoints.simulate_member.get(run=run, brain=brain).output.summary
-    return week_tag(week) in map(week_tag, read_json(summary)["weeks"])
+    return week in read_json(summary)["weeks"]
 
 
 for suffix, sides in PARTS_OF_BRAINS.items():

@@ -2,7 +2,9 @@
 # copy of a user's own is ever deleted or replaced.
 from gyriflow.study.atlases import retrieval_note, used_atlases
 
-ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in used_atlases(CONFIG) for file in atlas.missing}
+ATLAS_FILES = {
+    str(file.path).removeprefix("/"): file for atlas in used_atlases(CONFIG) for file in atlas.missing
+}
 
 if workflow.is_main_process:
     for atlas in used_atlases(CONFIG):

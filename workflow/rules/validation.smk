@@ -1,8 +1,8 @@
 # What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
 rule ready_surfaces:
     input:
-        real=lambda w: study.references[w.brain, w.week][0].pial,
-        adjacent=lambda w: study.references[w.brain, w.week][1].pial,
+        real=lambda w: study.references[w.brain, float(w.week)][0].pial,
+        adjacent=lambda w: study.references[w.brain, float(w.week)][1].pial,
         start=PIAL["whole"],
     output:
         **READY,
@@ -23,7 +23,7 @@ rule validation:
     params:
         start_week=from_brain("week"),
         series=from_simulation("series"),
-        weeks=from_simulation("real_weeks"),
+        weeks=lambda w: list(study.simulations[w.run, w.brain].real),
         run=lambda w: w.run,
         real=lambda w: [brain.id for brain in study.simulations[w.run, w.brain].real.values()],
         kind=from_simulation("kind"),
@@ -53,15 +53,15 @@ rule prediction:
 
 def deviation_labels(wildcards):
     """Return the first columns of the table of deviations."""
-    run, start, week = wildcards.run, wildcards.brain, wildcards.week
+    run, start, week = wildcards.run, wildcards.brain, float(wildcards.week)
     real = study.simulations[run, start].real[week]
-    names = {"run": run, "start": start, "week": real.week}
+    names = {"run": run, "start": start, "week": week}
     return names | {"real": real.id, "subject": real.subject}
 
 
 rule deviation:
     input:
-        unpack(lambda w: study.simulations[w.run, w.brain].deviation_files(w.week)),
+        unpack(lambda w: study.simulations[w.run, w.brain].deviation_files(float(w.week))),
     output:
         **DEVIATION,
     params:
@@ -95,9 +95,7 @@ rule registration_ceiling:
         start_week=from_brain("week"),
         weeks=lambda w: study.ceiling_weeks(w.brain),
         run="registration",
-        real=lambda w: [
-            study.references[w.brain, week_tag(week)][0].id for week in study.ceiling_weeks(w.brain)
-        ],
+        real=lambda w: [study.references[w.brain, week][0].id for week in study.ceiling_weeks(w.brain)],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:

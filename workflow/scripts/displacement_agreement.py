@@ -12,10 +12,10 @@ from gyriflow.step import step
 files, labels = snakemake.input, snakemake.params.labels
 with step(snakemake.log[0]):
     carried, weeks = read_weekly_shapes(files.carried), read_weeks(files.frames)
-    both = [week for week in weeks if np.isclose(carried.weeks, week).any()]
+    both = [week for week in weeks if week in carried.weeks]
     start = read_positions(files.frames, weeks[0])
     surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))
     simulated = np.stack([read_positions(files.frames, week)[pial] for week in both])
-    measured = np.stack([carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in both])
+    measured = np.stack([carried.positions[np.flatnonzero(carried.weeks == week)[0]][pial] for week in both])
     table = displacement_table(both, simulated, measured, surface.faces, registered=snakemake.params.registered)
     write_table(snakemake.output[0], table.assign(**labels)[[*labels, *table.columns]])

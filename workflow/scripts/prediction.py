@@ -14,15 +14,13 @@ from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
-from gyriflow.units import week_tag
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0]):
     targets, rows = read_weekly_shapes(files.targets), []
     start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
-    brains_of_atlas = dict(zip(map(week_tag, params.atlas_weeks), files.atlas, strict=True))
-    for number, tag in enumerate(params.weeks):
-        week = float(tag)
+    brains_of_atlas = dict(zip(params.atlas_weeks, files.atlas, strict=True))
+    for number, week in enumerate(params.weeks):
         real = read_surface(files.whole[number])
         real_shape = Shape(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
         patch, _ = drawn_patches(real_shape, mirrored=True)
@@ -32,7 +30,7 @@ with step(snakemake.log[0]):
         # written with the run that grows as the atlas, for those beside it too
         simple = {"scaled": scaled_to(start, volume)}
         simple |= {name: TriangleMesh(places[at], start.faces) for name, places in targets.surfaces.items()}
-        atlas = read_surface(brains_of_atlas[tag]) if tag in brains_of_atlas else simple["atlas"]
+        atlas = read_surface(brains_of_atlas[week]) if week in brains_of_atlas else simple["atlas"]
         simple |= {"atlas": scaled_to(atlas, volume), "target": target}
         models = {"run": read_surface(files.simulated[number])} | (simple if params.of_atlas else {})
         for model, surface in models.items():

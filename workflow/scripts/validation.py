@@ -23,7 +23,7 @@ with step(snakemake.log[0]):
     if files.get("carried"):
         surface, pial = boundary_surface(read_tetrahedral_mesh(files.mesh))
         pose, carried = read_pose(files.report), read_weekly_shapes(files.carried)
-        at = [carried.positions[np.isclose(carried.weeks, week).argmax()][pial] for week in params.weeks]
+        at = [carried.positions[np.flatnonzero(carried.weeks == week)[0]][pial] for week in params.weeks]
         surfaces = [TriangleMesh(transform_points(places, pose.world), surface.faces) for places in at]
     else:
         surfaces, growth = map(read_surface, files.simulated), read_yaml(files.params)["growth"]

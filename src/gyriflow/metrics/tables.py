@@ -18,9 +18,6 @@ OF_THE_ANALYSIS = (
 )
 """Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
 
-SAME_WEEK_GW = 0.005
-"""Weeks in file names have two decimals."""
-
 
 def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """Return tables of metrics, of whole hemispheres and of regions, as one, a row per number.
@@ -96,8 +93,8 @@ def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str
             began = table[table["subject"] == first]
             from_week = float(began.loc[began["run"] == MEASURED, "week"].iloc[0])
             to_week = float(later["week"].iloc[0])
-            starts = began[(began["week"] - from_week).abs() < SAME_WEEK_GW]
-            ends = began[(began["run"] != MEASURED) & ((began["week"] - to_week).abs() < SAME_WEEK_GW)]
+            starts = began[began["week"] == from_week]
+            ends = began[(began["run"] != MEASURED) & (began["week"] == to_week)]
             part, start = (
                 rows[["run", *what, "value"]].rename(columns={"value": name})
                 for name, rows in (("to_value", pd.concat([later, ends])), ("from_value", starts))

@@ -315,7 +315,7 @@ def influence_spectra(
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
     rows = _of_bands(pd.concat([*simulated, *real]), FOLD_BANDS)
-    rows = rows[(rows["week"] - week).abs() < 1e-6]
+    rows = rows[rows["week"] == week]
     sides = _sides_of(rows)
     figure, panels = panel_figure(len(sides), per_row=2, panel_in=2.3, sharey=True)
     width = 0.8 / len(colours)

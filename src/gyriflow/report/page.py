@@ -328,9 +328,7 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and what is to be known before its folds are believed."""
     weeks = [float(week) for week in str(run["weeks"]).strip("[]").split(",")]
     reached, end = max(weeks), float(run["end_week"])
-    words = [
-        f"reached {week_label(reached)}" if reached >= end - 1e-6 else f"ended at {week_label(reached)} of {end:g}"
-    ]
+    words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")
     if too_coarse := _resolution(run):

@@ -224,7 +224,7 @@ def predicted_table(metrics: pd.DataFrame, prediction: Mapping[str, Any]) -> pd.
     rows = rows.assign(name=_named).set_index("name")
 
     def values(brain: str, run: str, when: str) -> pd.Series:
-        at = np.isclose(rows["week"], prediction[when], atol=0.005)
+        at = rows["week"] == prediction[when]
         return rows.loc[at & (rows["subject"] == prediction[brain]) & (rows["run"] == run), "value"]
 
     start, beside = values("brain", MEASURED, "start_week"), values("beside", MEASURED, "beside_week")

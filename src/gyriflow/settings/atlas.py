@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from ..shipped import SHIPPED
 from .base import KeyProblem, Settings, did_you_mean, located, refused
 from .terms import AffineSource, Coordinates
-from .varying import Week
+from .varying import AnyWeek
 
 ATLASES = SHIPPED / "atlases"
 """Folder of the atlases that come with gyriflow, each in a folder of its own."""
@@ -93,7 +93,7 @@ class AtlasSeries(Settings):
     files: dict[FileKey, str]
     """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels`
     and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
-    weeks: dict[Week, dict[FileKey, AtlasFileRecord]]
+    weeks: dict[AnyWeek, dict[FileKey, AtlasFileRecord]]
     """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
 
     @field_validator("weeks", mode="before")
@@ -173,7 +173,7 @@ class AtlasSettings(Settings):
     """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the `atlas.yaml` of your own."""
     series: str | tuple[str, ...] | None = None
     """Series to use; `null`: all."""
-    weeks: tuple[Week, ...] | None = None
+    weeks: tuple[AnyWeek, ...] | None = None
     """Weeks to use, as in the file names; `null`: all. [GW]"""
     images: bool = False
     """Whether T2-weighted volumes are shown with the surfaces' outlines."""

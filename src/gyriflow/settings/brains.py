@@ -53,7 +53,7 @@ class Brain(Settings):
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME)
     """Name in paths and tables: letters, digits, - _ ."""
     week: Week
-    """Gestational age. [GW]"""
+    """Gestational age; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
     """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
     subject: str | None = Field(None, min_length=1)

@@ -10,7 +10,19 @@ from ..errors import InputError
 from .base import KeyProblem, Settings, line, validated
 from .growth import SIZES, Growth
 from .terms import FieldName, MaterialName, Side
-from .varying import Floats, Maps, Varying, VaryingNumber, Week, bounds_of, map_of, require_bounds, value_range, varying
+from .varying import (
+    EndWeek,
+    Floats,
+    Maps,
+    Varying,
+    VaryingNumber,
+    Week,
+    bounds_of,
+    map_of,
+    require_bounds,
+    value_range,
+    varying,
+)
 
 
 def _memory(value: Any) -> float:
@@ -85,7 +97,7 @@ class FoldingSettings(Settings):
     """Parameters to start from; other keys come on top, for the preset of a run the run's own. `fetalfoldsim`:
     the paper's; `measured`: growth that takes the brain to the shapes that its series was measured to have;
     `expected`: to those that the growth of another population, such as an atlas, would give it."""
-    end_week: float = Field(gt=15, le=45)
+    end_week: EndWeek
     """Gestational age at which the simulation ends. [GW]"""
     step_s: float = Field(43200.0, gt=0, le=604800)
     """Time step; shortened where an output week comes first. [s]"""
@@ -145,10 +157,9 @@ GROWTH_RATES = tuple(name for name in VARYING if name.endswith("growth_rate_per_
 
 
 def output_weeks(start_week: float, end_week: float, every_gw: float) -> list[float]:
-    """Return the output weeks of a run: the start, then every `every_gw` weeks, and the end."""
+    """Return the output weeks of a run, to two decimals: the start, then every `every_gw` weeks, and the end."""
     steps = int((end_week - start_week) / every_gw + 1e-9)
-    weeks = [round(start_week + n * every_gw, 9) for n in range(steps + 1)]
-    return weeks if end_week - weeks[-1] < 1e-6 else [*weeks, end_week]
+    return sorted({*(round(start_week + n * every_gw, 2) for n in range(steps + 1)), end_week})
 
 
 class FoldingParameters(FoldingSettings):

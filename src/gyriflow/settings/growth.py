@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from .base import KeyProblem, Settings
-from .varying import Week
+from .varying import AnyWeek
 
 SizeCurve = Annotated[
-    Annotated[dict[Week, Annotated[float, Field(gt=0)]], Tag("(table)")]
+    Annotated[dict[AnyWeek, Annotated[float, Field(gt=0)]], Tag("(table)")]
     | Annotated[Literal["measured"], Tag("(word)")],
     Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(word)"),
 ]

@@ -11,6 +11,7 @@ from .brains import Brain
 from .folding import FoldingSettings
 from .growth import SIZES
 from .terms import LONGEST_NAME, SCORES, Score
+from .varying import EndWeek
 
 ALL = "all"
 """The word for all brains in `start`."""
@@ -173,7 +174,7 @@ class Compared(Settings):
 
     base: str
     """Name of the run that all others differ from."""
-    compare_week: float = Field(gt=15, le=45)
+    compare_week: EndWeek
     """Week of the comparison, at which the runs end. [GW]"""
     compare_with: tuple[str, ...] | None = None
     """Ids of the real brains of that week to compare with; `null`: all of the start's population, or of any if

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
 from pydantic.fields import FieldInfo
 
 from .base import InputFile, KeyProblem, Settings
@@ -16,7 +16,13 @@ Maps = Mapping[str, Floats]
 """Values at the mesh's vertices by parameter name; they move with the tissue."""
 WEEKS = (15.0, 45.0)
 """First and last gestational week that gyriflow knows."""
-Week = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
+AnyWeek = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
+"""A gestational week, such as one that a curve has a value at."""
+_two_decimals = AfterValidator(lambda week: round(week, 2))
+Week = Annotated[AnyWeek, _two_decimals]
+"""The week of a brain, rounded to the two decimals of file names and tables: equal weeks are equal numbers."""
+EndWeek = Annotated[float, Field(gt=WEEKS[0], le=WEEKS[1]), _two_decimals]
+"""The same of a brain that is simulated, which has begun earlier."""
 FileOrPair = Annotated[
     Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
     Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
@@ -30,7 +36,7 @@ class Varying(Settings):
     coordinates. Maps move with the tissue.
     """
 
-    weeks: dict[Week, float] | None = None
+    weeks: dict[AnyWeek, float] | None = None
     """Values by week, such as `{21: 1.5, 30: 2.0}`: linear in between, constant outside. [GW]"""
     map: FileOrPair | None = None
     """File with the values, or a list of the left and the right one."""

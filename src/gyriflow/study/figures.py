@@ -149,7 +149,7 @@ def _whole(one: Simulation) -> dict[float, str]:
 
 def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
     """Return the measured brains that runs are shown beside, by week."""
-    return {float(week): brain for one in runs for week, brain in one.measured_by_week.items()}
+    return {week: brain for one in runs for week, brain in one.measured_by_week.items()}
 
 
 def _of_brains(study: Study) -> Iterator[Figure]:
@@ -325,7 +325,7 @@ def _of_validation(study: Study) -> Iterator[Figure]:
 
 def _of_expected(one: Simulation) -> Iterator[Figure]:
     simulated, real = _whole(one), _measured_by_week(one)
-    away = {float(week): [simulated[float(week)], one.file(DEVIATION["maps"], week=week)] for week in one.real}
+    away = {week: [simulated[week], one.file(DEVIATION["maps"], week=week)] for week in one.real}
     # the last week and others, four at most
     weeks = sorted(away, reverse=True)[:: -(-len(away) // 4)]
     shown = {min(simulated), *weeks}

@@ -4,12 +4,18 @@ import re
 from collections.abc import Iterable
 
 from ..settings.terms import SIDES, Side
+from ..units import week_tag
 
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
 CALIBRATION = f"{STUDY}/calibration"
 WEEK = "week-{week}"
+
+
+def file_of(pattern: str, **names: str | float) -> str:
+    """Return the file of a pattern; its week, a number, has two decimals there, as "21.50"."""
+    return pattern.format(**{key: name if isinstance(name, str) else week_tag(name) for key, name in names.items()})
 
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:

@@ -11,7 +11,6 @@ from ..settings.folding import VARYING
 from ..settings.runs import Run
 from ..settings.terms import MEASURED, Side
 from ..settings.varying import Varying, files_of
-from ..units import week_tag
 from . import paths
 
 Origin = Literal["self", "atlas"]
@@ -205,9 +204,9 @@ class Simulation:
     towards; None where it has rates or sizes. `series` is the growth series with curves of sizes for the start, and
     `curves` their table where the run follows one. It has the maps of the run `base`: the calibration's for its runs.
 
-    `compared` are the measured brains of its later weeks, by week in file names, later scans of the start's own subject
-    first; `real` the one of each week that tells what the run is worth. These are `explained` by growth that knows
-    them, or else `predicted`: `from_others_only` by another population's, which has seen no later brain like the start.
+    `compared` are the measured brains of its later weeks, by week, later scans of the start's own subject first; `real`
+    the one of each week that tells what the run is worth. These are `explained` by growth that knows them, or else
+    `predicted`: `from_others_only` by another population's, which has seen no later brain like the start.
     """
 
     run: str
@@ -218,8 +217,8 @@ class Simulation:
     series: str | None
     curves: str | list[str]
     base: str
-    compared: Mapping[str, tuple[Brain, ...]]
-    real: Mapping[str, Brain]
+    compared: Mapping[float, tuple[Brain, ...]]
+    real: Mapping[float, Brain]
     kind: Literal["explained", "predicted"]
     from_others_only: bool
     has_regions: bool
@@ -229,22 +228,14 @@ class Simulation:
         """Its wildcards."""
         return {"run": self.run, "brain": self.start.id}
 
-    def file(self, pattern: str, **wildcards: str) -> str:
+    def file(self, pattern: str, **wildcards: str | float) -> str:
         """Return a file of this simulation by its pattern."""
-        return pattern.format(**self.names, **wildcards)
+        return paths.file_of(pattern, **self.names, **wildcards)
 
     @property
-    def week_tags(self) -> list[str]:
-        return [week_tag(week) for week in self.weeks]
-
-    @property
-    def real_weeks(self) -> list[float]:
-        return [float(week) for week in self.real]
-
-    @property
-    def measured_by_week(self) -> dict[str, Brain]:
+    def measured_by_week(self) -> dict[float, Brain]:
         """The measured brain that it is shown beside, by week, the start at its own week."""
-        return {self.week_tags[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
+        return {self.weeks[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
 
     @property
     def follows_registration(self) -> bool:
@@ -295,13 +286,13 @@ class Simulation:
 
     def at(self, week: float) -> Measured:
         """Return the simulated brain of a week."""
-        metrics = f"runs/{self.run}/{self.start.id}/metrics"
-        surfaces = f"{self.file(paths.RUN)}/surfaces/week-{week_tag(week)}"
+        metrics, of_week = f"runs/{self.run}/{self.start.id}/metrics", paths.file_of(paths.WEEK, week=week)
+        surfaces = f"{self.file(paths.RUN)}/surfaces/{of_week}"
         return Measured(
-            where=f"{metrics}/week-{week_tag(week)}",
+            where=f"{metrics}/{of_week}",
             subject=self.start.id,
             run=self.run,
-            week=float(week_tag(week)),
+            week=week,
             sides=self.start.sides,
             surfaces=surfaces,
             thickness=f"{surfaces}/thickness.shape.gii",
@@ -318,17 +309,17 @@ class Simulation:
     def validation_files(self) -> dict[str, list[str]]:
         """The files that tell what the run is worth, of each kind one for each week that has a real brain."""
         return {
-            "simulated": [self.at(week).parts["whole"] for week in self.real_weeks],
+            "simulated": [self.at(week).parts["whole"] for week in self.real],
             "whole": [real.pial for real in self.real.values()],
             **{name: [self.file(file, week=week) for week in self.real] for name, file in paths.READY.items()},
         }
 
-    def deviation_files(self, week: str) -> dict[str, str | list[str]]:
+    def deviation_files(self, week: float) -> dict[str, str | list[str]]:
         """Return the files that tell how the real brain of a week deviates from the simulated one.
 
         Those of `thickness` are in the order of the surfaces; there are none where one is not known.
         """
-        expected = self.at(float(week))
+        expected = self.at(week)
         rows = {"start": self.start.measured, "first": self.at(self.start.week), "expected": expected}
         rows["real"] = self.real[week].measured
         complete = all(row.thickness for row in rows.values())

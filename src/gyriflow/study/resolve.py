@@ -14,7 +14,6 @@ from ..settings.root import Config
 from ..settings.runs import Compared, Run, changed, starts_of, variants
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
-from ..units import week_tag
 from .atlases import known_checksums
 from .paths import CURVES
 from .records import Brain, Calibration, Chain, Comparison, Origin, Simulation
@@ -97,7 +96,7 @@ def _brain(
 
 def _compared_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
     alike = [brain for brain in start.comparable(brains) if not brain.given.synthetic]
-    return list({week_tag(week): week for week in sorted(brain.week for brain in alike) if week > start.week}.values())
+    return sorted({brain.week for brain in alike if brain.week > start.week})
 
 
 # what is folded
@@ -196,8 +195,7 @@ def _model(run: Run) -> str:
 
 def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]:
     weeks = output_weeks(start.week, settings.end_week, settings.output_every_gw)
-    tags = {week_tag(week) for week in weeks}
-    return sorted([*weeks, *(week for week in further if week < weeks[-1] and week_tag(week) not in tags)])
+    return sorted({*weeks, *(week for week in further if week < weeks[-1])})
 
 
 def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
@@ -227,13 +225,13 @@ def _chains(foldings: Sequence[_Folding], series: Series, brains: Iterable[Brain
             "atlas": _atlas_chain(start, end, series),
         }
         for origin, members in through.items():
-            tags = {week_tag(brain.week) for brain in members[1:]}
+            known = {brain.week for brain in members[1:]}
             compared = _compared_weeks(start, brains) if origin == "atlas" else []
             chains[start.id, origin] = Chain(
                 brains=tuple(members),
                 correspondences=tuple(series.correspondence(*pair) for pair in pairwise(members)),
                 posed=tuple(series.posed(*pair) for pair in pairwise(members)),
-                further_weeks=tuple(week for week in compared if week <= end and week_tag(week) not in tags),
+                further_weeks=tuple(week for week in compared if week <= end and week not in known),
             )
     return chains
 
@@ -247,11 +245,11 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     members = sorted(series.brains.get(series.with_brain(start), ()), key=lambda brain: brain.subject != start.subject)
     # the first brain past the end tells of growth up to it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
-    chosen = {week_tag(start.week): start}
+    chosen = {start.week: start}
     for brain in members:
         volumes = start.given.has_labels and brain.given.has_labels
         if start.week < brain.week <= last and (volumes or series.are_matched(start, brain)):
-            chosen.setdefault(week_tag(brain.week), brain)
+            chosen.setdefault(brain.week, brain)
     return sorted(chosen.values(), key=lambda brain: brain.week)
 
 
@@ -263,7 +261,7 @@ def _atlas_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     """
     names = series.of_others(start)
     members = series.brains[names[0]] if len(names) == 1 else ()
-    weekly = sorted({week_tag(brain.week): brain for brain in members}.values(), key=lambda brain: brain.week)
+    weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
     if not weekly:
         return [start]
     first = max((brain.week for brain in weekly if brain.week <= start.week), default=weekly[0].week)
@@ -317,13 +315,13 @@ def _simulation(
     alike = list(dict.fromkeys([*start.comparable(brains), *led_to]))
     alike.sort(key=lambda brain: brain.subject != start.subject)
     compared = {
-        tag: of_week
-        for tag in map(week_tag, folding.weeks[1:])
-        if (of_week := tuple(brain for brain in alike if week_tag(brain.week) == tag))
+        week: of_week
+        for week in folding.weeks[1:]
+        if (of_week := tuple(brain for brain in alike if brain.week == week))
     }
     real = {
-        tag: real_of_week[0]
-        for tag, of_week in compared.items()
+        week: real_of_week[0]
+        for week, of_week in compared.items()
         if (real_of_week := [brain for brain in of_week if not brain.given.synthetic]) and not start.given.synthetic
     }
     scans = [brain for brain in brains if start.given.subject is not None and brain.subject == start.subject]

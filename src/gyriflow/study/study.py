@@ -11,7 +11,6 @@ from ..io.exports import ExportedBrain, labels_of
 from ..settings.atlas import Atlas
 from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
-from ..units import week_tag
 from . import paths
 from .atlases import used_atlases
 from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
@@ -99,13 +98,13 @@ class Study:
         return [one for one in self.folded if one.real]
 
     @cached_property
-    def references(self) -> dict[tuple[str, str], tuple[Brain, Brain]]:
+    def references(self) -> dict[tuple[str, float], tuple[Brain, Brain]]:
         """By start and week the real brain that runs are compared with, and the latest comparable real one before."""
         references = {}
         for one in self.validated:
             alike = [brain for brain in one.start.comparable(self.brains.values()) if not brain.given.synthetic]
             for week, real in one.real.items():
-                before = [brain for brain in alike if brain.week < float(week)]
+                before = [brain for brain in alike if brain.week < week]
                 references[one.start.id, week] = real, max(before, key=lambda brain: brain.week)
         return references
 
@@ -154,13 +153,12 @@ class Study:
 
     def ceiling_weeks(self, brain: str) -> list[float]:
         """Return the compared weeks that a start brain's mesh is carried to."""
-        weeks = [week_tag(week) for week in self.chains[brain, "self"].later_weeks]
-        return [float(week) for week in weeks if (brain, week) in self.references]
+        return [week for week in self.chains[brain, "self"].later_weeks if (brain, week) in self.references]
 
     def ceiling_files(self, brain: str) -> dict[str, list[str]]:
         """Return the surfaces that tell what registration alone is worth, week by week."""
-        weeks = [week_tag(week) for week in self.ceiling_weeks(brain)]
-        ready = {name: [file.format(brain=brain, week=week) for week in weeks] for name, file in paths.READY.items()}
+        weeks, files = self.ceiling_weeks(brain), paths.READY.items()
+        ready = {name: [paths.file_of(file, brain=brain, week=week) for week in weeks] for name, file in files}
         return ready | {"whole": [self.references[brain, week][0].pial for week in weeks]}
 
     def onset_files(self, run: str, brain: str) -> dict[str, str | list[str]]:
@@ -205,7 +203,7 @@ class Study:
             one.file(file, week=week)
             for one in self.folded
             for file in paths.folded_of(*one.start.sides).values()
-            for week in one.week_tags
+            for week in one.weeks
         ]
 
     @cached_property

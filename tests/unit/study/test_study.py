@@ -141,7 +141,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
         "thick": ["b21", "b21"]
     }
     assert ids(found.comparisons["thick"].real["b21"]) == ["twin"]
-    assert found.simulations["reference", "b21"].real == {"24.00": found.brains["twin"]}
+    assert found.simulations["reference", "b21"].real == {24: found.brains["twin"]}
     assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
     assert {tuple(row["template_maps"]) for row in found.exported} == {()}
     # nothing is left where no start is
@@ -162,7 +162,7 @@ def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only
         {"id": "half", "week": 22, "hemisphere": {"file": str(files / "left.gii"), "side": "left"}},
     ]
     found = study(brains)
-    assert ids(found.simulations["reference", "b21"].compared["22.00"]) == ["b22"]
+    assert ids(found.simulations["reference", "b21"].compared[22]) == ["b22"]
     assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"]]
     assert found.places["brains/half/metrics"].parts == {
         "whole": surface("half"),
@@ -170,10 +170,26 @@ def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only
     }
 
 
+def test_a_week_of_days_is_one_number_everywhere(labels):
+    """24 weeks and 2 days are 24.2857...: of the brain, the end of the runs and the comparison."""
+    days = 24 + 2 / 7
+    varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": days}
+    found = study([labels(21), labels(days, id="late")], folding={"end_week": days}, studies={"thick": varied})
+    one, comparison = found.simulations["reference", "b21"], found.comparisons["thick"]
+    assert found.brains["late"].week == one.weeks[-1] == comparison.week == 24.29
+    assert ids(one.real.values()) == ids(comparison.real["b21"]) == ["late"]
+    # the rows of tables that figures look for by their week
+    rows = [found.brains["late"].measured, one.measured[-1], *(member.at(24.29) for member, _ in comparison.members)]
+    assert {row.week for row in rows} == {24.29}
+    spectra = next(figure for figure in figures_of(found) if figure.name == "influence_spectra")
+    assert spectra.options["week"] == 24.29
+    assert one.measured[-1].where.endswith("/week-24.29")
+
+
 def test_later_scans_of_the_subject_come_first(labels):
     brains = [labels(21, subject="s"), labels(22, id="other"), labels(22, id="own", subject="s")]
     one = study(brains).simulations["reference", "b21"]
-    assert ids(one.compared["22.00"]) == ["own", "other"]
+    assert ids(one.compared[22]) == ["own", "other"]
     assert ids(one.real.values()) == ["own"]
     assert study(brains).scans == {"s": ["b21", "own"]}
 
@@ -224,13 +240,13 @@ def test_the_scans_of_another_subject_are_no_atlas(labels):
     found = study([*cohort(labels), *atlas], **expected)
     assert ids(found.chains["c25", "atlas"].later) == ["atlas25", "atlas26", "atlas27"]
     assert [found.growth_of(one) for one in found.folded] == ["series atlas"]
-    assert ids(found.folded[0].compared["26.00"]) == ["atlas26"]
+    assert ids(found.folded[0].compared[26]) == ["atlas26"]
 
 
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
     found = study([{"id": f"b{week}", "week": week, **SPHERE} for week in (21, 22)])
     (one,) = found.folded
-    assert {week: brain.id for week, brain in one.measured_by_week.items()} == {"21.00": "b21", "22.00": "b22"}
+    assert {week: brain.id for week, brain in one.measured_by_week.items()} == {21: "b21", 22: "b22"}
     assert one.real == {}
     alone = study([{"id": "b21", "week": 21, **SPHERE}])
     assert alone.growing == alone.validated == []
@@ -319,14 +335,10 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
     brains = of_two(22.4, 23, 23.4, 23.7, 23.701, 26)
     found = study(brains, runs=EXPECTED["runs"] | {"plain": {}})
     one, chain = found.simulations["a", "own22.4"], found.chains["own22.4", "atlas"]
-    assert one.weeks == pytest.approx([22.4, 23, 23.4, 23.701, 24])
-    assert (chain.later_weeks, chain.further_weeks) == ([22, 23, 24], (23.4, 23.701))
+    assert one.weeks == pytest.approx([22.4, 23, 23.4, 23.7, 24])
+    assert (chain.later_weeks, chain.further_weeks) == ([22, 23, 24], (23.4, 23.7))
     assert found.chains["own22.4", "self"].further_weeks == ()
-    assert {week: brain.id for week, brain in one.real.items()} == {
-        "23.00": "own23",
-        "23.40": "own23.4",
-        "23.70": "own23.7",
-    }
+    assert {week: brain.id for week, brain in one.real.items()} == {23: "own23", 23.4: "own23.4", 23.7: "own23.7"}
     # so are runs beside it; others keep the weeks that are asked for
     assert found.simulations["plain", "own22.4"].weeks == one.weeks
     assert [one.run for one in found.predictions] == ["a", "plain"]
@@ -380,7 +392,7 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
 
 def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
     found = study(of_two(22, 23, 24), **EXPECTED)
-    compared = found.simulations["a", "own22"].deviation_files("24.00")
+    compared = found.simulations["a", "own22"].deviation_files(24)
     assert compared["expected"] == "results/runs/a/own22/surfaces/week-24.00/pial.surf.gii"
     assert compared["real"] == surface("own24")
     places = [path.split("/")[-2] for path in compared["thickness"]]

@@ -36,19 +36,19 @@ def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared
     brains = [given | {"population": "well"} for given in brains]
     found = resolved([*(brains[number] for number in order), *others])
     assert {week: ids(pair) for (_, week), pair in found.references.items()} == {
-        "22.00": ["b", "a"],
-        "23.00": ["c", "b"],
-        "24.00": ["d", "c"],
+        22: ["b", "a"],
+        23: ["c", "b"],
+        24: ["d", "c"],
     }
 
 
 def test_the_observed_brain_of_a_week_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
     brains = [brain("start", 21, subject="s"), sphere("ball", 22), brain("x", 22), brain("own", 22, subject="s")]
     run = resolved([*brains, brain("y", 22)], start="start").simulations["reference", "start"]
-    assert (ids(run.compared["22.00"]), run.real["22.00"].id) == (["own", "ball", "x", "y"], "own")
+    assert (ids(run.compared[22]), run.real[22].id) == (["own", "ball", "x", "y"], "own")
     # another subject's scan is no brain to be compared with
     run = resolved([*brains[:3], brain("theirs", 22, subject="t")], start="start").simulations["reference", "start"]
-    assert (ids(run.compared["22.00"]), run.real["22.00"].id) == (["ball", "x"], "x")
+    assert (ids(run.compared[22]), run.real[22].id) == (["ball", "x"], "x")
 
 
 @pytest.mark.parametrize(
