@@ -23,21 +23,18 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import map_coordinates
 
+from gyriflow.compare.distances import aligned_distances
 from gyriflow.compare.placement import correlation, values_on
-from gyriflow.compare.prediction import distances
-from gyriflow.compare.shapes import Shape, ready, scaled_to
-from gyriflow.geometry.alignment import fit_onto
+from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
-from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
+from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
 from gyriflow.growth.expected import FADING_GW, OWN_MM, carry_sharply, expected_positions
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.metrics.curvature import curvature
 from gyriflow.study.paths import MESH, PIAL, REGISTERED, TARGETS
 from gyriflow.units import week_tag
 from workflow import call
@@ -118,19 +115,6 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
     return result
 
 
-def distance_mm(predicted: TriangleMesh, real: TriangleMesh) -> float:
-    """Return the mean symmetric distance of two surfaces, laid onto each other rigidly."""
-    both = transformed(predicted, fit_onto(predicted, real)), real
-    return distances([(one, nearest_on(one.vertices, other)[0]) for one, other in (both, both[::-1])])["distance_mm"]
-
-
-def shape_of(mesh: TriangleMesh, real: TriangleMesh) -> Shape:
-    """Return a surface made ready for the comparison with a real one, which may be itself."""
-    even = ready(mesh, real)
-    bend = curvature(even)
-    return Shape(even, bend.mean, bend.shape_index)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
@@ -175,14 +159,14 @@ def main() -> None:
         for law, week in product(KEPT_GW, weeks[1:]):
             real = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{law}-{week}"))
             own = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
-            models = targets[week] | {"atlas": scaled_to(own, signed_volume(targets[week][HERE]))}
+            models = targets[week] | {"atlas": scale_to_volume(own, signed_volume(targets[week][HERE]))}
             if not given.no_folding:
                 models["run"] = read_surface(folder / RUN.format(brain=brain, week=week_tag(week)))
-            folds = shape_of(real, real)
+            folds = prepare_for_comparison(real, real)
             for model, surface in models.items():
                 row = {"law": law, "individual": name, "horizon": week - start, "model": model}
-                row["distance_mm"] = distance_mm(surface, real)
-                values = values_on(folds, shape_of(surface, real))[0]["shape_index"]
+                row["distance_mm"] = aligned_distances(surface, real)["distance_mm"]
+                values = values_on(folds, prepare_for_comparison(surface, real))[0]["shape_index"]
                 row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
                 rows.append(row)
     for value in ("distance_mm", "r_shape_index"):

@@ -33,7 +33,9 @@ ARROWS = {
     "settings": GROUND | {"shipped"},
     "geometry": {"errors", "units"},
     "mechanics": set(),
-    **dict.fromkeys(("io", "mesh", "growth", "metrics", "compare", "report"), PLAIN),
+    **dict.fromkeys(("io", "mesh", "growth", "metrics", "report"), PLAIN),
+    # brains are compared by what is measured on them
+    "compare": PLAIN | {"metrics"},
     # surfaces are posed by those of the shipped atlas
     "anatomy": PLAIN | {"io", "shipped"},
     # the solver is a program of its own, with its own frames and checkpoints

@@ -7,6 +7,7 @@ from atlas_brains import atlas_labels
 from phantoms import phantom_labels
 from shapes import cerebrum_surface, rigid, save_gifti, save_labels
 
+from gyriflow.compare.distances import aligned_distances
 from gyriflow.geometry.alignment import angle_deg, rigid_fit
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -14,7 +15,6 @@ from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.report.labels import SIMPLER_WAYS
 
 from .conftest import COARSE
@@ -100,7 +100,7 @@ def test_a_surface_in_another_pose_is_carried_through_the_labels_of_an_atlas(wor
     atlas, target = (TriangleMesh(places, boundary.faces) for places in ends)
     # the former in the pose of that brain, the latter in that of the start
     assert nearest_on(atlas.vertices, real)[0].mean() < 0.8  # half a voxel
-    assert aligned_distance(target, real)["symmetric_mean"] < 1.5
+    assert aligned_distances(target, real)["distance_mm"] < 1.5
     assert signed_volume(target) == pytest.approx(signed_volume(real), rel=0.1)
     motion = rigid_fit(targets.positions[2], targets.positions[0], np.ones(len(targets.positions[0])))
     assert angle_deg(motion[:3, :3]) < 2.0

@@ -4,21 +4,13 @@ import numpy as np
 import pandas as pd
 
 from gyriflow.compare.calibration import SIZE_SCORES, shape_scores
-from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.distances import aligned_distances
+from gyriflow.compare.shapes import prepare_for_comparison
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.curvature import curvature
-from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.step import step
 
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
-
-
-def shape(mesh, real):
-    """Return a surface ready to be compared with the real brain's, with its curvature."""
-    even = ready(mesh, real)
-    bend = curvature(even, radius_mm=params.curvature_radius_mm)
-    return Shape(even, bend.mean, bend.shape_index)
 
 
 with step(snakemake.log[0]):
@@ -28,9 +20,10 @@ with step(snakemake.log[0]):
     pairs = zip(np.repeat(np.arange(len(params.compared)), params.compared), reals, strict=True)
     for mesh, real in [(simulated[number], real) for number, real in pairs] if not causes else []:
         shapes = set(params.weights) - {*SIZE_SCORES, "surface_distance"}
-        row = shape_scores(shape(mesh, real), shape(real, real), shapes) if shapes else {}
+        both = (prepare_for_comparison(brain, real, params.curvature_radius_mm) for brain in (mesh, real))
+        row = shape_scores(*both, shapes) if shapes else {}
         row |= {name: score(mesh, real) for name, score in SIZE_SCORES.items() if name in params.weights}
-        distance = {"surface_distance": aligned_distance(mesh, real)["symmetric_mean"]}
+        distance = {"surface_distance": aligned_distances(mesh, real)["distance_mm"]}
         rows.append(row | (distance if "surface_distance" in params.weights else {}))
     found = pd.DataFrame(rows, columns=list(params.weights)).mean()
     score = sum(weight * found[name] for name, weight in params.weights.items())

@@ -4,10 +4,10 @@ from itertools import batched
 
 import pandas as pd
 
+from gyriflow.compare.distances import aligned_distances
 from gyriflow.compare.members import COLUMNS, distances_to
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface
-from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.step import step
 
@@ -27,7 +27,7 @@ with step(snakemake.log[0]):
             same = params.population == population
             labels = dict(zip(LABELS, (names.brain, names.run, real, population, same), strict=True))
             pairs = zip(params.parts, simulated, map(read_surface, of_real), strict=True)
-            surfaces = {part: aligned_distance(mesh, measured) for part, mesh, measured in pairs}
+            surfaces = {part: aligned_distances(mesh, measured) for part, mesh, measured in pairs}
             rows = distances_to(real, metrics, spectra, spectral, surfaces)
             parts.append(rows.assign(**labels)[[*LABELS, *COLUMNS]])
     write_table(snakemake.output[0], pd.concat([part for part in parts if len(part)] or parts, ignore_index=True))

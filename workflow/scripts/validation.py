@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gyriflow.compare.shapes import Shape, ready
+from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
 from gyriflow.compare.validation import ordered, validation_row
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -14,7 +14,6 @@ from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.metrics.curvature import curvature
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -31,12 +30,10 @@ with step(snakemake.log[0]):
     for number, (week, simulated) in enumerate(zip(params.weeks, surfaces, strict=True)):
         aims = {name: float(value(curve, week)) for name, curve in zip(("area_cm2", "volume_ml"), curves, strict=False)}
         real = read_surface(files.whole[number])
-        even = ready(simulated, real)
-        bend = curvature(even, radius_mm=params.curvature_radius_mm)
-        shapes = {"run": Shape(even, bend.mean, bend.shape_index)}
+        shapes = {"run": prepare_for_comparison(simulated, real, params.curvature_radius_mm)}
         for name in ("real", "start", "adjacent"):
             maps = read_vertex_maps(files[f"{name}_maps"][number])
-            shapes[name] = Shape(read_surface(files[name][number]), **maps)
+            shapes[name] = PreparedSurface(read_surface(files[name][number]), **maps)
         labels = {"run": params.run, "kind": params.kind, "start_week": params.start_week, "week": week}
         labels |= {"start": snakemake.wildcards.brain, "real": params.real[number]}
         rows.append(validation_row(labels, simulated=simulated, real_brain=real, aims=aims, **shapes))

@@ -17,7 +17,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
 from .placement import MEASURES, correlation, values_on
-from .shapes import Shape, against_real
+from .shapes import PreparedSurface, curvature_differences
 
 DIGITS = 6
 """Significant digits of calibrated values."""
@@ -89,15 +89,15 @@ SIZE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {"size
 """Those scores that compare closed surfaces, simulated and real, as they are."""
 
 
-def shape_scores(run: Shape, real: Shape, names: Collection[Score]) -> dict[Score, float]:
+def shape_scores(run: PreparedSurface, real: PreparedSurface, names: Collection[Score]) -> dict[Score, float]:
     """Score shapes that are ready and laid onto each other by those of `names` that compare such.
 
     shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is
-    curvature_distance_per_mm of `shapes.against_real`.
+    curvature_distance_per_mm of `shapes.curvature_differences`.
     """
     values, _ = values_on(real, run)
     scores = {measure: 1 - correlation(getattr(real, measure), values[measure], real.areas) for measure in MEASURES}
-    scores["curvature_distribution"] = against_real(run, real)["curvature_distance_per_mm"]
+    scores["curvature_distribution"] = curvature_differences(run, real)["curvature_distance_per_mm"]
     return {name: scores[name] for name in names}
 
 

@@ -27,19 +27,21 @@ def distances_to(
 
     Measures: `relative_power_B4` to `B6`, the share of the band in the power of the spectrum, and the same with
     `_weyl`, cut at Weyl's number as the paper's (distance: the absolute difference); `spectral_distance_…` of
-    `metrics.spangy`; `surface_symmetric_mean` and `surface_hausdorff95` of `metrics.similarity`; `area`, `volume`,
+    `metrics.spangy`; `surface_distance` and `surface_distance95`, distance_mm and distance95_mm of aligned surfaces;
+    `area`, `volume`,
     `gyrification_index` (distance: the absolute relative difference); `weyl_number` (no distance).
 
     `real` is the id of the real brain. Metrics and spectra are rows of the simulated brain and of the real one, whose
     `run` is "real"; spectral those of the simulated brain, with the column `real`; surfaces by hemisphere the distances
-    of `metrics.similarity.aligned_distance` in mm. The columns are `COLUMNS`; `flag` is "ok" or says what is wrong with
+    of `distances.aligned_distances`. The columns are `COLUMNS`; `flag` is "ok" or says what is wrong with
     the value.
     """
     rows = [*_band_rows(real, spectra), *_size_rows(real, metrics)]
     for row in spectral[spectral["real"] == real].itertuples():
         rows.append((row.hemisphere, row.metric, np.nan, np.nan, row.value, "1", row.flag))
     for hemisphere, distances in surfaces.items():
-        rows += [(hemisphere, f"surface_{name}", np.nan, np.nan, mm, "mm", "ok") for name, mm in distances.items()]
+        for name in ("distance", "distance95"):
+            rows.append((hemisphere, f"surface_{name}", np.nan, np.nan, distances[f"{name}_mm"], "mm", "ok"))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.alignment import fit_onto
-from ..geometry.matching import MIRROR, match_points, nearest_on, values_at
-from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed, vertex_normals
-from .shapes import Shape
+from ..geometry.alignment import align
+from ..geometry.matching import MIRROR, match_surface, nearest_on, values_at
+from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
+from .shapes import PreparedSurface
 
 MEASURES = ("shape_index", "mean_curvature")
 
@@ -38,18 +38,20 @@ def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
     return float((r - r_start) / room) if horizon > SKILLED_FROM and room > 0 else float("nan")
 
 
-def values_on(real: Shape, other: Shape) -> tuple[dict[str, Floats], float]:
+def values_on(real: PreparedSurface, other: PreparedSurface) -> tuple[dict[str, Floats], float]:
     """Take the measures of another shape at the vertices of the real one, both laid onto each other.
 
     To each vertex belongs the nearest point of the other whose normal agrees. Returns (n,) values by measure, and the
     part of the real area for which there is such a point.
     """
-    match = match_points(real.mesh.vertices, vertex_normals(real.mesh), other.mesh)
+    match = match_surface(real.mesh, other.mesh)
     values = {measure: values_at(match, getattr(other, measure)) for measure in MEASURES}
     return values, float(np.average(match.agrees, weights=real.areas))
 
 
-def placement(real: Shape, run: Shape, start: Shape, adjacent: Shape, *, horizon: float) -> dict[str, float | bool]:
+def placement(
+    real: PreparedSurface, run: PreparedSurface, start: PreparedSurface, adjacent: PreparedSurface, *, horizon: float
+) -> dict[str, float | bool]:
     """Tell how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
 
     Correlations are those of `values_on`, weighted by area over the whole surface. For each of `MEASURES`: r_…,
@@ -83,7 +85,7 @@ def placement(real: Shape, run: Shape, start: Shape, adjacent: Shape, *, horizon
     return row
 
 
-def drawn_patches(real: Shape, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
+def drawn_patches(real: PreparedSurface, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
     """Return for each vertex the number of the patch that is drawn with it, and how patches were made.
 
     asymmetry_mm is the mean distance of the brain from its mirror image. Where it is below `SYMMETRIC_MM`, or where
@@ -101,8 +103,8 @@ def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
     The image, mirrored along x (left to right), is laid onto the surface rigidly.
     """
     image = transformed(mesh, np.pad(MIRROR, (0, 1)) + np.diag([0.0, 0.0, 0.0, 1.0]))
-    laid = transformed(image, fit_onto(image, mesh))
-    return laid.vertices, float(np.average(nearest_on(laid.vertices, mesh)[0], weights=areas))
+    aligned = align(image, mesh)
+    return aligned.vertices, float(np.average(nearest_on(aligned.vertices, mesh)[0], weights=areas))
 
 
 def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:

@@ -4,11 +4,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
-from ..geometry.alignment import fit_onto
+from ..geometry.alignment import align
 from ..geometry.diffusion import diffuse
-from ..geometry.matching import crossing_faces, nearest_on, surface_distance
+from ..geometry.matching import crossing_faces
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -16,49 +15,15 @@ from ..geometry.triangles import (
     area,
     edges,
     signed_volume,
-    transformed,
     vertex_areas,
     vertex_normals,
 )
+from .distances import drawn_distances, pairwise_distances, surface_distances
 from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, values_on
-from .shapes import Shape, cortex_dice
+from .shapes import PreparedSurface, cortex_dice
 
 SMOOTHING_MM = 3.0
 """Standard deviation that areas are smoothed with before they are compared."""
-
-
-def apart(predicted: TriangleMesh, real: TriangleMesh, real_even: TriangleMesh) -> list[tuple[TriangleMesh, Floats]]:
-    """Return two surfaces, and how far their vertices are from the other in mm, as they lie.
-
-    `real_even` is the real one made `ready`.
-    """
-    both = ((predicted, real), (real_even, predicted))
-    return [(one, nearest_on(one.vertices, other)[0]) for one, other in both]
-
-
-def distances(pair: list[tuple[TriangleMesh, Floats]]) -> dict[str, float]:
-    """Return the symmetric distances in mm of two surfaces that are `apart`.
-
-    distance_mm is the mean over both surfaces, weighted by area, and distance95_mm the larger of their 95 % quantiles;
-    distance_left_mm and distance_right_mm are means over what lies left and right of x = 0, NaN where nothing does.
-    """
-    mean, far = surface_distance((away, vertex_areas(even)) for even, away in pair)
-    sides = []
-    for of_side in (np.less, np.greater_equal):
-        parts = [(away, vertex_areas(even) * of_side(even.vertices[:, 0], 0)) for even, away in pair]
-        sides.append(surface_distance(parts)[0] if all(areas.any() for _, areas in parts) else float("nan"))
-    left, right = sides
-    return {"distance_mm": mean, "distance_left_mm": left, "distance_right_mm": right, "distance95_mm": far}
-
-
-def drawn_distances(pair: list[tuple[TriangleMesh, Floats]], points: Floats, patch: Ints, drawn: Ints) -> Floats:
-    """Return the mean distances in mm over drawn patches (k, p); vertices have that of their nearest point."""
-    near, means = cKDTree(points), []
-    for even, away in pair:
-        at, areas = patch[near.query(even.vertices)[1]], vertex_areas(even)
-        sums, total = (np.bincount(at, weights, minlength=drawn.shape[1]) for weights in (areas * away, areas))
-        means.append((drawn @ sums) / (drawn @ total))
-    return np.asarray(np.mean(means, axis=0))
 
 
 def roughness_mm(mesh: TriangleMesh) -> float:
@@ -76,12 +41,12 @@ def roughness_mm(mesh: TriangleMesh) -> float:
 
 
 def endpoints(
-    predicted: TriangleMesh, real: TriangleMesh, shape: Shape, real_shape: Shape, patch: Ints
+    predicted: TriangleMesh, real: TriangleMesh, shape: PreparedSurface, real_shape: PreparedSurface, patch: Ints
 ) -> dict[str, Any]:
     """Tell what a predicted surface is worth against the real one.
 
-    Columns: those of `distances` and cortex_dice, laid onto each other rigidly, neither scaled; area_error and
-    volume_error as fractions of the real; r_… of each of `MEASURES`; crossing_faces; roughness_ratio and
+    Columns: those of `distances.surface_distances` and cortex_dice, laid onto each other rigidly, neither scaled;
+    area_error and volume_error as fractions of the real; r_… of each of `MEASURES`; crossing_faces; roughness_ratio and
     curvature_rms_ratio, to the real surface's; …_low and …_high, the 95 % intervals of distance_mm and r_shape_index
     when patches are drawn with replacement; drawn_mm, the mean distances of these draws, for `with_skill`.
 
@@ -94,14 +59,14 @@ def endpoints(
     patch
         Of each vertex of the real shape, as of `drawn_patches`.
     """
-    placed = transformed(predicted, fit_onto(predicted, real))
-    pair, areas = apart(placed, real, real_shape.mesh), real_shape.areas
+    aligned = align(predicted, real)
+    pair, areas = pairwise_distances(aligned, real, real_shape.mesh), real_shape.areas
     values, _ = values_on(real_shape, shape)
     drawn = draw_patches(patch)
     away = drawn_distances(pair, real_shape.mesh.vertices, patch, drawn)
     r = drawn_correlations(real_shape.shape_index, values["shape_index"], areas, patch, drawn)
-    row: dict[str, Any] = distances(pair) | {
-        "cortex_dice": cortex_dice(placed, real),
+    row: dict[str, Any] = surface_distances(pair) | {
+        "cortex_dice": cortex_dice(aligned, real),
         "area_error": area(predicted) / area(real) - 1,
         "volume_error": signed_volume(predicted) / signed_volume(real) - 1,
         **{f"r_{name}": correlation(getattr(real_shape, name), values[name], areas) for name in MEASURES},

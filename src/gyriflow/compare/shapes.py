@@ -1,4 +1,4 @@
-"""Surfaces made ready for comparison: the real brain's volume, even triangles, one pose; and what folds they have."""
+"""Surfaces prepared for comparison: scaled to the observed brain's volume, remeshed, aligned, with their curvature."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -8,31 +8,33 @@ from scipy.ndimage import distance_transform_edt
 from scipy.stats import wasserstein_distance
 
 from ..errors import InputError
-from ..geometry.alignment import fit_onto
+from ..geometry.alignment import align
 from ..geometry.matching import surface_mask
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, transformed, vertex_areas
+from ..metrics.curvature import curvature
+from ..settings.terms import CURVATURE_RADIUS_MM
 
 EDGE_MM = 1.0
-"""Edges that surfaces are compared with, after both have the real brain's volume."""
+"""Edge length after remeshing."""
 
-LARGEST_CURVATURE = 1.0
-"""Mean curvature beyond this (1/mm) is clipped: it is that of single sharp edges."""
+MAX_CURVATURE_PER_MM = 1.0
+"""Mean curvature is clipped here: larger values are those of single sharp edges."""
 
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
-"""Depth of what counts as cortex where brains are laid over each other, and the edge of the voxels that are counted."""
+"""Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """A surface that is ready, with its curvature.
+class PreparedSurface:
+    """A surface prepared for comparison, with the curvature at its n vertices.
 
     Attributes
     ----------
     mesh
-        Of `ready`.
+        Closed surface in mm with even triangles.
     mean_curvature : (n,) float
-        In 1/mm at its vertices, positive on gyri, clipped at ± `LARGEST_CURVATURE`.
+        In 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`.
     shape_index : (n,) float
         From −1, a pit, to 1.
     """
@@ -42,11 +44,12 @@ class Shape:
     shape_index: Floats
 
     def __post_init__(self) -> None:
-        clipped = np.clip(self.mean_curvature, -LARGEST_CURVATURE, LARGEST_CURVATURE)
+        clipped = np.clip(self.mean_curvature, -MAX_CURVATURE_PER_MM, MAX_CURVATURE_PER_MM)
         object.__setattr__(self, "mean_curvature", clipped)
 
     @property
     def areas(self) -> Floats:
+        """The (n,) areas of the vertices in mm²."""
         return vertex_areas(self.mesh)
 
     @property
@@ -55,43 +58,51 @@ class Shape:
         return float(np.sqrt(np.average(self.mean_curvature**2, weights=self.areas)))
 
 
-def scaled_to(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
-    """Scale a closed surface to a volume."""
+def prepare_for_comparison(
+    mesh: TriangleMesh, observed: TriangleMesh, radius_mm: float = CURVATURE_RADIUS_MM
+) -> PreparedSurface:
+    """Scale a closed surface to the observed brain's volume, remesh it, align it rigidly and fit its curvature.
+
+    The observed brain itself (`mesh is observed`) is only remeshed. `radius_mm` is that of `metrics.curvature`.
+    InputError where a surface encloses no volume.
+    """
+    volumes = [signed_volume(surface) for surface in (mesh, observed)]
+    if min(volumes) <= 0:
+        raise InputError(
+            "a surface encloses no volume, so it cannot be compared",
+            found=f"{volumes[0]:.4g} and {volumes[1]:.4g} mm³",
+            expected="closed surfaces with outward faces",
+        )
+    if mesh is observed:
+        even = remesh(observed, EDGE_MM)
+    else:
+        even = align(remesh(scale_to_volume(mesh, volumes[1]), EDGE_MM), observed)
+    fitted = curvature(even, radius_mm=radius_mm)
+    return PreparedSurface(even, fitted.mean, fitted.shape_index)
+
+
+def scale_to_volume(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+    """Scale a closed surface uniformly to a volume."""
     factor = (volume_mm3 / signed_volume(mesh)) ** (1 / 3)
     return transformed(mesh, np.diag([factor] * 3 + [1.0]))
 
 
-def ready(mesh: TriangleMesh, real: TriangleMesh) -> TriangleMesh:
-    """Scale a closed surface to the volume of the real brain, remesh it and lay it onto that rigidly.
+def curvature_differences(surface: PreparedSurface, observed: PreparedSurface) -> dict[str, float]:
+    """Compare how strongly two surfaces are folded, wherever the folds are.
 
-    The real brain itself is only remeshed. InputError where a surface encloses no volume.
+    curvature_rms_ratio is the ratio to the observed one; curvature_distance_per_mm is the first Wasserstein distance
+    between the distributions of mean curvature over the area.
     """
-    volumes = [signed_volume(surface) for surface in (mesh, real)]
-    if min(volumes) <= 0:
-        raise InputError(
-            "a surface encloses no volume, so that it cannot be compared",
-            found=f"{volumes[0]:.4g} and {volumes[1]:.4g} mm³",
-            expected="closed surfaces with their faces outwards",
-        )
-    if mesh is real:
-        return remesh(real, EDGE_MM)
-    even = remesh(scaled_to(mesh, volumes[1]), EDGE_MM)
-    return transformed(even, fit_onto(even, real))
+    distance = wasserstein_distance(surface.mean_curvature, observed.mean_curvature, surface.areas, observed.areas)
+    return {
+        "curvature_rms_ratio": surface.curvature_rms / observed.curvature_rms,
+        "curvature_distance_per_mm": float(distance),
+    }
 
 
-def against_real(run: Shape, real: Shape) -> dict[str, float]:
-    """Return how the folds of a run differ from the real ones, wherever they are.
-
-    curvature_rms_ratio is the run's over the real one; curvature_distance_per_mm the mean difference of mean curvature
-    between the two distributions by area (Wasserstein's first distance).
-    """
-    distance = wasserstein_distance(run.mean_curvature, real.mean_curvature, run.areas, real.areas)
-    return {"curvature_rms_ratio": run.curvature_rms / real.curvature_rms, "curvature_distance_per_mm": float(distance)}
-
-
-def cortex_dice(one: TriangleMesh, other: TriangleMesh) -> float:
-    """Return the Dice overlap of the outermost `CORTEX_MM` of two closed surfaces, as they lie to each other in mm."""
-    ribbons = [_ribbon(mesh) for mesh in (one, other)]
+def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
+    """Return the Dice overlap of the outermost `CORTEX_MM` of two aligned closed surfaces in mm."""
+    ribbons = [_ribbon(mesh) for mesh in (surface, observed)]
     both = sum(map(len, ribbons)) - len(np.unique(np.concatenate(ribbons), axis=0))
     return 2 * both / sum(map(len, ribbons))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from ..geometry.alignment import fit_onto, rigid_fit, without_rigid_motion
+from ..geometry.alignment import align, rigid_fit, without_rigid_motion
 from ..geometry.triangles import (
     Floats,
     Ints,
@@ -15,13 +15,12 @@ from ..geometry.triangles import (
     area,
     face_components,
     signed_volume,
-    transformed,
     vertex_areas,
 )
 from ..units import CM2_PER_MM2, ML_PER_MM3
+from .distances import pairwise_distances, surface_distances
 from .placement import placement
-from .prediction import apart, distances
-from .shapes import Shape, against_real, cortex_dice
+from .shapes import PreparedSurface, cortex_dice, curvature_differences
 
 
 def validation_row(
@@ -30,18 +29,18 @@ def validation_row(
     simulated: TriangleMesh,
     real_brain: TriangleMesh,
     aims: Mapping[str, float],
-    run: Shape,
-    real: Shape,
-    start: Shape,
-    adjacent: Shape,
+    run: PreparedSurface,
+    real: PreparedSurface,
+    start: PreparedSurface,
+    adjacent: PreparedSurface,
 ) -> dict[str, Any]:
     """Return a row of validation.csv.
 
-    Columns: the labels, horizon (weeks since the start); distance_mm and distance95_mm of `prediction.distances` and
-    `cortex_dice`, both of the surfaces as they are, laid onto each other rigidly; area_cm2, volume_ml and the same with
-    real_ and curve_ in front; area_error and volume_error against the curve and area_difference and volume_difference
-    from the real brain, as fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of
-    `placement.placement` and `shapes.against_real`.
+    Columns: the labels, horizon (weeks since the start); those of `distances.surface_distances` and `cortex_dice`, of
+    the surfaces as they are, aligned rigidly; area_cm2, volume_ml and the same with real_ and curve_ in front;
+    area_error and volume_error against the curve and area_difference and volume_difference from the real brain, as
+    fractions; relative_area, real_relative_area (A/V^⅔ as they are, before remeshing); those of `placement.placement`
+    and `shapes.curvature_differences`.
 
     The labels are run, kind ("explained" where growth came from the weeks that are compared, "predicted" where
     from another brain, atlas or only earlier weeks), start and real (ids of the brains), start_week and week.
@@ -50,9 +49,10 @@ def validation_row(
     `placement`.
     """
     horizon = labels["week"] - labels["start_week"]
-    placed = transformed(simulated, fit_onto(simulated, real_brain))
+    aligned = align(simulated, real_brain)
     row: dict[str, Any] = dict(labels) | {"horizon": horizon}
-    row |= distances(apart(placed, real_brain, real.mesh)) | {"cortex_dice": cortex_dice(placed, real_brain)}
+    row |= surface_distances(pairwise_distances(aligned, real_brain, real.mesh))
+    row["cortex_dice"] = cortex_dice(aligned, real_brain)
     row |= _sizes(simulated) | {f"real_{name}": size for name, size in _sizes(real_brain).items()}
     for name in ("area_cm2", "volume_ml"):
         row[f"curve_{name}"] = aims.get(name, np.nan)
@@ -60,7 +60,7 @@ def validation_row(
         row[f"{quantity}_error"] = row[name] / row[f"curve_{name}"] - 1
         row[f"{quantity}_difference"] = row[name] / row[f"real_{name}"] - 1
     row |= placement(real, run, start, adjacent, horizon=horizon)
-    return row | against_real(run, real)
+    return row | curvature_differences(run, real)
 
 
 def ordered(rows: list[dict[str, Any]]) -> pd.DataFrame:

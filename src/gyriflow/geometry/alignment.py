@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from .triangles import Floats, TriangleMesh, face_normals
+from .triangles import Floats, TriangleMesh, face_normals, transformed
 
 CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, none first: no rotation is more than 63 degrees from all of them."""
@@ -143,6 +143,11 @@ def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
 
     apart = of_b.mean(axis=0) - of_a.mean(axis=0)
     return motion(*follow_planes(np.eye(3), apart, planes, ROUNDS, arrived))
+
+
+def align(mesh: TriangleMesh, onto: TriangleMesh) -> TriangleMesh:
+    """Move a surface rigidly onto another in nearly the same pose, by `fit_onto`."""
+    return transformed(mesh, fit_onto(mesh, onto))
 
 
 def fits_from_all_sides(

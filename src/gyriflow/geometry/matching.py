@@ -148,6 +148,11 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
     return Match(nearest_corners, weights, distance, agrees)
 
 
+def match_surface(mesh: TriangleMesh, surface: TriangleMesh) -> Match:
+    """Match the vertices of a mesh with the nearest points of another surface whose normal agrees."""
+    return match_points(mesh.vertices, vertex_normals(mesh), surface)
+
+
 def values_at(match: Match, values: NDArray) -> Floats:
     """Return (n,) or (n, k) values at matched points from those at the surface's vertices, linear in each face."""
     weights = match.weights if values.ndim == 1 else match.weights[..., None]

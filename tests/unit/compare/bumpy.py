@@ -3,7 +3,7 @@
 import numpy as np
 from shapes import sphere
 
-from gyriflow.compare.shapes import Shape
+from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.triangles import Floats, TriangleMesh
 from gyriflow.metrics.curvature import curvature
 
@@ -25,9 +25,9 @@ def bumpy(seed: int, height: float = 1.0, subdivisions: int = 4) -> TriangleMesh
     return TriangleMesh(ball.vertices * radius[:, None], ball.faces)
 
 
-def shaped(mesh: TriangleMesh, pattern: Floats | None = None) -> Shape:
+def shaped(mesh: TriangleMesh, pattern: Floats | None = None) -> PreparedSurface:
     """Return a shape with its curvature, or with a pattern in its place."""
     if pattern is None:
         bend = curvature(mesh, radius_mm=3.0)
-        return Shape(mesh, bend.mean, bend.shape_index)
-    return Shape(mesh, 0.1 * pattern, np.tanh(pattern))
+        return PreparedSurface(mesh, bend.mean, bend.shape_index)
+    return PreparedSurface(mesh, 0.1 * pattern, np.tanh(pattern))

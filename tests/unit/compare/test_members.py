@@ -31,7 +31,7 @@ METRICS = pd.DataFrame(
 SPECTRAL = pd.DataFrame(
     {"real": ["b"], "hemisphere": "left", "metric": "spectral_distance_B4", "value": 0.2, "flag": "ok"}
 )
-SURFACES = {"whole": {"symmetric_mean": 1.5}}
+SURFACES = {"whole": {"distance_mm": 1.5, "distance95_mm": 2.5}}
 
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
@@ -47,7 +47,8 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
         ("left", "relative_power_B6"): pytest.approx(0.0),
         ("whole", "area"): pytest.approx(0.1),
         ("left", "spectral_distance_B4"): 0.2,
-        ("whole", "surface_symmetric_mean"): 1.5,
+        ("whole", "surface_distance"): 1.5,
+        ("whole", "surface_distance95"): 2.5,
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
     assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4

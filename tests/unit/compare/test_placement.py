@@ -6,8 +6,8 @@ import pytest
 from shapes import rigid, sphere
 
 from gyriflow.compare.placement import correlation, drawn_patches, gain_interval, patches, placement, skill
-from gyriflow.compare.prediction import apart, deviation_maps, distances, endpoints, roughness_mm, with_skill
-from gyriflow.compare.shapes import Shape, against_real, cortex_dice, ready
+from gyriflow.compare.prediction import deviation_maps, endpoints, roughness_mm, with_skill
+from gyriflow.compare.shapes import PreparedSurface, cortex_dice, curvature_differences, prepare_for_comparison
 from gyriflow.compare.validation import ordered, validation_row
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh, area, flipped, mean_edge_length, signed_volume, transformed
@@ -40,7 +40,7 @@ def test_skill_is_between_the_start_and_the_adjacent_week():
 
 def test_a_brain_that_is_laid_back_has_its_folds_in_place():
     scaled = transformed(REAL, rigid(0, 0, 12, shift=(5, -3, 2)) @ np.diag([0.7, 0.7, 0.7, 1.0]))
-    laid = ready(scaled, REAL)
+    laid = prepare_for_comparison(scaled, REAL).mesh
     assert signed_volume(laid) == pytest.approx(signed_volume(REAL), rel=0.01)
     assert mean_edge_length(laid) == pytest.approx(1.0, abs=0.1)
     row = placement(TRUTH, shaped(laid), shaped(SMOOTH, noise(1)), TRUTH, horizon=3)
@@ -54,7 +54,7 @@ def test_a_brain_that_is_laid_back_has_its_folds_in_place():
 def test_noise_has_the_correlation_that_it_leaves():
     pattern = TRUTH.mean_curvature
     added = pattern + pattern.std() * noise(4)
-    row = placement(TRUTH, Shape(REAL, added, added), shaped(SMOOTH, noise(2)), TRUTH, horizon=3)
+    row = placement(TRUTH, PreparedSurface(REAL, added, added), shaped(SMOOTH, noise(2)), TRUTH, horizon=3)
     assert row["r_mean_curvature"] == pytest.approx(1 / np.sqrt(2), abs=0.06)
     assert row["skill_mean_curvature"] == pytest.approx(row["r_mean_curvature"], abs=0.08)
     assert row["gain_low_mean_curvature"] < row["gain_mean_curvature"] < row["gain_high_mean_curvature"]
@@ -128,12 +128,12 @@ def test_intervals_of_symmetric_brains_are_root_two_wider_when_mirror_patches_ar
 
 def test_open_or_turned_surfaces_are_refused():
     with pytest.raises(InputError, match="encloses no volume"):
-        ready(flipped(REAL), REAL)
+        prepare_for_comparison(flipped(REAL), REAL)
 
 
 def test_size_and_distance_of_curvature():
     half = np.where(SMOOTH.vertices[:, 2] > 0, 0.1, -0.1)
-    against = against_real(Shape(SMOOTH, 2 * half, half), Shape(SMOOTH, half, half))
+    against = curvature_differences(PreparedSurface(SMOOTH, 2 * half, half), PreparedSurface(SMOOTH, half, half))
     assert against["curvature_rms_ratio"] == pytest.approx(2.0)
     assert against["curvature_distance_per_mm"] == pytest.approx(0.1, rel=0.02)
 
@@ -181,31 +181,6 @@ def test_a_row_of_validation_holds_sizes_errors_placement_and_folds():
     assert 0.7 < found["cortex_dice"] < table["cortex_dice"].iloc[0] == 1.0
     assert found["curvature_rms_ratio"] == pytest.approx(1.0)
     assert table[["run", "week"]].to_numpy().tolist() == [["measured", 22.0], ["measured", 23.0], ["reference", 22.0]]
-
-
-def lying_apart(found, real):
-    return distances(apart(found, real, ready(real, real)))
-
-
-def test_distances_are_weighted_by_area_and_the_far_ones_are_a_quantile():
-    ball = sphere(10.0)
-    # the two caps beyond 0.9 of a radius have a tenth of a ball's area
-    caps = np.abs(ball.vertices[:, 2:]) > 9.0
-    raised = TriangleMesh(ball.vertices * np.where(caps, 1.1, 1.0), ball.faces)
-    found = lying_apart(raised, ball)
-    assert found["distance_mm"] == pytest.approx(0.1, abs=0.05)
-    assert found["distance95_mm"] == pytest.approx(1.0, abs=0.15)
-
-
-def test_each_side_of_the_middle_has_its_distance():
-    ball = sphere(10.0)
-    # waves on the right only
-    right = np.where(ball.vertices[:, 0] > 0, 1 + 0.05 * np.cos(np.arctan2(*ball.vertices[:, 1:].T) * 8), 1.0)
-    found = lying_apart(TriangleMesh(ball.vertices * right[:, None], ball.faces), ball)
-    assert found["distance_right_mm"] > 5 * found["distance_left_mm"]
-    assert found["distance_mm"] == pytest.approx((found["distance_left_mm"] + found["distance_right_mm"]) / 2, rel=0.05)
-    half = TriangleMesh(ball.vertices + [20.0, 0, 0], ball.faces)
-    assert np.isnan(lying_apart(half, half)["distance_left_mm"])
 
 
 def test_jagged_vertices_are_rough_and_even_ones_are_not():

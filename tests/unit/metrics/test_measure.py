@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
-from shapes import ellipsoid, octasphere, rigid, sphere
+from shapes import ellipsoid, octasphere, sphere
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, transformed, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, vertex_areas
 from gyriflow.metrics.measure import BrainMetrics, area_ratio_rows, measure_brain, thickness_rows
 from gyriflow.metrics.regions import region_metrics
-from gyriflow.metrics.similarity import aligned_distance
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
 
 
@@ -229,29 +228,3 @@ def test_regions_have_their_area_and_means() -> None:
     assert dict(zip(rows["metric"], rows["unit"], strict=True)) == {"area": "cm2", "area_share": "1", **means}
     with pytest.raises(InputError, match="without a name: 9"):
         region_metrics({"left": mesh}, {"left": maps}, {"left": labels}, {7: "top"})
-
-
-def test_a_motion_is_no_distance() -> None:
-    # an ellipsoid with a bump, so that only one pose fits
-    ball = sphere(1.0, 4)
-    bump = 1 + 0.25 * np.exp(-8 * ((ball.vertices - np.array([0.6, 0.64, 0.48])) ** 2).sum(axis=1))
-    mesh = TriangleMesh(ball.vertices * bump[:, None] * [20.0, 28.0, 16.0], ball.faces)
-    result = aligned_distance(transformed(mesh, rigid(4.0, 6.0, 9.0, shift=(8.0, -5.0, 3.0))), mesh)
-    assert result["symmetric_mean"] < 0.02
-    assert result["hausdorff95"] < 0.05
-
-
-def test_spheres_of_different_radius() -> None:
-    assert aligned_distance(sphere(20.0), sphere(22.0)) == pytest.approx(
-        {"symmetric_mean": 2.0, "hausdorff95": 2.0}, abs=0.05
-    )
-
-
-def test_hausdorff_sees_what_the_mean_does_not() -> None:
-    smooth = sphere(25.0)
-    tall = smooth.vertices.copy()
-    cap = tall[:, 2] > 25.0 * np.cos(np.arccos(1 - 2 * 0.08))  # 8 % of the sphere's area
-    tall[cap] *= 1.2
-    result = aligned_distance(TriangleMesh(tall, smooth.faces), smooth)
-    assert result["symmetric_mean"] < 1.0
-    assert result["hausdorff95"] > 3.0
