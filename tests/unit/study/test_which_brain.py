@@ -141,22 +141,6 @@ def test_a_start_that_no_brain_leads_to_the_end_is_left_out_alone():
     assert (found.pairs, list(found.unreachable)) == ([("m", "y21"), ("m", "z21")], ["x21"])
 
 
-def test_a_start_follows_the_sizes_of_the_series_that_is_preferred_its_own_or_the_only_other():
-    series = [brain(f"{who}{week}", week, population=who) for who in "xyz" for week in (21, 23)]
-    sizes = {"runs": {"s": {"growth": "sizes"}}}
-
-    def followed(brains, start, **more):
-        found = resolved(brains, start=start, **sizes, **more)
-        (run,) = found.folded
-        return run.series, found.growth_of(run)
-
-    assert followed(series, "y21") == ("y", "own")
-    assert followed(series, "y21", growth={"series": "z"}) == ("z", "series z")
-    lone = brain("lone", 21, population="w")
-    assert followed([lone, *series[:2]], "lone")[1].startswith("series")
-    assert followed([lone, *series], "lone") == (None, "")
-
-
 def test_starts_are_in_the_order_of_the_brains_and_the_first_is_the_earliest_listed():
     brains = labelled(23, 21, 22)
     assert resolved(brains, start="first").pairs == [("reference", "a")]
@@ -164,25 +148,3 @@ def test_starts_are_in_the_order_of_the_brains_and_the_first_is_the_earliest_lis
     runs = {"one": {"start": "c"}, "every": {"start": "all"}}
     assert resolved(brains, runs=runs).pairs == [("one", "c"), *(("every", name) for name in "abc")]
     assert resolved(brains, ["a"], start="first").pairs == []
-
-
-def test_a_prediction_ends_beside_the_brain_of_the_atlas_nearest_to_its_end():
-    atlas = [brain(f"atlas{week}", week, population="atlas") for week in (22, 23, 24, 25)]
-    found = resolved([brain("own", 22.4, population="own"), *atlas], start="own", runs={"e": {"preset": "expected"}},
-                     folding={"end_week": 23.4})  # fmt: skip
-    assert found.prediction is found.folded[0]
-    assert found.atlas_brain(found.prediction).id == "atlas23"
-    assert found.described_prediction["beside"] == "atlas23"
-
-
-def test_a_study_is_compared_with_the_brains_of_its_week_of_the_start_s_population_or_those_named():
-    brains = [brain("start", 21, population="x"), brain("x23", 23, population="x"), brain("y23", 23, population="y"),
-              brain("x24", 24, population="x"), brain("none", 21)]  # fmt: skip
-    varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 23}
-    named = {"base": "reference", "vary": {"thickness_mm": [3.0]}, "compare_week": 23, "compare_with": ["y23"]}
-    found = resolved(brains, start=["start", "none"], studies={"by-week": varied, "by-name": named}).comparisons
-    assert {name: ids(real) for name, real in found["by-week"].real.items()} == {
-        "start": ["x23"],
-        "none": ["x23", "y23"],
-    }
-    assert {name: ids(real) for name, real in found["by-name"].real.items()} == {"start": ["y23"], "none": ["y23"]}

@@ -1,0 +1,146 @@
+"""What the scripts of the report write of two brains and two runs: the numbers of each stand under its own name."""
+
+import re
+from base64 import b64decode
+from io import BytesIO
+
+import pandas as pd
+import pytest
+from PIL import Image
+from scripts import run_script
+
+from gyriflow.io.downloads import sha256_of
+from gyriflow.io.files import read_json, read_table, read_text, write_json, write_table, write_text
+from gyriflow.io.yaml_files import write_yaml
+
+from .test_page import BRAINS, MEASURES, PAGE, PROVENANCE, RUNS, VALIDATION
+
+COLOURS = {"young": (200, 30, 30), "old": (30, 30, 200), "overview": (30, 160, 30)}
+FOLDED = [("thin", "young"), ("thick", "old")]
+GROWTH = ["own", "population P"]
+PARTS = {"page": "page.html", "style": "style.css", "three": "three.min.js", "notice": "three.LICENSE.txt"}
+PARTS |= {"controls": "OrbitControls.js", "viewer": "viewer.js"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working directory with what the pages are made of, and results of two brains and runs."""
+    monkeypatch.chdir(tmp_path)
+    for name, colour in COLOURS.items():
+        Image.new("RGB", (40, 30), colour).save(f"{name}.png", dpi=(20, 20))
+    later = {"run": "thick", "start_week": 23.0}
+    warnings = {"subject": ["young", "old"], "run": "", "step": "s", "level": "warning", "message": ["M1", "M2"]}
+    tables = MEASURES | {
+        "warnings": pd.DataFrame(warnings),
+        "runs": pd.concat([RUNS, RUNS.assign(subject="old", end_week=25.0, **later)]),
+        "validation": pd.concat([VALIDATION, VALIDATION.assign(week=[24.0, 25.0], distance_mm=[0.2, 0.9], **later)]),
+    }
+    for name, table in tables.items():
+        write_table(f"{name}.csv", table)
+    files = [{"brain": name, "what": "labels", "sha256": f"hash of {name}"} for name in ("young", "old")]
+    write_json("provenance.json", PROVENANCE | {"files": files})
+    words = {"section": "Surfaces", "title": "Seen", "caption": "a picture"}
+    write_yaml("words.yaml", {"quality_figure": words, "weekly_figure": words})
+    write_text("methods.rst", "Two were *processed*.\n")
+    for number, (run, brain) in enumerate(FOLDED):
+        at = f"results/runs/{run}/{brain}"
+        write_text(f"{brain}.nii.gz", f"voxels of {brain}")
+        write_text(f"results/brains/{brain}/mesh/brain.h5", f"mesh of {brain}")
+        write_text(f"{at}/folding/maps.h5", f"maps of {run}")
+        write_yaml(f"{at}/params.yaml", {"thickness_mm": 1.5 + number})
+        write_json(f"{at}/folding/summary.json", {"steps": 7 + number})
+        zones = {"order": 1, "clamped_share": 0.1, "initial_penetration_mm": 0.2, "elements_through_cortex": 2.5}
+        write_json(f"{at}/folding/zones.json", zones)
+        write_text(f"{at}/folding/steps.csv", f"week,elements_through_cortex\n22.0,{2.5 - number}\n")
+        write_text(f"{at}/benchmarks/simulate.tsv", f"s\tcpu_time\tmax_rss\n{3600 + 3600 * number}\t7200\t100\n")
+        write_text(f"{at}/logs/simulate.log", f"2026-01-01 10:00:00,000 WARNING root: of {run}\n")
+    return tmp_path
+
+
+def of_runs(name):
+    return [f"results/runs/{run}/{brain}/{name}" for run, brain in FOLDED]
+
+
+def row_with(text, words):
+    """Return the one row of a table that has some words."""
+    (row,) = [row for row in re.findall(r"<tr>.*?</tr>", text, re.DOTALL) if words in row]
+    return row
+
+
+def colours(text):
+    """Return what the pictures of a page show, by the names of their colours."""
+    addresses = re.findall(r"webp;base64,([^\"]*)", text)
+    pixels = [Image.open(BytesIO(b64decode(data))).getpixel((5, 5)) for data in addresses]
+    return [min(COLOURS, key=lambda name: abs(COLOURS[name][0] - pixel[0]) + abs(COLOURS[name][1] - pixel[1]))
+            for pixel in pixels]  # fmt: skip
+
+
+def html_report(folder, inputs, params):
+    inputs = inputs | {name: f"{name}.csv" for name in ("quality", "warnings", "metrics", "centiles")}
+    inputs |= {"provenance": "provenance.json", "methods": "methods.rst", "words": "words.yaml"}
+    inputs |= {name: PAGE / file for name, file in PARTS.items()}
+    params = {"config": {"labels": "/data/Smith/young.nii.gz"}, "norm": "N", **params}
+    run_script("html_report.py", folder, inputs, {0: "page.html"}, params)
+    return read_text("page.html")
+
+
+def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder):
+    inputs = {"small": ["young.png", "old.png"], "runs": "runs.csv", "validation": "validation.csv"}
+    figures = [("weekly_figure", str(folder / "overview.png"), {}), ("without_words", "none.png", {})]
+    pictured = {"pictured": ["young", "old"], "prediction": None}
+    text = html_report(folder, inputs, pictured | {"brains": BRAINS, "figures": figures})
+    rows = [row_with(text, f'href="brains/{name}.html"') for name in ("young", "old")]
+    assert [colours(row) for row in rows] == [["young"], ["old"]]
+    assert [("46.2" in row, "refused" in row, "CC0 1.0" in row) for row in rows] == [(1, 0, 1), (0, 1, 0)]
+    for name in ("young", "old"):
+        assert name in row_with(text, f"hash of {name}")
+    assert ("0.42" in row_with(text, ">thin<"), "0.90" in row_with(text, ">thick<")) == (True, True)
+    assert ("overview" in colours(text), "<em>processed</em>" in text, "Smith" in text) == (True, True, False)
+
+
+def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
+    figures = [("quality_figure", str(folder / "young.png"), {})]
+    text = html_report(folder, {}, {"brains": BRAINS[:1], "pictured": None, "figures": figures})
+    assert ("young</h1>" in text, colours(text), "46.2" in text) == (True, ["young"], True)
+    assert [words for words in ("M1", "M2", "hash of young", "hash of old") if words in text] == ["M1", "hash of young"]
+
+
+def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(folder):
+    brains = [{"id": brain, "labels": str(folder / f"{brain}.nii.gz")} for _, brain in FOLDED]
+    shown = "{{ run.run }} {{ run.start }}: {{ run.growth_of }}, {{ run.summary.steps }}; "
+    write_text("template.rst", f"{{% for run in runs %}}{shown}{{% endfor %}}")
+    inputs = {"run_params": of_runs("params.yaml"), "summaries": of_runs("folding/summary.json")}
+    outputs = {name: f"results/{name}/provenance.json" for name in ("study", "report")}
+    outputs |= {"brains": [f"results/brains/{brain}/provenance.json" for _, brain in FOLDED]}
+    outputs |= {"runs": of_runs("provenance.json"), "methods": "methods.rst", "config": "config.yaml"}
+    params = {"brains": brains, "folded": FOLDED, "growth_of": GROWTH, "config": {}, "method": {}}
+    params["files"] = [(brain["id"], "labels", brain["labels"]) for brain in brains]
+    run_script("provenance.py", folder, inputs | {"template": "template.rst"}, outputs, params)
+    assert read_text("methods.rst") == "thin young: own, 7; thick old: population P, 8; "
+    for brain, run, (name, start), thickness in zip(brains, outputs["runs"], FOLDED, (1.5, 2.5), strict=True):
+        alone, folded = read_json(f"results/brains/{start}/provenance.json"), read_json(run)
+        found = [{path: file["sha256"] for path, file in record["inputs"].items()} for record in (alone, folded)]
+        others = f"results/brains/{start}/mesh/brain.h5", str(folder / f"results/runs/{name}/{start}/folding/maps.h5")
+        assert found[0] == {brain["labels"]: sha256_of(brain["labels"])}
+        assert found[1] == found[0] | {path: sha256_of(path) for path in others}
+        assert read_json(outputs["study"])["inputs"][start] == alone["inputs"]
+        assert (alone["configuration"], others[0] in "".join(alone["results"])) == (brain, True)
+        assert folded["configuration"] == {"run": name, "start": start, "parameters": {"thickness_mm": thickness}}
+
+
+def test_tables_tell_runs_and_what_they_took_apart(folder):
+    files = {"params": "params.yaml", "steps": "folding/steps.csv"}
+    files |= {"summaries": "folding/summary.json", "zones": "folding/zones.json"}
+    inputs, outputs = {kind: of_runs(file) for kind, file in files.items()}, {"csv": "runs.csv", "table": "runs.html"}
+    run_script("study_runs.py", folder, inputs, outputs, {"folded": FOLDED, "growth_of": GROWTH})
+    columns = ["run", "subject", "growth_of", "thickness_mm", "least_elements_through_cortex", "steps"]
+    assert read_table("runs.csv")[columns].to_numpy().tolist() == [
+        ["thin", "young", "own", 1.5, 2.5, 7], ["thick", "old", "population P", 2.5, 1.5, 8]]  # fmt: skip
+    assert re.findall(r"(own|population P)</td>", read_text("runs.html")) == GROWTH
+    pattern = r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"
+    outputs = {"csv": "resources.csv", "table": "resources.html", "warnings": "warnings.csv"}
+    params = {"folded": FOLDED, "brains": ["young", "old"], "benchmarks": {"simulate": pattern}}
+    run_script("study_resources.py", folder, {}, outputs, params)
+    assert read_table("resources.csv").set_index("run")["hours"][["thin", "thick"]].tolist() == [1, 2]
+    warned = read_table("warnings.csv")[["run", "subject", "message"]].to_numpy().tolist()
+    assert sorted(warned) == [["thick", "old", "of thick"], ["thin", "young", "of thin"]]
