@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.growth.carried_regions import NO_REGION, PLACES_MM, find_places, regions_by_deformation
+from gyriflow.growth.carried_regions import PLACES_MM, find_places, regions_by_deformation
 from gyriflow.growth.channels import channels
 from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.settings.schemes import LabelScheme
-from gyriflow.settings.terms import SIDES, STRUCTURES
+from gyriflow.settings.terms import NO_REGION, SIDES, STRUCTURES
 from gyriflow.step import step
 
 files, read = snakemake.input, snakemake.params.read

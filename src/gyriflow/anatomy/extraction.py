@@ -12,9 +12,8 @@ from scipy.special import ndtr
 from skimage.measure import marching_cubes
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, signed_volume, transformed
+from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
-Mask = NDArray[np.bool_]
 PAD_VOXELS = 6
 # σ of the Gaussian by which masks are smoothed before they become surfaces
 SMOOTHING_VOXELS = 1.0

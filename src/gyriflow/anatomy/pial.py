@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import TriangleMesh, area, corners, euler_number, merged, signed_volume, transformed
 from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES, Side
+from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import (
     LEVEL,
@@ -65,7 +65,6 @@ from .sulci import open_shut_sulci
 
 log = logging.getLogger(__name__)
 
-Coordinates = Literal["auto", "ras", "lps"]
 
 # slits this near to the mid-surface belong to the fissure
 FISSURE_REACH_MM = 3.0

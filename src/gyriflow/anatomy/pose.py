@@ -10,14 +10,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.alignment import Fit, angle_deg, motion
+from ..geometry.alignment import MIRROR, Fit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
 from .hindbrain import LEAST_TURN_DEG, judged_turn
 from .template import (
     DEEPEST,
-    MIRROR,
     Shape,
     brains,
     hemispheres,

@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry.alignment import CUBE_ROTATIONS, Fit, Planes, fits_from_all_sides, follow_planes, margin
+from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Fit, Planes, fits_from_all_sides, follow_planes, margin
 from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
 
 WEEKS = 21, 28, 34
-MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 POINTS = 2400
 # of whole brains, points deeper below the hull, in sizes, do not count
 DEEPEST = 0.15

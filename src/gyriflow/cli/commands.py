@@ -17,14 +17,14 @@ from ..shipped import CONFIG, DEMO, SHIPPED
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
-LABELS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
+BIDS_LABEL_OPTIONS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
 """Options of BIDS apps with several values after each other."""
 ELSEWHERE = ("--profile", "--executor", "-e")
 """Options of Snakemake's by which jobs run on other machines."""
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
 THERE = click.Path(exists=True, file_okay=False, path_type=Path)
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
@@ -64,7 +64,7 @@ def _one_by_one(args: Sequence[str]) -> list[str]:
     single, option = [], ""
     for argument in args:
         if argument.startswith("-"):
-            option = argument if argument in LABELS else ""
+            option = argument if argument in BIDS_LABEL_OPTIONS else ""
             single += [] if option else [argument]
         else:
             single += [option, argument] if option else [argument]
@@ -220,13 +220,13 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 
 
 @main.command()
-@click.argument("labels", type=FILE)
+@click.argument("labels", type=EXISTING_FILE)
 @click.option("--week", type=float, required=True, help="Gestational week of the scan.")
 @click.option("--until", type=float, required=True, help="Gestational week to predict.")
 @click.option("--atlas", help="Atlas whose growth is used: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
 @scheme_option
 @click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: download them]")
-@click.option("--image", type=FILE, help="T2-weighted volume of the scan.")
+@click.option("--image", type=EXISTING_FILE, help="T2-weighted volume of the scan.")
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas.")
 @click.option("--quick", is_flag=True, help="Use a coarse mesh and steps of one day, for a first look.")
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
@@ -255,8 +255,8 @@ def predict(
 @click.argument("data", type=THERE, metavar="BIDS")
 @click.argument("out", type=FOLDER)
 @click.argument("level", type=click.Choice(LEVELS))
-@click.option(*LABELS[:2], "participants", multiple=True, help="Only these participants.")
-@click.option(*LABELS[2:], "sessions", multiple=True, help="Only these sessions.")
+@click.option(*BIDS_LABEL_OPTIONS[:2], "participants", multiple=True, help="Only these participants.")
+@click.option(*BIDS_LABEL_OPTIONS[2:], "sessions", multiple=True, help="Only these sessions.")
 @click.option("--files", help="Pattern of the paths to use if a scan has several files.")
 @scheme_option
 @click.option(

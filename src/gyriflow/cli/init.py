@@ -37,7 +37,7 @@ folding:
 runs:
   reference: {{}}{measured}
 """
-MEASURED = """
+MEASURED_RUN = """
   measured: {preset: measured}"""
 SHIPPED_ATLAS = "spina-bifida"
 QUICK: dict[str, Any] = {
@@ -71,7 +71,7 @@ def write_configuration(
     series = next((ids for ids in of_subjects if len(_weeks(ids)) > 1), brains)
     weeks, several = _weeks(series), series is not brains
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    measured = MEASURED if fold and several and _leads(series, folder) else ""
+    measured = MEASURED_RUN if fold and several and _leads(series, folder) else ""
     rest = REST.format(start=series[0].entry["id"], end=end, measured=measured)
     write_text(path, HEAD + "".join(lines) + (rest if fold else ""))
     for brain in brains:

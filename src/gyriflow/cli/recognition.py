@@ -22,10 +22,10 @@ from ..study.participants import Scan, covariates, read_scans
 VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
 SURFACES = (".gii", ".vtk", ".vtp", ".stl", ".ply", ".obj")
 FREESURFER = re.compile(r"[lr]h\.(?:pial|white)")
-LABELS = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
-SIDES = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
-KINDS = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
-WEEK = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
+LABEL_NAME = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
+SIDE_NAME = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
+LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
+WEEK_NAME = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
 SUFFIXES = re.compile(
     r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|nii|gz|mgz|mgh|gii|vt[kp]|stl|ply|obj)(?=[._-]|$)",
     re.IGNORECASE,
@@ -157,9 +157,9 @@ def _is_own(description: Path) -> bool:
 def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
     surfaces: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
-        kind, side = KINDS.search(file.name), SIDES.search(file.name)
+        kind, side = LAYER_NAME.search(file.name), SIDE_NAME.search(file.name)
         if kind and side and (file.name.lower().endswith(SURFACES) or FREESURFER.fullmatch(file.name)):
-            rest = str(file.parent / KINDS.sub("", SIDES.sub("", file.name)))
+            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", file.name)))
             sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
             sides["left" if side[1] else "right"] = file
     for (rest, layer), sides in surfaces.items():
@@ -179,7 +179,7 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
 def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUMES)]
     for file in volumes:
-        if LABELS.search(file.name):
+        if LABEL_NAME.search(file.name):
             try:
                 labels = read_label_volume(folder / file).labels
             except InputError:
@@ -196,7 +196,7 @@ def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Re
     named = [scan for scan in scans if _names(file, scan.subject) and _names(file, scan.session)]
     # a participant's row holds for its sessions too, but the session's own comes first
     scan = max(named, key=lambda scan: scan.session is not None, default=None)
-    weeks = [match[1] for part in reversed(file.parts) if (match := WEEK.search(part))]
+    weeks = [match[1] for part in reversed(file.parts) if (match := WEEK_NAME.search(part))]
     week = float(weeks[0]) if weeks and scan is None else UNSET
     if scan is not None and scan.week is not None:
         week = scan.week
@@ -213,7 +213,7 @@ def _names(file: Path, part: str | None) -> bool:
 def _id(file: Path) -> str:
     if entities := SUBJECT_AND_SESSION.search(file.as_posix()):
         return "_".join(filter(None, entities.groups()))
-    name = SUFFIXES.sub("", KINDS.sub("", SIDES.sub("", file.name)))
+    name = SUFFIXES.sub("", LAYER_NAME.sub("", SIDE_NAME.sub("", file.name)))
     if len(file.parts) > 1 and not re.search(r"\d", name):
         name = file.parts[-2]
     return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"

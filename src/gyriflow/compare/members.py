@@ -12,7 +12,7 @@ SIZES = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the real brain's is a measure."""
 MODES = "weyl_number"
 """The metric that says at how many modes the spectrum of a hemisphere is cut."""
-COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
+DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
 
 
@@ -33,7 +33,7 @@ def distances_to(
 
     `real` is the id of the real brain. Metrics and spectra are rows of the simulated brain and of the real one, whose
     `run` is "real"; spectral those of the simulated brain, with the column `real`; surfaces by hemisphere the distances
-    of `distances.aligned_distances`. The columns are `COLUMNS`; `flag` is "ok" or says what is wrong with
+    of `distances.aligned_distances`. The columns are `DISTANCE_COLUMNS`; `flag` is "ok" or says what is wrong with
     the value.
     """
     rows = [*_band_rows(real, spectra), *_size_rows(real, metrics)]
@@ -42,7 +42,7 @@ def distances_to(
     for hemisphere, distances in surfaces.items():
         for name in ("distance", "distance95"):
             rows.append((hemisphere, f"surface_{name}", np.nan, np.nan, distances[f"{name}_mm"], "mm", "ok"))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    return pd.DataFrame(rows, columns=list(DISTANCE_COLUMNS))
 
 
 def _band_rows(real: str, spectra: pd.DataFrame) -> Iterator[tuple]:
@@ -101,8 +101,8 @@ def member_row(
 def nearest(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each real brain by each measure, per hemisphere.
 
-    The comparison has the columns subject, run, real and those of `COLUMNS`; members are rows of `member_row`, varied
-    their columns with the varied values.
+    The comparison has the columns subject, run, real and those of `DISTANCE_COLUMNS`; members are rows of `member_row`,
+    varied their columns with the varied values.
 
     Returns
     -------

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.alignment import align
-from ..geometry.matching import MIRROR, match_surface, nearest_on, values_at
+from ..geometry.alignment import MIRROR, align
+from ..geometry.matching import match_surface, nearest_on, values_at
 from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
 from .shapes import PreparedSurface
 
@@ -102,7 +102,7 @@ def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
 
     The image, mirrored along x (left to right), is laid onto the surface rigidly.
     """
-    image = transformed(mesh, np.pad(MIRROR, (0, 1)) + np.diag([0.0, 0.0, 0.0, 1.0]))
+    image = transformed(mesh, MIRROR)
     aligned = align(image, mesh)
     return aligned.vertices, float(np.average(nearest_on(aligned.vertices, mesh)[0], weights=areas))
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..geometry.jacobians import EDGES
 from ..geometry.triangles import Floats
 from ..settings.terms import ELEMENTS_NEEDED
 from ..units import MM_PER_M
@@ -12,8 +13,6 @@ from .contact import SelfContact
 from .domain import Domain
 from .newton import NewtonSolver
 from .zones import Zones
-
-EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.matching import barycentric, nearest_on
-from ..geometry.triangles import Floats, TriangleMesh, corners, unit, vertex_normals
+from ..geometry.triangles import Floats, Ints, TriangleMesh, corners, unit, vertex_normals
 from ..settings.folding import FoldingParameters
 from ..settings.terms import CORTICAL_STEEPNESS
 from ..settings.varying import Maps, value_at
 from ..units import M_PER_MM, MM_PER_M
 from .points import IntegrationPoints
-
-Ints = NDArray[np.int64]
 
 WEIGHT_REACH = 3.0
 """Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken as 0."""

@@ -13,6 +13,9 @@ from .triangles import Floats, TriangleMesh, face_normals, transformed
 CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, none first: no rotation is more than 63 degrees from all of them."""
 
+MIRROR: Floats = np.diag([-1.0, 1.0, 1.0, 1.0])
+"""The (4, 4) reflection that exchanges left and right in RAS coordinates."""
+
 Planes = tuple[Floats, Floats, Floats, Floats | None]
 """Points, unit normals of the planes that they are to reach, how far these are along them, and weights."""
 

@@ -19,8 +19,6 @@ AGREEING = 0.5
 NEIGHBOURS = (16, 64, 256)
 """How many nearest vertices are looked through for an agreeing one, in turn."""
 
-MIRROR = np.diag([-1.0, 1.0, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
 class Match:

@@ -11,6 +11,7 @@ from .alignment import motion
 from .triangles import Floats
 
 LPS_TO_RAS: Floats = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""Also the motion from RAS to LPS: it is its own inverse."""
 CONVENTIONS: dict[str, Floats] = {"ras": np.eye(4), "lps": LPS_TO_RAS}
 """Axes of files, as motions (4, 4) to RAS+."""
 

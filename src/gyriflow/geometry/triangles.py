@@ -10,6 +10,7 @@ from ..errors import MeshError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:

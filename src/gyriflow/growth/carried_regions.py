@@ -12,13 +12,13 @@ from ..errors import InputError
 from ..geometry.deformations import Deformation, carry, transform_points
 from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
+from ..settings.terms import NO_REGION
 from .channels import Channels
 from .diffeomorphic import register
 from .registration_quality import judge, require_good
 
 log = logging.getLogger(__name__)
 
-NO_REGION = 0
 PLACES_MM = 1.2
 """Grid of the registration that carries named sulci: fine enough for places, four times as fast as 0.8 mm."""
 REACH_MM = 4.0

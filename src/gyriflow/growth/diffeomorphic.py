@@ -13,7 +13,9 @@ from scipy.ndimage import binary_dilation, map_coordinates
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
+from ..geometry.alignment import CUBE_ROTATIONS
 from ..geometry.deformations import Deformation, transform_points
+from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM, Channels
 
@@ -24,9 +26,6 @@ WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
 DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -s 2.5vox 0.8vox -wp 0"
 
-TURNS = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
-"""The 24 rotations of a cube, none first."""
-
 CLEARLY_BETTER = 0.7
 """A turned start has to have a smaller share of the difference of the start as given to be taken."""
 
@@ -35,9 +34,6 @@ POINTS = 20000
 
 NEAR_MM = 3.0
 """Round the cerebrum, what is compared for the deformation."""
-
-MIRROR = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""greedy hands matrices over in RAS and all else in LPS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +79,8 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
             found=f"channels {', '.join(names)}" + said.getvalue()[-500:],
             remedy="Look at both label volumes: are they of the same kind of brain, whole and in mm?",
         ) from error
-    matrix = start @ MIRROR @ np.asarray(greedy["found"], dtype=float) @ MIRROR
+    # greedy returns matrices in RAS, and works in LPS with all else
+    matrix = start @ LPS_TO_RAS @ np.asarray(greedy["found"], dtype=float) @ LPS_TO_RAS
     # images hold their axes the other way round in SimpleITK's arrays
     warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3).astype(np.float32)
     seconds = time.perf_counter() - began
@@ -117,7 +114,7 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
     index = index[:: max(1, len(index) // POINTS)]
     points = transform_points(index, earlier.affine)
     tried, differences = [], []
-    for turn in TURNS:
+    for turn in CUBE_ROTATIONS:
         matrix = np.eye(4)
         matrix[:3, :3] = scale * turn
         matrix[:3, 3] = second - matrix[:3, :3] @ first
@@ -131,7 +128,7 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
         differences.append(float(np.sum([square.mean() for square in squares])))
     best = int(np.argmin(differences))
     chosen = best if differences[best] < CLEARLY_BETTER * differences[0] else 0
-    return TURNS[chosen], tried[chosen]
+    return CUBE_ROTATIONS[chosen], tried[chosen]
 
 
 def _place(brain: Channels) -> tuple[Floats, float]:

@@ -64,7 +64,7 @@ PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
 }
-LABELS = "{}{}_dseg.nii.gz"
+LABELS_FILE = "{}{}_dseg.nii.gz"
 TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
 OF_INPUT = {"Description": "As in the tables of the input"}
 SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
@@ -124,7 +124,7 @@ def export_bids(
         sidecars |= _write_surfaces(place, brain, pose.inverse if pose.together else np.eye(4))
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
-            write_label_volume(LABELS.format(*place), _labels(brain, pose.inverse))
+            write_label_volume(LABELS_FILE.format(*place), _labels(brain, pose.inverse))
             _write_tsv(folder / "dseg.tsv", pd.DataFrame(TISSUES, columns=["index", "name"]))
     for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
@@ -150,7 +150,7 @@ def export_bids(
 def labels_of(folder: AnyPath, one: ExportedBrain, brains: Sequence[ExportedBrain]) -> str:
     """Return the file for the labels of one simulated brain that `export_bids` writes to a folder with all brains."""
     names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
-    return LABELS.format(*_places(Path(folder), [one], names)[0])
+    return LABELS_FILE.format(*_places(Path(folder), [one], names)[0])
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[Place]:

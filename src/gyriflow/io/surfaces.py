@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
-from ..settings.terms import STRUCTURES, Side
+from ..settings.terms import NO_REGION, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, reading, require_finite
 
 log = logging.getLogger(__name__)
@@ -252,7 +252,6 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
     return len(mesh.vertices), len(mesh.faces), hashlib.sha256(triangles.tobytes()).hexdigest()
 
 
-NO_REGION = 0
 UNNAMED = ("", "???", "unknown", "Unknown", "none")
 """Names that label tables give to what is in no region."""
 

@@ -8,16 +8,14 @@ import logging
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..geometry.jacobians import coefficients
 from ..geometry.matching import faces_that_cross, nearest_on
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, quadratic, signed_volumes
-from ..geometry.triangles import Floats, TriangleMesh, edges, face_normals, vertex_normals
+from ..geometry.triangles import Floats, Mask, TriangleMesh, edges, face_normals, vertex_normals
 from .quality import jacobian_ratios, radius_ratios
 
 log = logging.getLogger(__name__)
-Mask = NDArray[np.bool_]
 ALIKE = 0.5
 """Least cosine between the normals of the mesh at a node and of the surface where the node is to go: the wall of a
 sulcus may be nearer to a node than the place it comes from."""

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
+from ..settings.terms import NO_REGION
 from ..units import CM2_PER_MM2
-
-UNLABELLED = 0
-"""The label of what is in no region."""
 
 MAP_UNITS = {
     "shape_index": "1",
@@ -47,7 +45,7 @@ def region_metrics(
     rows = []
     for side, mesh in sides.items():
         label = np.asarray(labels[side])
-        unknown = sorted({int(number) for number in np.unique(label)} - {UNLABELLED, *names})
+        unknown = sorted({int(number) for number in np.unique(label)} - {NO_REGION, *names})
         if unknown or len(label) != len(mesh.vertices):
             summary = f"{len(label)} labels, without a name: {', '.join(map(str, unknown)) or 'none'}"
             expected = f"{len(mesh.vertices)} labels, each named"

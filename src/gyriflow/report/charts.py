@@ -19,13 +19,12 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..settings.terms import FOLD_BANDS, MEASURED, SIDES
+from ..settings.terms import FOLD_BANDS, MEASURED, REAL_BRAIN, SIDES
 from .labels import METRICS, value_labels, with_unit
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
     NEUTRAL_COLOUR,
-    REAL_BRAIN,
     REAL_COLOUR,
     RUN_COLOURS,
     from_zero,

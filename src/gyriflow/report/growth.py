@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..settings.terms import REAL_BRAIN
 from .style import (
     MUTED_COLOUR,
-    REAL_BRAIN,
     RUN_COLOURS,
     from_zero,
     panel_figure,

@@ -17,7 +17,7 @@ from ..settings.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_name
 from .labels import METRICS, plain, week_label, with_unit
 from .tables import brain_table, html_table, predicted_table, span, standing, worth_table
 
-FILE = "(file)"
+PATH_PLACEHOLDER = "(file)"
 _FILE_NAME = re.compile(r"[/\\]|\.(nii|gii|mgz|mgh|stl|ply|obj|vtk|yaml|yml|h5|csv|sif)(\.gz)?$", re.IGNORECASE)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders before the name of a file: they may hold names of people, and are nobody else's matter."""
@@ -406,6 +406,6 @@ def hide_paths(value: Any) -> Any:
         case list() | tuple():
             return [hide_paths(item) for item in value]
         case str() if _FILE_NAME.search(value):
-            return FILE
+            return PATH_PLACEHOLDER
         case _:
             return value

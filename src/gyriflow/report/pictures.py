@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
 from ..quantities import SHAPE_MEASURES, VertexMeasure
-from ..settings.terms import ZONE_NAMES
+from ..settings.terms import REAL_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2
 from .labels import AREA_GROWTH, DEVIATIONS, DISPLACEMENT, DISTANCE, MAPS, column_label, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
@@ -31,7 +31,6 @@ from .scene import (
 )
 from .style import (
     NEUTRAL_COLOUR,
-    REAL_BRAIN,
     REAL_SURFACE_COLOUR,
     RIGHT_COLOUR,
     RUN_COLOURS,

@@ -23,7 +23,7 @@ from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted,
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
 from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure, styled, wrap
 
-VERDICTS = {"fine": ("No warnings.", "#009E73"), "look": ("Warnings:", "#E69F00")}
+VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "look": ("Warnings:", "#E69F00")}
 """What stands above the warnings of a page, and the colour of the verdict."""
 TISSUES = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
 """Groups of labels as they are coloured, in place of an image."""
@@ -88,7 +88,7 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
     figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
-    heading, colour = VERDICTS[row["verdict"]]
+    heading, colour = VERDICT_HEADINGS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
     # a line ends between facts, not within one
     facts = [f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}") for name, value in _facts(row).items()]

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..geometry.triangles import TriangleMesh
+from ..settings.terms import REAL_BRAIN
 from .labels import week_label
 from .style import (
     FULL_WIDTH_IN,
-    REAL_BRAIN,
     REAL_COLOUR,
     SINGLE_COLUMN_IN,
     add_letters,

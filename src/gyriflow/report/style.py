@@ -33,9 +33,6 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 NEUTRAL_COLOUR = "#D9D9D9"
 """Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
-REAL_BRAIN = "real brain"
-"""What brains that were not simulated are called where their population is not known."""
-
 SETTINGS: dict[Any, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,

@@ -9,9 +9,9 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
-from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED, SIDES
+from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED, REAL_BRAIN, SIDES
 from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
-from .style import REAL_BRAIN, run_colours, runs_by_name
+from .style import run_colours, runs_by_name
 
 VERDICTS = ("fine", "look", "refused")
 _WORD, _SENTENCE = 12, 60

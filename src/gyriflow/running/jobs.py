@@ -13,7 +13,7 @@ import pandas as pd
 
 from ..io.files import AnyPath
 
-COLUMNS = ("subject", "run", "step", "level", "message")
+MESSAGE_COLUMNS = ("subject", "run", "step", "level", "message")
 NEXT = r"(?!\d{4}-\d\d-\d\d |warning: |gyriflow: )"
 """Lookahead: the line does not begin another message."""
 MESSAGE = re.compile(
@@ -140,7 +140,7 @@ def gather_messages(
         source = {"subject": "", "run": "", **match.groupdict()}
         if (source["run"], source["subject"]) in folded or (not source["run"] and source["subject"] in {"", *ids}):
             rows += [{**source, "level": level, "message": message} for level, message in read_messages(path)]
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    return pd.DataFrame(rows, columns=list(MESSAGE_COLUMNS))
 
 
 BENCHMARK_COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}

@@ -21,7 +21,7 @@ PACKAGES = (
     *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )
 """Packages whose versions are recorded because results depend on them."""
-STUDY = Path("results", "study", "study.json")
+STUDY_RECORD = Path("results", "study", "study.json")
 """Record of the study that the results belong to, in the working directory."""
 
 
@@ -47,7 +47,7 @@ def check_results_belong_to(directory: Path, files: Sequence[Path], config: Conf
     Two studies differ if they share neither configuration files nor a brain, so a configuration may be edited, copied
     or moved. With `record`, this study is recorded as the owner of the results.
     """
-    path = directory / STUDY
+    path = directory / STUDY_RECORD
     brains: list[list[Any]] = [
         [brain.id, brain.week, brain.source, *(Path(file).name for file in brain.files)] for brain in config.brains
     ]

@@ -16,7 +16,7 @@ from ..study.loading import load
 from ..units import week_tag
 from .jobs import events_in, read_log
 from .launch import hold_lock
-from .provenance import STUDY
+from .provenance import STUDY_RECORD
 
 STATE = Path(".snakemake", "gyriflow-run.json")
 """State of the live or last run, in the working directory."""
@@ -93,7 +93,7 @@ def _configured(directory: Path) -> list[tuple[str, str]]:
     path = directory / CONFIG
     # the command that runs a configuration reports what is wrong with it
     with suppress(InputError):
-        if (record := directory / STUDY).is_file():
+        if (record := directory / STUDY_RECORD).is_file():
             path = Path(read_json(record)["configuration"][-1])
         if path.is_file():
             return resolve(load(read_yaml(path), path.resolve().parent)).pairs

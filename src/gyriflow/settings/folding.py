@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
@@ -12,7 +14,6 @@ from .growth import SIZES, Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
     EndWeek,
-    Floats,
     Maps,
     Varying,
     VaryingNumber,
@@ -229,7 +230,7 @@ def target_map(week: float) -> str:
     return f"target_{week:05.2f}"
 
 
-def target_maps(weeks: Iterable[float], positions: Floats) -> dict[str, Floats]:
+def target_maps(weeks: Iterable[float], positions: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Return the (n,) maps by name of the (w, n, 3) positions that a mesh is to have at w weeks."""
     return {
         f"{target_map(week)}_{axis}": values

@@ -59,6 +59,11 @@ LONGEST_NAME = 100
 
 MEASURED = "real"
 """The run of measured brains in tables."""
+REAL_BRAIN = "real brain"
+"""What a measured brain is called in figures where its population is not named."""
+
+NO_REGION = 0
+"""The label of what is in no region."""
 
 MOST_COLOURED = 6
 """Values of a covariate that charts tell apart by colours."""

@@ -11,8 +11,7 @@ from pydantic.fields import FieldInfo
 
 from .base import InputFile, KeyProblem, Settings
 
-Floats = NDArray[np.float64]
-Maps = Mapping[str, Floats]
+Maps = Mapping[str, NDArray[np.float64]]
 """Values at the mesh's vertices by parameter name; they move with the tissue."""
 WEEKS = (15.0, 45.0)
 """First and last gestational week that gyriflow knows."""
@@ -133,7 +132,7 @@ def curve_at(value: float | Varying, week: float) -> float:
     return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
 
 
-def value_at(value: float | Varying, week: float, maps: Maps) -> float | Floats:
+def value_at(value: float | Varying, week: float, maps: Maps) -> float | NDArray[np.float64]:
     """Return a parameter's value at a week: a number, or (n,) values where there is a map."""
     name = map_of(value)
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..settings.terms import MOST_COLOURED, run_names
+from ..settings.terms import MOST_COLOURED, REAL_BRAIN, run_names
 from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
 from .records import Brain, Comparison, Measured, Simulation
 from .study import Study
@@ -12,7 +12,6 @@ from .study import Study
 OF_STUDY, OF_RUN, OF_COMPARISON = f"{STUDY}/figures", f"{RUN}/figures", f"{STUDY}/{{study}}/figures"
 AROUND = ["left", "right", "top", "bottom"]
 THREE_SIDES = ["left", "top", "bottom"]
-REAL_BRAIN = "real brain"
 ZONES = {"contact", "no_growth", "support"}
 """Settings of a run that decide its zones: runs alike in them have one figure of these."""
 FEWEST_FOR_NORMS, MOST_SERIES = 5, 4

@@ -131,11 +131,11 @@ def _lacks(table: _Table, what: str, names: Sequence[str]) -> InputError:
 
 PATHS = ("labels", "image", "pial", "white", "hemispheres.left", "hemispheres.right", "hemisphere.file")
 """The columns that are keys of brains with paths, inner keys with dots."""
-COLUMNS = (*PATHS, "population", "subject", "scheme", "affine_from", "coordinates", "hemisphere.side")
+BRAIN_KEYS = (*PATHS, "population", "subject", "scheme", "affine_from", "coordinates", "hemisphere.side")
 """All columns that are keys of brains, besides those of who it is and of the age."""
 FILES, SIDE = "files", "side"
 """Columns that stand for a source, whatever its key."""
-KNOWN = {*IDS, SESSION, *UNIT_OF_AGE, AGE, FILES, SIDE, *COLUMNS}
+KNOWN = {*IDS, SESSION, *UNIT_OF_AGE, AGE, FILES, SIDE, *BRAIN_KEYS}
 ALMOST = 0.85
 """How like a known name an unknown column has to be to be taken for a mistyped one."""
 
@@ -172,7 +172,7 @@ def participants_brains(
 
 def covariates(scan: Scan) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
-    keys = {*IDS, SESSION, FILES, SIDE, *COLUMNS, scan.age_column}
+    keys = {*IDS, SESSION, FILES, SIDE, *BRAIN_KEYS, scan.age_column}
     others = {key: value for key, value in scan.values.items() if key not in keys and value not in NOTHING}
     return {"covariates": others} if others else {}
 
@@ -187,7 +187,7 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
             return {}, f"files: found {len(files)}, {'; '.join(files)}; expected {expected}"
         values |= _of_files(files, side)
     for column in values:
-        if column not in COLUMNS:
+        if column not in BRAIN_KEYS:
             continue
         value: Any = values[column]
         if column in PATHS:

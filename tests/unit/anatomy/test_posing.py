@@ -25,9 +25,9 @@ from gyriflow.anatomy.pose import (
     pose_of_volume_by_shape,
 )
 from gyriflow.anatomy.repair import pieces
-from gyriflow.anatomy.template import MIRROR, medial_wall, shape_of
+from gyriflow.anatomy.template import medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg, motion
+from gyriflow.geometry.alignment import MIRROR, angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import SCHEMES
