@@ -3,7 +3,6 @@ import os
 from operator import attrgetter
 
 from gyriflow.errors import GyriflowError
-from gyriflow.quantities import SHAPE_MEASURES
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import asked_for, by_rule, files_in, figures_of, measured_name
