@@ -169,7 +169,7 @@ WARNED = {
     "pial_ply": "hung on a stalk",
     "wide": "the hemispheres' areas differ by 1",
     "cropped": "the cerebrum touches the border of the volume",
-    "upside_down": "the brain was turned by 180°",
+    "upside_down": "rotated by 180°",
     "hypoplasia": "the hemispheres' areas differ by",
 }
 WARNINGS = trying({"polyp": 46, "pial_ply": 46, "wide": 52, "cropped": 48, "upside_down": 49, "hypoplasia": 52})

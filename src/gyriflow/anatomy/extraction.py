@@ -1,4 +1,4 @@
-"""Masks of voxels, their topology made that of balls, what hangs on them by stalks cut off, and isosurfaces."""
+"""Masks of voxels: smoothing, topology correction, removal of parts that hang by a stalk, and isosurfaces."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -15,62 +15,63 @@ from ..errors import MeshError
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
 
 PAD_VOXELS = 6
-# σ of the Gaussian by which masks are smoothed before they become surfaces
+# σ of the Gaussian that smooths a mask before its isosurface is extracted
 SMOOTHING_VOXELS = 1.0
 LEVEL = 0.5
 # slope per voxel of a mask's edge smoothed with σ = 1 voxel: 1/√(2π)
 EDGE_SLOPE = 0.4
-# smaller groups of voxels outside a mask that smoothing closes are roughness of the labels
-LEAST_SLIT_VOXELS = 20
-# a part of this size of the largest is kept: two hemispheres that do not touch
+# smaller groups of outside voxels that smoothing closes are roughness of the labels
+MIN_SLIT_VOXELS = 20
+# a part at least this large, relative to the largest, is kept: hemispheres may not touch
 COMPARABLE = 0.2
-# voxels inside are joined through faces only, voxels outside through edges and corners as well
+# inside voxels are connected through faces only, outside voxels through edges and corners too
 INSIDE = ndimage.generate_binary_structure(3, 1)
 OUTSIDE = ndimage.generate_binary_structure(3, 3)
-# the 27 places around and in a voxel, and as bits of a number those that share a corner, an edge or a face with it
+# the 27 cells of a 3 × 3 × 3 block, and bit masks of those that share a corner, an edge or a face with the middle one
 CELLS = np.array(list(np.ndindex(3, 3, 3)))
-AROUND, BESIDE, FACING = (
-    sum(1 << place for place, cell in enumerate(CELLS) if 0 < np.abs(cell - 1).sum() <= most) for most in (3, 2, 1)
+CORNER_CELLS, EDGE_CELLS, FACE_CELLS = (
+    sum(1 << place for place, cell in enumerate(CELLS) if 0 < np.abs(cell - 1).sum() <= limit) for limit in (3, 2, 1)
 )
 BY_CORNERS, BY_FACES = (
-    [sum(1 << place for place, cell in enumerate(CELLS) if 0 < distance(cell - one) <= 1) for one in CELLS]
-    for distance in (lambda way: np.abs(way).max(), lambda way: np.abs(way).sum())
+    [sum(1 << place for place, cell in enumerate(CELLS) if 0 < distance(cell - middle) <= 1) for middle in CELLS]
+    for distance in (lambda offset: np.abs(offset).max(), lambda offset: np.abs(offset).sum())
 )
-# radii in voxels of the openings and closings that find what joins or pierces the mask
-REACHES = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
-# how far around a change its effect on parts is looked for, in voxels: at last in the whole volume
+# radii in voxels of the openings and closings that find bridges and tunnels
+RADII = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
+# margins in voxels in which the effect of a change on connectivity is examined; the last is the whole volume
 MARGINS = (4, 16, 64, 100_000)
-# distance from the level of one half at which changed voxels are put
-STEP = 0.2
+# changed voxels get the level plus or minus this value
+CHANGED_STEP = 0.2
 # stalks are thinner than twice this
 NECK_RADIUS_MM = 1.6
-# the stalk's cross-section, and the part that hangs on it: larger ones are no polyps but parts of a brain
-MOST_NECK_MM2 = 12.0
-MOST_SHARE = 0.05
-LEAST_MM3 = 15.0
-# how far from the hanging part its stalk is cut away with it
-REACH_MM = 4.0
+# limits of the stalk's cross-section and of the size of the hanging part: larger ones belong to the brain
+MAX_NECK_MM2 = 12.0
+MAX_HANGING_SHARE = 0.05
+MIN_HANGING_MM3 = 15.0
+# length of stalk that is removed with the hanging part
+STALK_MM = 4.0
 
 
 def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
-    """Return the slices that cut an (i, j, k) volume to the mask's contents, and the (3,) first index of the cut
-    volume once it has been padded with `PAD_VOXELS`.
+    """Return the bounding box of an (i, j, k) mask as slices, and the (3,) index of its first voxel after padding.
+
+    The padding is `PAD_VOXELS` wide.
     """
     box = ndimage.find_objects(mask.astype(np.uint8))[0]
     return box, np.array([side.start for side in box]) - PAD_VOXELS
 
 
 def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
-    """Return the affine of a volume that was cut (or padded) so that it begins at voxel `first`."""
+    """Return the affine of a volume that was cropped or padded to begin at voxel `first`."""
     moved = np.array(affine, dtype=float)
     moved[:3, 3] += moved[:3, :3] @ first
     return moved
 
 
 def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
-    """Yield each part of an (i, j, k) mask: its box, one voxel wider than the part, and the part's mask in it.
+    """Yield each connected part of an (i, j, k) mask: its bounding box plus one voxel, and its mask in that box.
 
-    Voxels at edges and corners of each other are of one part.
+    Voxels are connected through faces, edges and corners.
     """
     number, _ = ndimage.label(mask, OUTSIDE)
     for index, tight in enumerate(ndimage.find_objects(number), start=1):
@@ -83,31 +84,31 @@ def _wider(box: tuple[slice, ...], margin: int) -> tuple[slice, ...]:
 
 
 def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArray[np.float32]:
-    """Return the mask as a field from 0 to 1, smoothed by a Gaussian of the given σ in voxels."""
+    """Return the mask smoothed by a Gaussian of the given σ in voxels, as a field from 0 to 1."""
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def remove_bridges(mask: Mask, field: NDArray[np.float32], left_shut: Mask) -> tuple[NDArray[np.float32], int]:
-    """Return a smoothed mask in which slits that smoothing has closed are open again, and their number of voxels.
+def remove_bridges(mask: Mask, field: NDArray[np.float32], stays_fused: Mask) -> tuple[NDArray[np.float32], int]:
+    """Reopen slits of a mask that smoothing has closed; return the smoothed field and the number of voxels reopened.
 
-    A slit is a group of voxels outside the mask, open to the outside: a sulcus, the fissure or the Sylvian opening,
-    one voxel wide. Its voxels take the value with which the surface passes where the slit's walls are. Groups of a few
-    voxels are roughness of the labels, which smoothing is for; a slit that would pierce the mask stays shut, and so
-    does what is in the mask `left_shut`.
+    A slit is a group of voxels outside the mask and connected to the outside: a sulcus, the fissure or the Sylvian
+    opening, one voxel wide. Its voxels get the value that places the surface at the slit's walls. Groups of a few
+    voxels are roughness of the labels and stay closed. So do slits that would pierce the mask, and voxels of the mask
+    `stays_fused`.
     """
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
-    closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~left_shut
+    closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~stays_fused
     number, gains = _parts_with_gains(field > LEVEL, closed)
-    opened = (np.bincount(number[closed], minlength=len(gains)) >= LEAST_SLIT_VOXELS) & (gains == 0)
+    opened = (np.bincount(number[closed], minlength=len(gains)) >= MIN_SLIT_VOXELS) & (gains == 0)
     slits = closed & opened[number]
-    # half-way between a slit's voxel and the next, whose value is that beside a slit one voxel wide, lies the wall
-    beside = 1.0 - (ndtr(1.5 / SMOOTHING_VOXELS) - ndtr(0.5 / SMOOTHING_VOXELS))
-    return np.where(slits, np.float32(1.0 - beside), field), int(slits.sum())
+    # the wall lies half-way between a voxel of the slit and the next one, which has this value at a slit 1 voxel wide
+    wall_value = 1.0 - (ndtr(1.5 / SMOOTHING_VOXELS) - ndtr(0.5 / SMOOTHING_VOXELS))
+    return np.where(slits, np.float32(1.0 - wall_value), field), int(slits.sum())
 
 
 def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats]:
-    """Return an (i, j, k) field on voxels `factor` times smaller, linear in between, and their affine."""
+    """Interpolate an (i, j, k) field linearly to voxels `factor` times smaller; return it and its affine."""
     fine = np.array(affine, dtype=float)
     fine[:3, :3] /= factor
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
@@ -116,42 +117,42 @@ def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
-    """Return the mask's largest part and those of comparable size, filled, without the other parts.
+    """Return the mask's largest part and those of comparable size, with cavities filled.
 
-    The second and third value are the number of parts dropped and the number of voxels in them.
+    The second and third value are the number of parts dropped and of their voxels.
     """
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
-    kept = (sizes >= comparable * sizes.max()) & (sizes > 0)
-    dropped = ~kept & (sizes > 0)
-    return ndimage.binary_fill_holes(kept[number]), int(dropped.sum()), int(sizes[dropped].sum())
+    is_main = (sizes >= comparable * sizes.max()) & (sizes > 0)
+    dropped = ~is_main & (sizes > 0)
+    return ndimage.binary_fill_holes(is_main[number]), int(dropped.sum()), int(sizes[dropped].sum())
 
 
 def make_simple(
     field: NDArray[np.float32], comparable: float = COMPARABLE
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Return the field with a level set of main parts only, without cavities and handles, and a report.
+    """Return the field with a level set that has only main parts, no cavities and no handles; and a report.
 
-    Main parts are those of `comparable` times the largest one's size and more.
+    Main parts have at least `comparable` times the size of the largest.
     """
     inside = field > LEVEL
     if not inside.any():
-        raise MeshError("nothing is left of the mask after smoothing")
-    kept, parts, voxels = main_parts(inside, comparable)
-    field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
+        raise MeshError("the mask is empty after smoothing")
+    main, parts, voxels = main_parts(inside, comparable)
+    field = np.where(main, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3)).astype(np.float32)
     field, handles_repaired = without_handles(field)
-    dropped = {"parts_dropped": parts, "voxels_dropped": voxels, "voxels_filled": int((kept & ~inside).sum())}
+    dropped = {"parts_dropped": parts, "voxels_dropped": voxels, "voxels_filled": int((main & ~inside).sum())}
     return unambiguous(field), dropped | handles_repaired
 
 
 def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
-    """Return the outward surface in mm where an (i, j, k) field falls below one half.
+    """Return the surface in mm, oriented outward, on which an (i, j, k) field is one half.
 
-    MeshError where it encloses no volume.
+    MeshError if it encloses no volume.
     """
     vertices, faces, _, _ = marching_cubes(field, LEVEL, gradient_direction="ascent")
-    # an affine that mirrors (LAS, LPI, …) turns the faces inside out: transformed() turns them back
+    # transformed() flips the faces if the affine mirrors (LAS, LPI, …)
     mesh = transformed(TriangleMesh(vertices, faces), affine)
     if signed_volume(mesh) <= 0:
         raise MeshError("the surface of the mask encloses no volume", found=f"{signed_volume(mesh):.3g} mm³")
@@ -165,52 +166,52 @@ def handles(mask: Mask) -> int:
 
 
 def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
-    """Return the (i, j, k) field with the handles of its level set above one half cut or filled, and the counts.
+    """Cut or fill the handles of the level set at one half of an (i, j, k) field; return the field and the counts.
 
-    Patches that an opening takes away or a closing adds are tried from the smallest to the largest. One that removes
-    a handle is kept, less all voxels that can be given back without a change of topology (simple points, Bertrand and
-    Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
+    Patches that an opening removes or a closing adds are tried from the smallest to the largest. A patch that removes
+    a handle is applied, except for the voxels that can be restored without a change of topology (simple points,
+    Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
     """
     original = field > 0.5
     mask = original.copy()
-    left = handles(mask)
+    remaining = handles(mask)
     counts = {False: 0, True: 0}
-    # at last a cut may leave voxels that reach the outside through edges and corners only
-    for closed_by, reach in product((INSIDE, OUTSIDE), REACHES):
-        if left == 0:
+    # in the second round a cut may leave cavities connected to the outside through edges and corners only
+    for closed_by, radius in product((INSIDE, OUTSIDE), RADII):
+        if remaining == 0:
             break
-        for fills, box, patch in _patches(mask, reach):
+        for fills, box, patch in _patches(mask, radius):
             # an earlier change may have touched this patch
             patch = patch & (mask[box] != fills)
             changed = np.where(patch, fills, mask[box])
-            if left == 0 or not patch.any() or _euler_gain(mask[box], changed) <= 0:
+            if remaining == 0 or not patch.any() or _euler_gain(mask[box], changed) <= 0:
                 continue
-            if removed := _change(mask, box, _least_change(mask[box], changed, field[box]), closed_by):
-                left -= removed
+            if removed := _change(mask, box, _minimal_change(mask[box], changed, field[box]), closed_by):
+                remaining -= removed
                 counts[fills] += 1
     added, cut = mask & ~original, original & ~mask
-    changed = np.where(added, 0.5 + STEP, np.where(cut, 0.5 - STEP, field)).astype(field.dtype)
+    changed = np.where(added, 0.5 + CHANGED_STEP, np.where(cut, 0.5 - CHANGED_STEP, field)).astype(field.dtype)
     return changed, {
         "bridges_cut": counts[False],
         "voxels_cut_from_bridges": int(cut.sum()),
         "tunnels_filled": counts[True],
         "voxels_filled_in_tunnels": int(added.sum()),
-        "handles_left": left,
+        "handles_left": remaining,
     }
 
 
 def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the field with diagonal neighbours set apart, so that its isosurface joins voxels by faces only.
+    """Adjust a field so that its isosurface connects inside voxels through faces only.
 
-    Where inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the
-    other six, marching cubes decides by the values what is joined; these values are moved so that it never is the
-    inside.
+    If inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the other
+    six, marching cubes decides from the values which ones to connect. The values are changed so that it never
+    connects the inside.
     """
     mask = field > 0.5
-    doubtful = np.zeros_like(mask)
+    ambiguous = np.zeros_like(mask)
     for first, second in ((0, 1), (0, 2), (1, 2)):
         inside = np.moveaxis(mask, (first, second), (0, 1))
-        flags = np.moveaxis(doubtful, (first, second), (0, 1))
+        flags = np.moveaxis(ambiguous, (first, second), (0, 1))
         a, b, c, d = inside[:-1, :-1], inside[1:, :-1], inside[1:, 1:], inside[:-1, 1:]
         alternating = (a == c) & (b == d) & (a != b)
         for view in (flags[:-1, :-1], flags[1:, :-1], flags[1:, 1:], flags[:-1, 1:]):
@@ -222,15 +223,15 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
             low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
             opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
             for corner in np.ndindex(2, 2, 2):
-                doubtful[tuple(ends[side] for side in corner)] |= opposite
-    apart = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
-    return np.where(doubtful, apart, field).astype(np.float32)
+                ambiguous[tuple(ends[side] for side in corner)] |= opposite
+    separated = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
+    return np.where(ambiguous, separated, field).astype(np.float32)
 
 
 def dilated(mask: Mask, radius: float) -> Mask:
-    """Return the voxels of an (i, j, k) volume within a radius, in voxels and at most 10, of those of the mask.
+    """Dilate an (i, j, k) mask by a ball of a radius in voxels, at most 10.
 
-    Squared distances are summed axis by axis, in bytes: a distance transform takes ten times the time and memory.
+    Squared distances are summed axis by axis, in bytes. A distance transform takes ten times the time and memory.
     """
     squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
     for axis in range(3):
@@ -243,9 +244,9 @@ def dilated(mask: Mask, radius: float) -> Mask:
     return squared <= radius**2
 
 
-def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
-    closed = ~dilated(~dilated(mask, reach), reach)
-    opened = dilated(~dilated(~mask, reach), reach)
+def _patches(mask: Mask, radius: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
+    closed = ~dilated(~dilated(mask, radius), radius)
+    opened = dilated(~dilated(~mask, radius), radius)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
         number, gains = _parts_with_gains(mask, change)
@@ -254,10 +255,10 @@ def _patches(mask: Mask, reach: float) -> list[tuple[bool, tuple[slice, ...], Ma
 
 
 def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) -> int:
-    """Change a mask in a box where this removes handles and leaves its parts as they are; return how many it removes.
+    """Change a mask in a box if this removes handles and preserves its parts; return the number of handles removed.
 
-    What it joins or parts may be joined elsewhere as well, which is looked for in ever wider boxes. Cavities, out of
-    which no neighbours of `closed_by` lead, are filled.
+    Voxels that the change connects or separates may be connected outside the box, so ever wider boxes are examined.
+    Cavities are filled; the connectivity `closed_by` defines them.
     """
     for margin in MARGINS:
         wide = _wider(box, margin)
@@ -266,8 +267,8 @@ def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) 
         after[inner] = changed
         after = ndimage.binary_fill_holes(after, closed_by)
         gain = _euler_gain(before, after)
-        # the frame joins all that reaches the box's border
-        framed = [ndimage.label(np.pad(one, 1, constant_values=True), INSIDE)[1] for one in (before, after)]
+        # the frame connects everything that reaches the border of the box
+        framed = [ndimage.label(np.pad(state, 1, constant_values=True), INSIDE)[1] for state in (before, after)]
         if gain <= 0 or framed[0] < framed[1]:
             return 0
         if _pieces(before) == _pieces(after):
@@ -281,9 +282,9 @@ def _pieces(mask: Mask) -> tuple[int, int]:
 
 
 def _euler_cells(mask: Mask) -> NDArray[np.int8]:
-    """Return what each (i, j, k) voxel adds to the Euler number, with the seven next ones along the axes.
+    """Return the contribution of each 2 × 2 × 2 block to the Euler number, at the block's first voxel.
 
-    Voxels that are joined by faces have that of a complex of points, edges, squares and cubes.
+    Voxels connected through faces have the Euler number of a complex of points, edges, squares and cubes.
     """
     x, y, z = (_pairs(mask, axis) for axis in range(3))
     xy, xz, yz = _pairs(x, 1), _pairs(x, 2), _pairs(y, 2)
@@ -305,9 +306,9 @@ def _euler_gain(before: Mask, after: Mask) -> int:
 
 
 def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Return the numbers of the parts of a `change` of the mask, and by number the Euler number that each one adds.
+    """Label the parts of a `change` of the mask; return the labels, and by label the change of the Euler number.
 
-    The parts touch neither at edges nor at corners, so that one cell of eight voxels sees one of them only.
+    Parts touch neither at edges nor at corners, so each block of eight voxels contains only one of them.
     """
     number, count = ndimage.label(change, OUTSIDE)
     gain = _euler_cells(mask ^ change) - _euler_cells(mask)
@@ -319,41 +320,42 @@ def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDAr
     return number, gains.astype(np.int64)
 
 
-def _least_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with every voxel set back to `before` that does not change the topology.
+def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
+    """Return `after` with every voxel restored to `before` whose change does not affect the topology.
 
-    The clearest voxels go back first, so that what stays changed lies where the field is closest to one half.
+    Voxels far from one half are restored first, so the remaining changes lie where the field is closest to one half.
     """
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
     places = places[np.argsort(-np.abs(field[tuple(places.T)] - 0.5), kind="stable")] + 1
-    given_back = True
-    while given_back and len(places):
+    is_progressing = True
+    while is_progressing and len(places):
         waiting = []
         for i, j, k in places:
             if is_simple(mask[i - 1 : i + 2, j - 1 : j + 2, k - 1 : k + 2].tobytes()):
                 mask[i, j, k] = ~mask[i, j, k]
             else:
                 waiting.append((i, j, k))
-        given_back = len(waiting) < len(places)
+        is_progressing = len(waiting) < len(places)
         places = np.array(waiting)
     return mask[1:-1, 1:-1, 1:-1]
 
 
 @lru_cache(maxsize=2**16)
-def is_simple(around: bytes) -> bool:
-    """Return whether the middle one of 3 × 3 × 3 voxels can change sides without a change of topology."""
-    voxels = sum(1 << place for place, value in enumerate(around) if value)
-    inside, outside = voxels & BESIDE, ~voxels & AROUND
-    facing = inside & FACING
-    if not facing or not outside:
+def is_simple(block: bytes) -> bool:
+    """Return whether the middle voxel of a 3 × 3 × 3 block can be flipped without a change of topology."""
+    voxels = sum(1 << place for place, value in enumerate(block) if value)
+    inside, outside = voxels & EDGE_CELLS, ~voxels & CORNER_CELLS
+    touching = inside & FACE_CELLS
+    if not touching or not outside:
         return False
-    return not facing & ~_joined(inside, facing, BY_FACES) and not outside & ~_joined(outside, outside, BY_CORNERS)
+    is_inside_connected = not touching & ~_connected(inside, touching, BY_FACES)
+    return is_inside_connected and not outside & ~_connected(outside, outside, BY_CORNERS)
 
 
-def _joined(places: int, beginning: int, neighbours: list[int]) -> int:
-    """Return those of the places, bits of a number, that neighbours join to the lowest bit of the beginning."""
-    reached = new = beginning & -beginning
+def _connected(places: int, seeds: int, neighbours: list[int]) -> int:
+    """Return the places (bits of an integer) that are connected to the lowest bit of `seeds`."""
+    reached = new = seeds & -seeds
     while new:
         lowest = new & -new
         found = neighbours[lowest.bit_length() - 1] & places & ~reached
@@ -363,10 +365,10 @@ def _joined(places: int, beginning: int, neighbours: list[int]) -> int:
 
 
 def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
-    """Return the (i, j, k) mask without what hangs on it by stalks, and each part's volume, stalk and place in mm.
+    """Remove the parts of an (i, j, k) mask that hang by a stalk; return the mask and each part's volume and place.
 
-    A part hangs where a ball of 3.2 mm across cannot pass from the rest to it, and no more than 12 mm² join it to the
-    rest: a gyrus, which may be as thin, is joined along its length.
+    A part hangs by a stalk if a ball of 3.2 mm diameter cannot pass from the rest into it and the cross-section that
+    connects it is at most 12 mm². A gyrus may be as thin, but is connected along its length.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     depth = ndimage.distance_transform_edt(mask, sampling=size)
@@ -374,11 +376,11 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     if count < 2:
         return mask, []
     sizes = np.bincount(number.ravel())[1:]
-    large = sizes >= MOST_SHARE * sizes.sum()
+    large = sizes >= MAX_HANGING_SHARE * sizes.sum()
     main = np.isin(number, np.flatnonzero(large) + 1)
     solid = mask & (ndimage.distance_transform_edt(~main, sampling=size) <= NECK_RADIUS_MM)
-    most = MOST_SHARE * mask.sum()
-    hanging, reach = np.zeros_like(mask), NECK_RADIUS_MM + REACH_MM
+    max_voxels = MAX_HANGING_SHARE * mask.sum()
+    hanging, reach = np.zeros_like(mask), NECK_RADIUS_MM + STALK_MM
     for part, tight in enumerate(ndimage.find_objects(number)):
         if large[part]:
             continue
@@ -387,25 +389,25 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
         near = ndimage.distance_transform_edt(~ball, sampling=size) <= reach
         loose, _ = ndimage.label(mask[box] & ~solid[box] & near, INSIDE)
         cut = np.isin(loose, np.setdiff1d(loose[ball], 0))
-        large_enough = cut.sum() * size.prod() >= LEAST_MM3 and cut.sum() < most
-        if large_enough and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MOST_NECK_MM2:
+        large_enough = cut.sum() * size.prod() >= MIN_HANGING_MM3 and cut.sum() < max_voxels
+        if large_enough and 0 < _contact_mm2(cut, mask[box] & ~cut, size) <= MAX_NECK_MM2:
             hanging[box] |= cut
     number, count = ndimage.label(hanging, INSIDE)
-    left = mask & ~hanging
-    return left, [
+    remaining = mask & ~hanging
+    return remaining, [
         {
             "volume_mm3": float(part.sum() * size.prod()),
-            "stalk_mm2": _contact_mm2(part, left, size),
+            "stalk_mm2": _contact_mm2(part, remaining, size),
             "place_mm": (affine[:3, :3] @ np.argwhere(part).mean(axis=0) + affine[:3, 3]).round(1).tolist(),
         }
         for part in (number == n for n in range(1, count + 1))
     ]
 
 
-def _contact_mm2(one: Mask, other: Mask, size_mm: Floats) -> float:
+def _contact_mm2(first: Mask, second: Mask, size_mm: Floats) -> float:
     total = 0.0
     for axis in range(3):
-        a, b = np.moveaxis(one, axis, 0), np.moveaxis(other, axis, 0)
+        a, b = np.moveaxis(first, axis, 0), np.moveaxis(second, axis, 0)
         faces = (a[:-1] & b[1:]).sum() + (b[:-1] & a[1:]).sum()
         total += float(faces * np.prod(np.delete(size_mm, axis)))
     return total

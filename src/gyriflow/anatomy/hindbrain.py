@@ -1,4 +1,4 @@
-"""The pose of a label volume, judged by its cerebellum, its brainstem and its labelled sides."""
+"""Pose of a label volume, estimated from its cerebellum, brainstem and labelled sides."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,28 +12,30 @@ from ..settings.schemes import LabelScheme
 
 # from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
 EXPECTED = {"cerebellum": np.array([0.0, -0.58, -0.81]), "brainstem": np.array([0.0, -0.30, -0.95])}
-# how far they are at least, in cube roots of its volume: 0.37 and more in weeks 21 to 36
-LEAST_OUTSIDE = 0.25
-# left and right of the labels weigh as much as the hindbrain does
+# minimum of these distances, in cube roots of the cerebrum's volume; 0.37 or more in weeks 21 to 36
+MIN_HINDBRAIN_DISTANCE = 0.25
+# labelled sides weigh as much as the hindbrain
 TO_RIGHT = np.array([1.0, 0.0, 0.0])
-# brains turned by less stand as their files say: this is how far atlases and scans differ
-LEAST_TURN_DEG = 60.0
-# brains turned by more, up to that, are kept with a warning: atlases and scans rarely differ as much
+# smaller rotations are left as in the file: atlases and scans differ by as much
+MIN_TURN_DEG = 60.0
+# rotations between this and MIN_TURN_DEG are left with a warning
 DOUBTFUL_TURN_DEG = 15.0
 PITCH_KEPT = "its mid-plane is set upright, its pitch is kept; check the file's axes"
-# warned of volumes without labelled sides, which tell a turned brain from a mirrored one
-OR_MIRRORED = "if its array has an axis reversed or two exchanged instead, left and right are exchanged now: check them"
-# two directions nearer to each other than this (in radians) say nothing of the turn about them
-LEAST_SPREAD = 0.06
-# a brain that is turned is turned by quarters, as wrong axis codes do, where these are as near as this
+# without labelled sides a rotated brain cannot be distinguished from a mirrored one
+MIRROR_WARNING = (
+    "if an axis of its array is reversed instead, or two are exchanged, left and right are wrong now: check them"
+)
+# two directions closer than this (radians) do not determine the rotation about them
+MIN_SPREAD = 0.06
+# a rotation this close to quarter turns is taken for quarter turns, as caused by wrong axis codes
 QUARTERS_DEG = 15.0
 
 
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
-    """Return the pose from cerebellum, brainstem and labelled sides; None where too few of them are labelled.
+    """Estimate the pose from cerebellum, brainstem and labelled sides; return None if too few of them are labelled.
 
-    It is the file's where the two differ by less than 60°, with a warning from 15° on. InputError where the labels of
-    left and right are mirrored: no rotation brings them to their sides.
+    The file's pose is kept if it differs by less than 60°, with a warning from 15° on. InputError if the labels of
+    left and right are mirrored, so that no rotation can correct them.
     """
     centres = {
         name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
@@ -48,63 +50,62 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
     }
     hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
     size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
-    for name, way in hindbrain.items():
-        if (share := np.linalg.norm(way) / size) < LEAST_OUTSIDE:
+    for name, offset in hindbrain.items():
+        if (share := np.linalg.norm(offset) / size) < MIN_HINDBRAIN_DISTANCE:
             raise InputError(
-                f"what the scheme {scheme.name!r} calls the {name} lies inside what it calls the cerebrum",
-                found=f"its centre {share:.2f} of the cerebrum's size (the cube root of its volume) from the middle",
-                expected=f"{LEAST_OUTSIDE} or more",
+                f"with the scheme {scheme.name!r} the {name} lies inside the cerebrum",
+                found=f"centres {share:.2f} times the cerebrum's size (cube root of its volume) apart",
+                expected=f"{MIN_HINDBRAIN_DISTANCE} or more",
             )
     sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
-    rotation = _turn_of_hindbrain(hindbrain)
+    rotation = _rotation_from_hindbrain(hindbrain)
     if sides is not None and hindbrain:
-        rotation = _turn_of_sides(hindbrain, sides, rotation)
+        rotation = _rotation_from_sides(hindbrain, sides, rotation)
     if rotation is None:
         return None
     by = " and ".join([*hindbrain, *(["the labelled sides"] if sides is not None else [])])
-    return judged_turn(rotation, by, sides is not None)
+    return pose_from_rotation(rotation, by, sides is not None)
 
 
-def judged_turn(rotation: Floats, witness: str, sided: bool) -> Pose:
-    """Return the pose of a volume that seems to need a (3, 3) rotation about its origin to lie in RAS+.
+def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
+    """Return the pose of a volume that an estimated (3, 3) rotation about its origin would bring to RAS+.
 
-    Turns of 60° and more are made, by quarters where these are near; smaller ones are only warned of from 15° on.
-    `witness` says so in warnings and in the pose; `sided` is whether labels say which side is which.
+    Rotations of 60° and more are applied, as quarter turns if these are close. Smaller ones only give a warning, from
+    15° on. `evidence` names what the estimate rests on; `has_sides` is whether left and right are labelled.
     """
     quarters = _nearest_quarters(rotation)
     if angle_deg(rotation @ quarters.T) < QUARTERS_DEG:
         rotation = quarters
     angle = angle_deg(rotation)
-    say = "says" if witness.startswith("the shape") else "say"
-    if angle >= LEAST_TURN_DEG:
-        what = witness.replace("the shape", "its shape")
-        warning = f"the brain was turned by {angle:.0f}°, as {what} {say}: its affine has other axes"
-        return turned(rotation, witness.removeprefix("the "), "ras", warning if sided else f"{warning}; {OR_MIRRORED}")
-    doubt = f"{witness} {say} that the brain is turned by about {angle:.0f}°: {PITCH_KEPT}"
+    if angle >= MIN_TURN_DEG:
+        warning = f"the brain was rotated by {angle:.0f}° according to {evidence}: its affine has other axes"
+        warning = warning if has_sides else f"{warning}; {MIRROR_WARNING}"
+        return turned(rotation, evidence.removeprefix("the "), "ras", warning)
+    doubt = f"according to {evidence} the brain is rotated by about {angle:.0f}°: {PITCH_KEPT}"
     return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
 
 
-def _turn_of_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
+def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
     if len(hindbrain) < 2:
         return None
     theirs, ours = (
         (np.cross(*pair), unit(pair[0] + pair[1]))
         for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
     )
-    # the brainstem is in front of the cerebellum, so that the cross product points to the right; where both lie in
-    # one direction, they say nothing of the turn about it
-    if np.linalg.norm(theirs[0]) < LEAST_SPREAD:
+    # the brainstem is in front of the cerebellum, so the cross product points to the right. If both lie in the same
+    # direction, the rotation about it is unknown
+    if np.linalg.norm(theirs[0]) < MIN_SPREAD:
         return None
-    return _turn_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
+    return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
 
 
-def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
-    """Return the rotation (3, 3) to RAS+ that labelled sides and the hindbrain show together.
+def _rotation_from_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
+    """Estimate the (3, 3) rotation to RAS+ from labelled sides and the hindbrain together.
 
-    InputError where they fit mirrored only: against the `rotation` that the hindbrain shows, or by themselves.
+    InputError if the sides are mirrored, according to the `rotation` from the hindbrain or to the fit itself.
     """
-    below = [(unit(way), EXPECTED[name]) for name, way in hindbrain.items()]
-    turn, mirrored = (_turn_onto([(one, TO_RIGHT), *below]) for one in (sides, -sides))
+    below = [(unit(offset), EXPECTED[name]) for name, offset in hindbrain.items()]
+    turn, mirrored = (_rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides))
     if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
         raise InputError(
             "labels of the left hemisphere lie on the right",
@@ -115,22 +116,22 @@ def _turn_of_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats
     return turn
 
 
-def _turn_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
+def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
     ours, theirs = zip(*pairs, strict=True)
     return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
 
 
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
-    """Return whether exchanged sides explain a volume better than a turn does.
+    """Return whether exchanged sides explain a volume better than a rotation.
 
-    Sides and one more direction fit some rotation, `turn`, even where they are mirrored: a half turn about an oblique
-    axis. With the sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes
-    turn by quarters instead, most often from LPS; else sides of a brain that is upright are taken to be exchanged.
+    Mirrored sides with one more direction still fit a rotation `turn`: a half turn about an oblique axis. With the
+    sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes instead give
+    quarter turns, most often from LPS. Otherwise the sides of an upright brain are taken to be exchanged.
     """
-    if angle_deg(turn) < LEAST_TURN_DEG:
+    if angle_deg(turn) < MIN_TURN_DEG:
         return False
     off_lps, off_quarters = (angle_deg(turn @ axes.T) for axes in (CONVENTIONS["lps"][:3, :3], _nearest_quarters(turn)))
-    return angle_deg(mirrored) < min(LEAST_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters))
+    return angle_deg(mirrored) < min(MIN_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters))
 
 
 def _nearest_quarters(rotation: Floats) -> Floats:

@@ -36,15 +36,15 @@ from .fissure import (
     cut_sides,
     fissure_between,
     fissure_between_labels,
-    least_gap,
     left_faces,
     mid_plane,
     open_fissure,
     plane_between_labels,
     sample,
-    set_apart,
+    separate,
+    signed_side_distance,
+    smallest_gap,
     split,
-    to_the_right,
     upright,
 )
 from .hindbrain import pose_of_labels
@@ -149,7 +149,7 @@ def from_labels(
         shut, taken_ml = (field, affine), 0.0
         if open_sulci:
             field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme)
-            warnings += logged(_left_shut(report))
+            warnings += logged(_fused_sulci_warning(report))
         taken = taken_ml / ML_PER_MM3
         even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, shut=shut)
         require_one(even.mesh)
@@ -169,18 +169,18 @@ def from_labels(
     if not scheme.cortex and hidden.sum() * SPACING_MM**2 > SHUT_FISSURE * cerebrum.volume_mm3 ** (2 / 3):
         warnings += logged([SHUT])
     # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
-    left_shut = np.zeros_like(mask)
+    stays_fused = np.zeros_like(mask)
     if scheme.cortex:
         voxels, points, _ = fissure.near(mask.shape, affine, FISSURE_REACH_MM)
-        left_shut[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
-    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, left_shut)
+        stays_fused[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
+    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, stays_fused)
     shut = field, grid
     if scheme.cortex:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
         field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, fissure)
-        warnings += logged(_left_shut(report))
+        warnings += logged(_fused_sulci_warning(report))
         opened_ml += taken_ml
     even = surface_of_mask(
         field,
@@ -204,7 +204,7 @@ def _with_sulci(
 ) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any]]:
     """Return the field with shut sulci opened, its affine, the volume (mL) that this took, and a report."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        return field, affine, 0.0, {"left_shut": "the labels have no white matter"}
+        return field, affine, 0.0, {"stays_fused": "the labels have no white matter"}
     # handles are cheaper to find before voxels are made finer
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
@@ -216,8 +216,8 @@ def _with_sulci(
     return opened, fine, report["opened_mL"] - gained_ml, {**report, "repaired_before": repaired}
 
 
-def _left_shut(report: Mapping[str, Any]) -> list[str]:
-    why = report["sulci"].get("left_shut")
+def _fused_sulci_warning(report: Mapping[str, Any]) -> list[str]:
+    why = report["sulci"].get("stays_fused")
     return [f"sulci that the labels keep shut were not opened: {why}"] if why else []
 
 
@@ -232,7 +232,7 @@ def _fissure_of_labels(
     tissue: Labels, mask: Mask, walls: TriangleMesh, scheme: LabelScheme, affine: Floats
 ) -> tuple[Fissure, Floats | None, list[str]]:
     plane, doubts = mid_plane(walls), []
-    to_right = to_the_right(tissue, scheme, affine) if scheme.left and scheme.right else None
+    to_right = signed_side_distance(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None:
         left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
         apart = affine[:3, :3] @ (right - left)
@@ -288,8 +288,8 @@ def from_hemispheres(
     left, right = (side.mesh for side in even)
     plane = mid_plane(merged(left, right), named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
-    gap, to_right = least_gap(left, right), plane.normal
-    left, right, moved = set_apart(left, right, GAP_MM, to_right)
+    gap, to_right = smallest_gap(left, right), plane.normal
+    left, right, moved = separate(left, right, GAP_MM, to_right)
     if moved > 0:
         warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {GAP_MM:g} mm"])
         plane = mid_plane(merged(left, right), named=named)

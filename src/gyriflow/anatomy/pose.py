@@ -14,7 +14,7 @@ from ..geometry.alignment import MIRROR, Fit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
-from .hindbrain import LEAST_TURN_DEG, judged_turn
+from .hindbrain import MIN_TURN_DEG, pose_from_rotation
 from .template import (
     DEEPEST,
     Shape,
@@ -216,7 +216,7 @@ def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: 
         swapped = f"are left and right swapped, and the coordinates not {named}? Check both, or set coordinates: auto"
         return [f"the shapes fit the other sides better: {swapped}"]
     turns = [angle_deg(one.rotation) for one in shapes]
-    if all(one.is_clear for one in shapes) and min(turns) > LEAST_TURN_DEG:
+    if all(one.is_clear for one in shapes) and min(turns) > MIN_TURN_DEG:
         return [_against(coordinates, "hemispheres are", float(np.mean(turns)))]
     return []
 
@@ -244,7 +244,7 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
         pose = pose_of_surface(mesh, "auto")
     except InputError:
         return unchecked
-    return unchecked if pose.by == "default" else judged_turn(pose.of_file()[:3, :3], "the shape", sided)
+    return unchecked if pose.by == "default" else pose_from_rotation(pose.of_file()[:3, :3], "the shape", sided)
 
 
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
@@ -277,7 +277,7 @@ def _judged(
     """Return the pose that is named, or else what a brain's or a hemisphere's `rotation` to RAS+ (3, 3) says of it."""
     angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
     if coordinates != "auto":
-        doubtful = one.is_clear and angles[coordinates] > LEAST_TURN_DEG
+        doubtful = one.is_clear and angles[coordinates] > MIN_TURN_DEG
         doubts = [_against(coordinates, f"{what} is", angles[coordinates])] if doubtful else []
         return turned(CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts)
     if not one.is_clear:

@@ -47,7 +47,7 @@ def open_shut_sulci(
     simple points, so that they add neither handles nor cavities, and stop where one bank's white matter begins to be
     the other's. The `fissure` parts the hemispheres: what lies between these is no sulcus. The field is returned as it
     was where no sulcus is shut, where much cortex lies far from all white matter, and where cortex is thinner than 1.5
-    voxels; for the latter two the report says why as "left_shut".
+    voxels; for the latter two the report says why as "stays_fused".
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / FINE_MM))
     every = field.shape[0] // core.shape[0]
@@ -65,10 +65,10 @@ def open_shut_sulci(
     low, thickness = map(float, np.quantile(away[beside[cortex]], [0.25, 0.5]))
     if (far := float((away > FAR * low).mean())) > MOST_FAR:
         why = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
-        return field, affine, {"left_shut": why}
+        return field, affine, {"stays_fused": why}
     if (voxels := thickness / (factor * every * size.max())) < LEAST_VOXELS:
         why = f"the cortex is {voxels:.1f} voxels thick, so that roughness of the labels looks like two banks"
-        return field, affine, {"left_shut": why}
+        return field, affine, {"stays_fused": why}
     bank = cortex.copy()
     bank[cortex] = away > LEAST_BANK * thickness
     apart = np.zeros(cortex.shape, dtype=np.float32)

@@ -73,7 +73,7 @@ def test_cavities_are_filled_and_the_surface_is_a_sphere(ball):
 def test_structure_thinner_than_the_smoothing_is_refused():
     thin = np.zeros((20, 20, 20), dtype=bool)
     thin[10, 5:15, 5:15] = True
-    with pytest.raises(MeshError, match="nothing is left"):
+    with pytest.raises(MeshError, match="mask is empty"):
         make_simple(smooth_mask(thin, 2.0))
 
 

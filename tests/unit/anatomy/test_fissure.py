@@ -37,7 +37,7 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
     lump = sphere(8.7, 3, (-38.0, 0.0, 0.0))
     assert 0.1 < area(lump) / area(brain) < 0.12
     mesh = merged(brain, lump)
-    with pytest.raises(InputError, match=r"cannot be parted at the fissure.* 10 % of the area beside"):
+    with pytest.raises(InputError, match=r"fissure.* 10 % .* 5 %"):
         left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
 
 
@@ -70,7 +70,7 @@ def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
 def test_a_cut_that_does_not_part_the_surface_is_refused():
     mesh = ball_at(0.0, 0.0, 0.0)
     stripes = np.sin(corners(mesh)[:, :, 0].mean(axis=1) * 1.2)
-    with pytest.raises(InputError, match="cannot be parted at the fissure"):
+    with pytest.raises(InputError, match=r"fissure.* 48 % "):
         left_faces(mesh, stripes)
 
 

@@ -11,7 +11,7 @@ from atlas_brains import atlas_halves
 from phantoms import CENTRE_MM
 from shapes import LPS, rigid, scaling, sphere
 
-from gyriflow.anatomy.fissure import least_gap, split
+from gyriflow.anatomy.fissure import smallest_gap, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.plausible import doubts_of_proportions, expected_volume_ml, require_plausible_size
 from gyriflow.anatomy.repair import pieces
@@ -144,7 +144,7 @@ def test_hemispheres_are_merged_apart_and_whole(halves):
     assert is_closed(surface.left)
     assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
     assert surface.fissure_x_mm == pytest.approx(CENTRE_MM[0], abs=0.4)
-    assert least_gap(*pieces(surface.whole)) > 0.5
+    assert smallest_gap(*pieces(surface.whole)) > 0.5
 
 
 def test_overlapping_hemispheres_are_moved_apart(halves):
@@ -153,7 +153,7 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     require_sound(surface, surfaces=2)
     assert surface.report["gap_before_mm"] < 0
     assert 0.5 < surface.report["moved_apart_mm"] < 2.0
-    assert least_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.1)
+    assert smallest_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.1)
     assert any("moved apart" in warning for warning in surface.report["warnings"])
 
 
@@ -238,8 +238,8 @@ def test_split_gives_bulges_back_to_their_hemisphere(phantom):
 
 def test_gap_between_balls_is_known():
     one, other, closer = (sphere(5.0, 3, (x, 0.0, 0.0)) for x in (-6.0, 6.0, 2.0))
-    assert least_gap(one, other) == pytest.approx(2.0, abs=0.05)
-    assert least_gap(one, closer) == pytest.approx(-2.0, abs=0.1)
+    assert smallest_gap(one, other) == pytest.approx(2.0, abs=0.05)
+    assert smallest_gap(one, closer) == pytest.approx(-2.0, abs=0.1)
 
 
 @pytest.mark.slow

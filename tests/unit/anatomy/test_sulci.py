@@ -132,7 +132,7 @@ def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
     core = body & (depth > THICKNESS_MM) & (places[..., 0] > 3.0)
     field = smooth_mask(body)
     same, grid, report = open_shut_sulci(field, affine, core)
-    assert "of the cortex is further" in report["left_shut"]
+    assert "of the cortex is further" in report["stays_fused"]
     np.testing.assert_array_equal(same, field)
     np.testing.assert_array_equal(grid, affine)
 
@@ -141,7 +141,7 @@ def test_cortex_of_a_voxel_is_told_and_stays_as_it_is():
     body, core, affine = with_sulcus(6.0, thickness_mm=VOXEL_MM)
     field = smooth_mask(body)
     same, _, report = open_shut_sulci(field, affine, core)
-    assert "the cortex is 1." in report["left_shut"]
+    assert "the cortex is 1." in report["stays_fused"]
     assert same is field
 
 
