@@ -2,6 +2,7 @@
 
 import pytest
 import yaml
+from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.study.loading import load
@@ -62,7 +63,7 @@ def problems(raw, folder="."):
     else:
         return []
     first, *lines, _ = message.splitlines()
-    assert first.startswith(f"the configuration has {len(lines)} problem")
+    assert first == Facts(len(lines))
     return [line.strip() for line in lines]
 
 

@@ -9,6 +9,7 @@ import nibabel as nib
 import numpy as np
 import pytest
 import pyvista as pv
+from facts import Facts
 from fuzzing import BOUNDED, damaged, outcome
 from hypothesis import given
 from hypothesis import strategies as st
@@ -108,7 +109,7 @@ def test_a_header_that_asks_for_more_than_its_file_has_takes_no_memory(tmp_path,
         data[place : place + np.dtype(number).itemsize] = np.array(30000, number).tobytes()
     path = tmp_path / f"a.{suffix}"
     path.write_bytes(data if suffix == "nii" else gzip.compress(data))
-    with pytest.raises(InputError, match="is shorter than its header says"):
+    with pytest.raises(InputError, check=Facts(path, "30000 x 30000 x 30000", 108_000_000_000_000)):
         read_label_volume(path)
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import pyvista
 from dolfinx.io import XDMFFile
+from facts import Facts
 from mpi4py import MPI
 from pyvista import wrap
 from shapes import box_mesh
@@ -49,14 +50,14 @@ def test_a_mesh_comes_back_with_its_fields_readable_by_others(tmp_path, make):
 
 
 @pytest.mark.parametrize(
-    ("point", "tet", "message"),
-    [(np.nan, [0, 1, 2, 3], "1 points"), (1.0, [0, 2, 1, 3], "found 1"), (0.0, [0, 1, 2, 3], "found 1")],
+    ("point", "tet", "found"),
+    [(np.nan, [0, 1, 2, 3], "NaN"), (1.0, [0, 2, 1, 3], ""), (0.0, [0, 1, 2, 3], "")],
 )
-def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, message):
+def test_meshes_with_bad_points_or_elements_are_refused(tmp_path, point, tet, found):
     points = np.vstack([np.zeros(3), np.eye(3)])
     points[3, 2] = point
     write_tetrahedral_mesh(tmp_path / "bad.xdmf", TetrahedralMesh(points, np.array([tet])))
-    with pytest.raises(InputError, match=rf"bad\.h5.*{message}"):
+    with pytest.raises(InputError, check=Facts(tmp_path / "bad.h5", 1, found)):
         read_tetrahedral_mesh(tmp_path / "bad.xdmf")
 
 
@@ -70,7 +71,7 @@ def test_maps_on_a_mesh_come_back_exactly(tmp_path):
 @pytest.mark.parametrize("name", ["torn", "missing"])
 def test_missing_and_torn_files_are_refused(tmp_path, read, name):
     (tmp_path / "torn.h5").write_bytes(b"HDF")
-    with pytest.raises(InputError, match=rf"{name}\.h5: cannot be read"):
+    with pytest.raises(InputError, check=Facts(tmp_path / f"{name}.h5")):
         read(tmp_path / f"{name}.xdmf")
 
 
@@ -94,9 +95,9 @@ def test_frames_are_joined_into_one_time_series(frames):
     np.testing.assert_array_equal(read_tets(path), mesh.tets)
     np.testing.assert_array_equal(read_field(path, 22.0, "w"), np.full(8, 22.0))
     np.testing.assert_array_equal(element_field(path, 21.5, "stress"), 21.5 + np.arange(8))
-    with pytest.raises(InputError, match=r"has no w of week 23.*weeks \[21\.0, 21\.5, 22\.0\]"):
+    with pytest.raises(InputError, check=Facts(path, "w", 23, 21, 21.5, 22)):
         read_field(path, 23.0, "w")
-    with pytest.raises(InputError, match="has no stress of week 21"):
+    with pytest.raises(InputError, check=Facts(path, "stress", 21)):
         read_field(path, 21.0, "stress")
 
 

@@ -3,6 +3,7 @@
 import nibabel as nib
 import numpy as np
 import pytest
+from facts import Facts
 from shapes import rigid
 
 from gyriflow.errors import InputError
@@ -63,7 +64,7 @@ def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     other = AFFINE.copy()
     other[0, 3] = 33.0
     path = saved(tmp_path / "a.nii", labels, qform_affine=other)
-    with pytest.raises(InputError, match=r"(?s)a\.nii.*qform.*33.*sform.*-10.*affine_from") as caught:
+    with pytest.raises(InputError, check=Facts("a.nii", "qform", 33, "sform", -10, "affine_from")) as caught:
         read_label_volume(path)
     assert caught.value.exit_code == 2
     assert read_label_volume(path, "qform").affine[0, 3] == pytest.approx(33.0)
@@ -101,22 +102,22 @@ def with_values(path, labels, value):
 
 @pytest.mark.fault(6, 13, 43)
 @pytest.mark.parametrize(
-    ("name", "make", "said"),
+    ("name", "make", "facts"),
     [
-        ("a.nii", with_odd_unit, r"a\.nii: has a unit of length that NIfTI does not know; found xyzt_units 5"),
-        ("a.nii", lambda path, labels: saved(path, labels, sform=0, qform=0), "left and right are unknown"),
-        ("a.img", lambda path, labels: saved(path, labels, sform=0, qform=0), "left and right are unknown"),
-        ("a.img", lambda path, labels: nib.save(nib.Spm2AnalyzeImage(labels, None), path), "in the Analyze format"),
-        ("a.nii", lambda path, _: saved(path, np.zeros((3, 3, 3, 2), np.int16)), "three axes"),
-        ("a.nii", lambda path, _: saved(path, np.zeros((3, 3), np.int16)), "three axes"),
-        ("a.nii", lambda path, labels: with_values(path, labels, 0.4), r"3 voxels, for example 0\.4.*not segment"),
-        ("a.nii", lambda path, labels: with_values(path, labels, np.nan), r"a\.nii.*3 voxels"),
-        ("a.nii", lambda path, labels: with_values(path, labels, np.inf), r"a\.nii.*3 voxels"),
+        ("a.nii", with_odd_unit, ["xyzt_units", 5, 0, 1, 2, 3]),
+        ("a.nii", lambda path, labels: saved(path, labels, sform=0, qform=0), ["qform", "sform", "affine_from"]),
+        ("a.img", lambda path, labels: saved(path, labels, sform=0, qform=0), ["qform", "sform", "affine_from"]),
+        ("a.img", lambda path, labels: nib.save(nib.Spm2AnalyzeImage(labels, None), path), ["Analyze", "NIfTI"]),
+        ("a.nii", lambda path, _: saved(path, np.zeros((3, 3, 3, 2), np.int16)), ["(3, 3, 3, 2)"]),
+        ("a.nii", lambda path, _: saved(path, np.zeros((3, 3), np.int16)), ["(3, 3)"]),
+        ("a.nii", lambda path, labels: with_values(path, labels, 0.4), [3, 0.4]),
+        ("a.nii", lambda path, labels: with_values(path, labels, np.nan), [3, "NaN"]),
+        ("a.nii", lambda path, labels: with_values(path, labels, np.inf), [3, "NaN"]),
     ],
 )
-def test_what_is_no_volume_of_labels_in_the_world_is_refused(tmp_path, labels, name, make, said):
+def test_what_is_no_volume_of_labels_in_the_world_is_refused(tmp_path, labels, name, make, facts):
     make(tmp_path / name, labels)
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, check=Facts(f"{name}:", *facts)):
         read_label_volume(tmp_path / name)
 
 

@@ -4,6 +4,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.io.yaml_files import read_yaml
@@ -214,7 +215,7 @@ def test_growth_is_of_one_subject_whose_scans_alone_it_leads_to(labels):
         "b24": (["b27"], 27.0),
     }
     assert [found.growth_of(one) for one in found.folded] == ["own", "own"]
-    with pytest.raises(InputError, match="none; the growth series are a, b"):
+    with pytest.raises(InputError, check=Facts("m", "c25", "a, b", 25, 27)):
         study(cohort(labels), **MEASURED | {"start": "c25"})
     # nor does a brain follow the sizes of another subject
     sizes = MEASURED | {"runs": {"s": {"growth": "sizes"}}}
@@ -227,10 +228,10 @@ def test_a_chain_of_several_subjects_is_asked_for_by_name_and_called_a_populatio
     assert ids(found.chains["a22", "self"].brains) == ["a22", "b24", "c25", "a26", "b27"]
     one = found.folded[0]
     assert (ids(one.real.values()), one.weeks[-1]) == (["b24", "c25", "a26", "b27"], 27.0)
-    assert found.growth_of(one) == "population cohort"
+    assert found.growth_of(one) == Facts("cohort")
     # a list of brains is no chain
     assert study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "b24"}).growing
-    with pytest.raises(InputError, match="none; the growth series are b"):
+    with pytest.raises(InputError, check=Facts("m", "a22", "b", 22, 27)):
         study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "a22"})
 
 
@@ -239,7 +240,7 @@ def test_the_scans_of_another_subject_are_no_atlas(labels):
     expected = {"runs": {"e": {"preset": "expected"}}, "folding": {"end_week": 27}, "start": "c25"}
     found = study([*cohort(labels), *atlas], **expected)
     assert ids(found.chains["c25", "atlas"].later) == ["atlas25", "atlas26", "atlas27"]
-    assert [found.growth_of(one) for one in found.folded] == ["series atlas"]
+    assert [found.growth_of(one) for one in found.folded] == [Facts("atlas")]
     assert ids(found.folded[0].compared[26]) == ["atlas26"]
 
 
@@ -297,15 +298,13 @@ def test_a_brain_is_expected_from_the_atlas_week_before_it_to_the_first_past_the
 def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_the_end(of_two, labels):
     both = [*of_two(22), *(labels(week, population="third", id=f"third{week}") for week in (22, 24))]
     for brains, found in (
-        (of_two(22, 24, atlas=()), "none; the growth series are volume"),
-        (of_two(22, atlas=(21, 23)), "own22 (22 GW), b21 (21 GW), b23 (23 GW)"),
+        (of_two(22, 24, atlas=()), ["volume"]),
+        (of_two(22, atlas=(21, 23)), ["own22 (22 GW)", "b21 (21 GW)", "b23 (23 GW)"]),
         # more than a week before the first brain of the atlas
-        (of_two(22, atlas=(23.5, 24)), "own22 (22 GW), b23.5 (23.5 GW), b24 (24 GW)"),
-        (both, "several series: atlas, third"),
+        (of_two(22, atlas=(23.5, 24)), ["own22 (22 GW)", "b23.5 (23.5 GW)", "b24 (24 GW)"]),
+        (both, ["atlas, third"]),
     ):
-        said = refusal(brains, **EXPECTED)
-        assert f"found {found}; expected brains of one series of another population" in said
-        assert "from 22 to 24 GW" in said
+        assert refusal(brains, **EXPECTED) == Facts("own22", 22, 24, "growth.series", *found)
     named = study(both, growth={"series": "third"}, **EXPECTED)
     assert ids(named.chains["own22", "atlas"].later) == ["third22", "third24"]
 
@@ -313,9 +312,9 @@ def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_th
 def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(of_two):
     named = {"growth": {"series": "atlas"}, "runs": {"a": {"preset": "measured"}}}
     assert ids(study(of_two(22, 23, 24), **named).chains["own22", "self"].later) == ["own23", "own24"]
-    assert "found none; the growth series are atlas" in refusal(of_two(22), **named)
+    assert refusal(of_two(22), **named) == Facts("atlas", 22, 24, "growth.brains")
     early = refusal(of_two(22, 23), runs=named["runs"])
-    assert "found own22 (22 GW), own23 (23 GW); expected brains of the start's own growth series" in early
+    assert early == Facts("own22 (22 GW)", "own23 (23 GW)", 24, "growth.brains")
 
 
 @pytest.mark.parametrize("preset", ["measured", "expected"])
@@ -328,7 +327,7 @@ def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(of_two,
             assert study(of_two(22, 24, 26), **runs, **more).chains["own22", "self"].later_weeks == [24, 26]
         else:
             # the atlas ends at 25 GW
-            assert "from 22 to 26 GW" in refusal(of_two(22, 24, 26), **runs, **more)
+            assert refusal(of_two(22, 24, 26), **runs, **more) == Facts("own22", 22, 26)
 
 
 def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
@@ -381,10 +380,9 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
     (drawn,) = (figure for figure in figures_of(found) if figure.name == "predicted_figure")
-    headings = ["start\n22.4 GW", "predicted\n23.9 GW", "atlas' own brain\n24 GW"]
-    shown = [surface("own22.4"), f"{at}/pial.surf.gii", surface("b24")]
-    assert list(drawn.inputs["real"].items()) == list(zip(headings, shown, strict=True))
-    assert drawn.options["predicted"] == headings[1]
+    shown = {22.4: surface("own22.4"), 23.9: f"{at}/pial.surf.gii", 24: surface("b24")}
+    assert list(drawn.inputs["real"].items()) == [(Facts(week, "GW"), path) for week, path in shown.items()]
+    assert drawn.options["predicted"] == list(drawn.inputs["real"])[1]
     # no prediction is one that its own later brains explain, or a study of several runs
     assert study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).described_prediction is None
     assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).described_prediction is None
