@@ -131,18 +131,20 @@ def test_sulci_of_real_brains_and_of_a_run_begin_in_their_weeks(workflow):
     config = {"brains": labelled(27, 22, 24), "start": "b", "folding": folding, "runs": {"reference": {}}}
     name = workflow.write("study.yaml", config)
     study = resolve(load(config, workflow.directory))
-    files = study.onset_files("reference", "b")
+    chain, run = study.chains["b", "self"], study.simulations["reference", "b"]
+    brains = {"real": [brain.measured for brain in chain.brains], "reference": run.measured}
     weeks = {"real": [22, 24, 27], "reference": [22, 24, 26, 27]}
-    assert list(study.simulations["reference", "b"].weeks) == weeks["reference"]
+    assert list(run.weeks) == weeks["reference"]
     shapes = {who: [groove(rate * (week - 22)) for week in weeks[who]] for who, rate in MM_PER_WEEK.items()}
     for side in ("left", "right"):
-        for key, who in (("real", "real"), ("run", "reference")):
-            for file, shape in zip(files[f"{key}_{side}"], shapes[who], strict=True):
-                write_surface(workflow.directory / file, shape)
-        write_vertex_labels(workflow.directory / files[f"{side}_regions"], np.zeros(len(BALL.vertices), int), {})
-    for file in files["reports"]:
-        write_json(workflow.directory / file, {"pose": Pose().plain()})
-    for file, (one, other) in zip(files["correspondences"], pairwise(shapes["real"]), strict=True):
+        for who, rows in brains.items():
+            for row, shape in zip(rows, shapes[who], strict=True):
+                write_surface(workflow.directory / row.parts[side], shape)
+        regions = chain.brains[-1].regions[f"{side}_regions"]
+        write_vertex_labels(workflow.directory / regions, np.zeros(len(BALL.vertices), int), {})
+    for brain in chain.brains:
+        write_json(workflow.directory / brain.report, {"pose": Pose().plain()})
+    for file, (one, other) in zip(chain.correspondences, pairwise(shapes["real"]), strict=True):
         write_correspondence(workflow.directory / file, MatchedSurfaces(one, other.vertices), {})
     table = "results/runs/reference/b/metrics/onset.csv"
     outcome = workflow.run(table, "--allowed-rules", "onset", "--cores", "1", "--configfile", name)

@@ -10,8 +10,14 @@ rule calibration_design:
         scores=lambda w: CALIBRATED.scores_before(int(w.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
+    log:
+        f"{CALIBRATION}/logs/calibration_design.{{round}}.log",
+    benchmark:
+        f"{CALIBRATION}/benchmarks/calibration_design.{{round}}.tsv"
     wildcard_constraints:
         round=r"\d+",
+    conda:
+        ENVIRONMENT
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,
@@ -26,8 +32,14 @@ rule calibration_parameters:
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
     output:
         PARAMETERS,
+    log:
+        f"{RUN}/logs/calibration_parameters.log",
+    benchmark:
+        f"{RUN}/benchmarks/calibration_parameters.tsv"
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
+    conda:
+        ENVIRONMENT
     params:
         week=lambda w: CONFIG.calibrate.compare_week,
     script:
@@ -54,8 +66,14 @@ rule calibration_score:
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
+    log:
+        f"{CALIBRATION}/logs/calibration_score.{{run}}.log",
+    benchmark:
+        f"{CALIBRATION}/benchmarks/calibration_score.{{run}}.tsv"
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
+    conda:
+        ENVIRONMENT
     params:
         # how many of the real brains belong to each of the simulated ones
         compared=lambda w: list(map(len, CALIBRATED.real.values())),
@@ -72,6 +90,12 @@ rule calibration_tables:
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
+    log:
+        f"{CALIBRATION}/logs/calibration_tables.log",
+    benchmark:
+        f"{CALIBRATION}/benchmarks/calibration_tables.tsv"
+    conda:
+        ENVIRONMENT
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,

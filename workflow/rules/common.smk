@@ -76,6 +76,20 @@ if RUNS:
     LOCK = hold_lock(Path.cwd())
 
 
+# the environment of each rule, for Snakemake's own deployment with conda
+ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"
+
+
+def brain_of(wildcards):
+    """Return the brain that the wildcards name."""
+    return study.brains[wildcards.brain]
+
+
+def simulation_of(wildcards):
+    """Return the run from a brain that the wildcards name."""
+    return study.simulations[wildcards.run, wildcards.brain]
+
+
 def from_brain(attribute):
     """Return an input function: an attribute of the brain that the wildcards name."""
     return lambda wildcards: attrgetter(attribute)(study.brains[wildcards.brain])

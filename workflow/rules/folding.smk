@@ -1,6 +1,7 @@
 # The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
+from gyriflow.settings.varying import files_of
 
 # runs of a calibration have their parameters from its rounds, and their maps from its base
 with_parameters = {one.run: one for one in study.simulations.values() if one.base == one.run}
@@ -9,35 +10,55 @@ with_parameters = {one.run: one for one in study.simulations.values() if one.bas
 rule parameters:
     input:
         surface=PIAL["report"],
-        curves=from_simulation("curves"),
-        targets=from_simulation("targets"),
+        curves=lambda w: simulation_of(w).curves,
+        targets=lambda w: simulation_of(w).targets,
     output:
         PARAMETERS,
+    log:
+        f"{RUN}/logs/parameters.log",
+    benchmark:
+        f"{RUN}/benchmarks/parameters.tsv"
     wildcard_constraints:
         run=one_of(with_parameters),
+    conda:
+        ENVIRONMENT
     params:
-        settings=from_simulation("parameters"),
-        weeks=from_simulation("weeks"),
-        series=from_simulation("followed_series"),
+        settings=lambda w: simulation_of(w).parameters,
+        weeks=lambda w: simulation_of(w).weeks,
+        series=lambda w: simulation_of(w).followed_series,
     script:
         "../scripts/parameters.py"
 
 
+def map_sources(wildcards):
+    """Return the user's files of each parameter that has a map, under "map" and "surface"."""
+    mapped = simulation_of(wildcards).mapped
+    return {
+        name: {"map": files_of(value.map), "surface": files_of(value.surface)} for name, value in mapped.items()
+    }
+
+
 rule parameter_maps:
     input:
-        from_simulation("map_files"),
+        lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
         mesh=MESH["mesh"],
         data=MESH["data"],
         surface=PIAL["report"],
-        targets=from_simulation("targets"),
+        targets=lambda w: simulation_of(w).targets,
     output:
         MAPS,
+    log:
+        f"{RUN}/logs/parameter_maps.log",
+    benchmark:
+        f"{RUN}/benchmarks/parameter_maps.tsv"
     wildcard_constraints:
         run=one_of(run for run, one in with_parameters.items() if one.maps),
+    conda:
+        ENVIRONMENT
     params:
         # volumes of maps are read like those of the brain
-        affine_from=from_brain("given.affine_from"),
-        maps=from_simulation("map_sources"),
+        affine_from=lambda w: brain_of(w).given.affine_from,
+        maps=map_sources,
     script:
         "../scripts/parameter_maps.py"
 
@@ -47,9 +68,9 @@ rule regions:
         mesh=MESH["mesh"],
         data=MESH["data"],
         params=PARAMETERS,
-        maps=from_simulation("maps"),
+        maps=lambda w: simulation_of(w).maps,
         # the hemispheres of the folded brain are those of the measured one
-        sides=lambda w: [PIAL[side] for side in study.brains[w.brain].sides],
+        sides=lambda w: [PIAL[side] for side in brain_of(w).sides],
     output:
         **REGIONS,
     script:
@@ -60,7 +81,7 @@ SOLVED_FROM = {
     "mesh": MESH["mesh"],
     "data": MESH["data"],
     "params": PARAMETERS,
-    "maps": from_simulation("maps"),
+    "maps": lambda w: simulation_of(w).maps,
     # that rule refuses impossible zones, before the ranks start
     "regions": REGIONS["mesh"],
 }
@@ -82,9 +103,9 @@ FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 # what both rules of a folding ask of a cluster: ranks, memory in MiB and minutes
 LIMITED = {
     "mpi": "mpiexec",
-    "tasks": from_simulation("settings.ranks"),
-    "mem_mb": lambda w: job_limits(study.simulations[w.run, w.brain], CONFIG.mesh)[0],
-    "runtime": lambda w: job_limits(study.simulations[w.run, w.brain], CONFIG.mesh)[1],
+    "tasks": lambda w: simulation_of(w).settings.ranks,
+    "mem_mb": lambda w: job_limits(simulation_of(w), CONFIG.mesh)[0],
+    "runtime": lambda w: job_limits(simulation_of(w), CONFIG.mesh)[1],
 }
 
 
@@ -101,11 +122,17 @@ rule simulate:
         **SOLVED_FROM,
     output:
         **FOLDING,
+    log:
+        f"{RUN}/logs/simulate.log",
+    benchmark:
+        f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(CONFIG.runs),
     # the runs that all else is compared with, and the longest: members of studies fill the cores beside them
     priority: 1
-    threads: from_simulation("settings.ranks")
+    conda:
+        ENVIRONMENT
+    threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
     params:
@@ -129,7 +156,9 @@ checkpoint simulate_member:
         f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(study.may_diverge),
-    threads: from_simulation("settings.ranks")
+    conda:
+        ENVIRONMENT
+    threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
     params:
@@ -159,8 +188,14 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             data=REGIONS["data"],
         output:
             **folded_of(*sides),
+        log:
+            f"{RUN}/logs/folded_surface{suffix}.{WEEK}.log",
+        benchmark:
+            f"{RUN}/benchmarks/folded_surface{suffix}.{WEEK}.tsv"
         wildcard_constraints:
             brain=brains_with(lambda brain: brain.sides == sides),
+        conda:
+            ENVIRONMENT
         script:
             "../scripts/folded_surface.py"
 

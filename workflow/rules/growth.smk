@@ -6,6 +6,12 @@ rule growth_rates:
         thickness=expand(THICKNESS["report"], brain=study.with_thickness_curve),
     output:
         **GROWTH,
+    log:
+        f"{STUDY}/logs/growth_rates.log",
+    benchmark:
+        f"{STUDY}/benchmarks/growth_rates.tsv"
+    conda:
+        ENVIRONMENT
     params:
         series=[series for series, _ in study.growing],
         brains=[brain.id for _, brain in study.growing],
@@ -20,6 +26,12 @@ rule growth_curves:
         GROWTH["areas"],
     output:
         **CURVES,
+    log:
+        f"{STUDY}/logs/growth_curves.log",
+    benchmark:
+        f"{STUDY}/benchmarks/growth_curves.tsv"
+    conda:
+        ENVIRONMENT
     script:
         "../scripts/growth_curves.py"
 

@@ -7,7 +7,13 @@ rule tetrahedralise:
         PIAL["whole"],
     output:
         **MESH,
+    log:
+        f"{BRAIN}/logs/tetrahedralise.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/tetrahedralise.tsv"
     priority: 1
+    conda:
+        ENVIRONMENT
     resources:
         mem_mb=6000,
     params:

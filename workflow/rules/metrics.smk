@@ -1,9 +1,9 @@
 # Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
 
 
-def from_place(attribute):
-    """Return an input function: an attribute of what is measured in the folder that the wildcards name."""
-    return lambda wildcards: getattr(study.places[wildcards.where], attribute)
+def place_of(wildcards):
+    """Return the brain that is measured in the folder that the wildcards name."""
+    return study.places[wildcards.where]
 
 
 for suffix, sides in PARTS_OF_BRAINS.items():
@@ -12,16 +12,22 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         name:
             f"measure{suffix}"
         input:
-            unpack(from_place("parts")),
-            thickness=from_place("thickness"),
-            report=from_place("report"),
+            unpack(lambda w: place_of(w).parts),
+            thickness=lambda w: place_of(w).thickness,
+            report=lambda w: place_of(w).report,
         output:
             **MEASURES,
             **maps_of(*sides),
+        log:
+            f"{PLACE}/logs/measure{suffix}.log",
+        benchmark:
+            f"{PLACE}/benchmarks/measure{suffix}.tsv"
         wildcard_constraints:
             where=one_of(where for where, row in study.places.items() if row.sides == sides),
+        conda:
+            ENVIRONMENT
         params:
-            labels=from_place("labels"),
+            labels=lambda w: place_of(w).labels,
             settings=CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"}),
         script:
             "../scripts/measure.py"
@@ -30,19 +36,24 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         name:
             f"white{suffix}"
         input:
-            unpack(from_brain("measured.parts")),
+            unpack(lambda w: brain_of(w).measured.parts),
             report=PIAL["report"],
-            source=lambda w: list(study.brains[w.brain].white_from.values()),
+            given=labels_or_white,
         output:
             **white_of(*sides),
+        log:
+            f"{BRAIN}/logs/white{suffix}.log",
+        benchmark:
+            f"{BRAIN}/benchmarks/white{suffix}.tsv"
         wildcard_constraints:
-            brain=brains_with(lambda brain: brain.white_from and brain.sides == sides),
+            brain=brains_with(lambda brain: brain.has_white and brain.sides == sides),
+        conda:
+            ENVIRONMENT
         params:
-            affine_from=from_brain("given.affine_from"),
-            labels=from_brain("measured.labels"),
-            scheme=from_brain("scheme"),
+            columns=lambda w: brain_of(w).measured.labels,
+            labels=lambda w: brain_of(w).labels,
             # exchanged files are the same inputs to Snakemake
-            source=from_brain("white_from"),
+            white=lambda w: brain_of(w).given.white_files,
             surface=surface_settings("edge_length_mm", "max_hole_mm"),
             curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         script:
@@ -54,6 +65,12 @@ rule displacement:
         FOLDING["frames"],
     output:
         DISPLACEMENT,
+    log:
+        f"{RUN}/logs/displacement.log",
+    benchmark:
+        f"{RUN}/benchmarks/displacement.tsv"
+    conda:
+        ENVIRONMENT
     params:
         labels=lambda w: {"subject": w.brain, "run": w.run},
     script:
@@ -62,16 +79,21 @@ rule displacement:
 
 rule label_volumes:
     input:
-        labels=from_brain("given.label_volume"),
+        labels=lambda w: brain_of(w).labels.path,
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
     output:
         **VOLUMES,
+    log:
+        f"{BRAIN}/logs/label_volumes.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/label_volumes.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.has_labels),
+        brain=brains_with(lambda brain: brain.labels),
+    conda:
+        ENVIRONMENT
     params:
-        affine_from=from_brain("given.affine_from"),
-        sides=from_brain("sides"),
-        labels=from_brain("measured.labels"),
-        scheme=from_brain("scheme"),
+        labels=lambda w: brain_of(w).labels,
+        sides=lambda w: brain_of(w).sides,
+        columns=lambda w: brain_of(w).measured.labels,
     script:
         "../scripts/label_volumes.py"

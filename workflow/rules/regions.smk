@@ -11,34 +11,59 @@ rule given_regions:
         report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
+    log:
+        f"{BRAIN}/logs/given_regions.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/given_regions.tsv"
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.regions_from == "given"),
+    conda:
+        ENVIRONMENT
     params:
-        affine_from=from_brain("given.affine_from"),
+        affine_from=lambda w: brain_of(w).given.affine_from,
         names=lambda w: CONFIG.metrics.regions[w.brain].names,
     script:
         "../scripts/given_regions.py"
 
 
+def region_pair(wildcards):
+    """Return the brain whose regions are carried, and the one that gets them."""
+    return study.giver_of_regions(wildcards.brain), brain_of(wildcards)
+
+
+def regions_to_carry(wildcards):
+    """Return the regions of the brain that gives them, and the surfaces that they are on."""
+    giver, _ = region_pair(wildcards)
+    return {**giver.regions, **{f"given_{side}": giver.measured.parts[side] for side in SIDES}}
+
+
 rule carried_regions:
     input:
-        unpack(lambda w: study.region_inputs(w.brain)),
+        unpack(regions_to_carry),
+        given_report=lambda w: region_pair(w)[0].report,
+        correspondence=lambda w: study.series.correspondence(*region_pair(w)),
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
+    log:
+        f"{BRAIN}/logs/carried_regions.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/carried_regions.tsv"
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.regions_from == "carried"),
+    conda:
+        ENVIRONMENT
     params:
-        posed=lambda w: study.posed_regions(w.brain),
+        posed=lambda w: study.series.posed(*region_pair(w)),
     script:
         "../scripts/carried_regions.py"
 
 
 rule named_sulci:
     input:
-        volume=from_brain("registered_volume"),
+        volume=lambda w: brain_of(w).registered.path,
         left=PIAL["left"],
         right=PIAL["right"],
         report=PIAL["report"],
@@ -46,11 +71,17 @@ rule named_sulci:
         drawn=SULCI / "sulci.nii.gz",
     output:
         **region_files(f"{BRAIN}/metrics"),
+    log:
+        f"{BRAIN}/logs/named_sulci.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/named_sulci.tsv"
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.regions_from == "named"),
+    conda:
+        ENVIRONMENT
     params:
-        read=from_brain("registered"),
-        posed=lambda w: not study.brains[w.brain].given.has_labels,
+        labels=lambda w: brain_of(w).registered,
+        posed=lambda w: brain_of(w).labels is None,
     script:
         "../scripts/named_sulci.py"
 
@@ -63,40 +94,78 @@ rule simulated_regions:
         right=PIAL["right"],
     output:
         **region_files(f"{RUN}/metrics"),
+    log:
+        f"{RUN}/logs/simulated_regions.log",
+    benchmark:
+        f"{RUN}/benchmarks/simulated_regions.tsv"
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.has_regions),
+    conda:
+        ENVIRONMENT
     script:
         "../scripts/simulated_regions.py"
 
 
 rule region_metrics:
     input:
-        unpack(from_place("regions")),
-        unpack(from_place("parts")),
+        unpack(lambda w: place_of(w).regions),
+        unpack(lambda w: place_of(w).parts),
         left_maps=maps_of("left")["left"],
         right_maps=maps_of("right")["right"],
     output:
-        "results/{where}/regions.csv",
+        f"{PLACE}/regions.csv",
+    log:
+        f"{PLACE}/logs/region_metrics.log",
+    benchmark:
+        f"{PLACE}/benchmarks/region_metrics.tsv"
     wildcard_constraints:
         where=one_of(where for where, row in study.places.items() if row.regions),
+    conda:
+        ENVIRONMENT
     params:
-        labels=from_place("labels"),
+        labels=lambda w: place_of(w).labels,
     script:
         "../scripts/region_metrics.py"
 
 
+def on_template(wildcards):
+    """Return the template, and the brain whose maps are to be had at its vertices."""
+    return study.brains[CONFIG.metrics.template], study.brains[place_of(wildcards).subject]
+
+
+def mapped_surface(wildcards):
+    """Return a hemisphere of a brain with maps; of a simulated one that of its start, whose vertices it keeps."""
+    row, brain = place_of(wildcards), study.brains[place_of(wildcards).subject]
+    if row.run in CONFIG.runs:
+        row = study.simulations[row.run, brain.id].at(brain.week)
+    return row.parts[wildcards.side]
+
+
+def template_correspondence(wildcards):
+    """Return where the template's points are in a brain, nothing for the template itself."""
+    template, brain = on_template(wildcards)
+    return [] if brain is template else study.series.correspondence(template, brain)
+
+
 rule template_maps:
     input:
-        unpack(lambda w: study.template_inputs(w.where, w.side)),
-        maps="results/{where}/{side}.shape.gii",
+        template=lambda w: on_template(w)[0].measured.parts[w.side],
+        template_report=lambda w: on_template(w)[0].report,
+        surface=mapped_surface,
+        report=lambda w: on_template(w)[1].report,
+        correspondence=template_correspondence,
+        maps=f"{PLACE}/{{side}}.shape.gii",
     output:
         TEMPLATE_MAPS,
+    log:
+        f"{PLACE}/logs/template_maps.{{side}}.log",
+    benchmark:
+        f"{PLACE}/benchmarks/template_maps.{{side}}.tsv"
     wildcard_constraints:
         where=one_of(study.measured),
+    conda:
+        ENVIRONMENT
     params:
-        posed=lambda w: study.series.posed(
-            study.brains[CONFIG.metrics.template],
-            study.brains[study.places[w.where].subject],
-        ),
+        posed=lambda w: study.series.posed(*on_template(w)),
     script:
         "../scripts/template_maps.py"

@@ -12,22 +12,39 @@ rule surface_mask:
         PIAL["whole"],
     output:
         MASK,
+    log:
+        f"{BRAIN}/logs/surface_mask.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/surface_mask.tsv"
+    conda:
+        ENVIRONMENT
     params:
         voxel_mm=CONFIG.surface.edge_length_mm,
     script:
         "../scripts/surface_mask.py"
 
 
+def pair_of(wildcards):
+    """Return the two brains that the wildcards name."""
+    return study.brains[wildcards.earlier], study.brains[wildcards.later]
+
+
 rule register:
     input:
-        earlier=lambda w: study.brains[w.earlier].registered_volume,
-        later=lambda w: study.brains[w.later].registered_volume,
-        images=lambda w: [image for name in (w.earlier, w.later) if (image := study.brains[name].given.image)],
+        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
+        images=lambda w: [brain.given.image for brain in pair_of(w) if brain.given.image],
     output:
         REGISTERED,
+    log:
+        f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.tsv"
     priority: 1
+    conda:
+        ENVIRONMENT
     params:
-        brains=lambda w: [study.brains[name].registered for name in (w.earlier, w.later)],
+        brains=lambda w: [brain.registered for brain in pair_of(w)],
+        images=lambda w: [brain.given.image for brain in pair_of(w)],
     script:
         "../scripts/register.py"
 
@@ -35,19 +52,25 @@ rule register:
 # the surfaces as they are given, with all their vertices, in the pose of the mesh
 rule match_surfaces:
     input:
-        lambda w: study.brains[w.earlier].given.files + study.brains[w.later].given.files,
-        reports=[PIAL["report"].format(brain=name) for name in ("{earlier}", "{later}")],
+        lambda w: [path for brain in pair_of(w) for path in brain.given.files],
+        reports=lambda w: [brain.report for brain in pair_of(w)],
     output:
         MATCHED,
+    log:
+        f"{STUDY}/logs/match_surfaces.{{earlier}}.{{later}}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/match_surfaces.{{earlier}}.{{later}}.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        files=lambda w: [study.brains[name].given.files for name in (w.earlier, w.later)],
+        files=lambda w: [brain.given.files for brain in pair_of(w)],
     script:
         "../scripts/match_surfaces.py"
 
 
-def from_chain(attribute):
-    """Return an input function: an attribute of the brains behind the growth of the start that the wildcards name."""
-    return lambda wildcards: getattr(study.chains[wildcards.brain, wildcards.origin], attribute)
+def chain_of(wildcards):
+    """Return the brains behind the growth of the start that the wildcards name."""
+    return study.chains[wildcards.brain, wildcards.origin]
 
 
 # the shapes that the mesh of a start brain is to have in later weeks, for runs that grow towards them
@@ -56,21 +79,27 @@ rule targets:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        correspondences=from_chain("correspondences"),
-        surfaces=from_chain("surfaces"),
-        reports=from_chain("reports"),
+        correspondences=lambda w: chain_of(w).correspondences,
+        surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
+        reports=lambda w: [brain.report for brain in chain_of(w).later],
     output:
         TARGETS,
+    log:
+        f"{BRAIN}/logs/targets.{{origin}}.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/targets.{{origin}}.tsv"
     wildcard_constraints:
         origin="self|atlas",
     priority: 1
+    conda:
+        ENVIRONMENT
     resources:
         mem_mb=8000,
     params:
-        start_week=from_brain("week"),
-        weeks=from_chain("later_weeks"),
-        further_weeks=from_chain("further_weeks"),
-        posed=from_chain("posed"),
+        start_week=lambda w: brain_of(w).week,
+        weeks=lambda w: chain_of(w).later_weeks,
+        further_weeks=lambda w: chain_of(w).further_weeks,
+        posed=lambda w: chain_of(w).posed,
     script:
         "../scripts/targets.py"
 
@@ -83,6 +112,12 @@ rule carried_mesh:
         later=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         CARRIED_MESH,
+    log:
+        f"{BRAIN}/logs/carried_mesh.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/carried_mesh.tsv"
+    conda:
+        ENVIRONMENT
     resources:
         mem_mb=8000,
     params:

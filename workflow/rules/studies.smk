@@ -7,12 +7,22 @@ PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
 
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the real brains, none where it has not come there."""
-    run, brain, compared = (
-        wildcards.run,
-        wildcards.brain,
-        study.comparisons[wildcards.study],
-    )
-    return compared.files(run, brain) if reaches(run, brain, compared.week) else {}
+    compared = study.comparisons[wildcards.study]
+    if not reaches(wildcards.run, wildcards.brain, compared.week):
+        return {}
+    simulated, real = simulation_of(wildcards).at(compared.week), compared.real[wildcards.brain]
+    rows = [simulated, *(brain.measured for brain in real)]
+    return {
+        "metrics": [f"{row.folder}/metrics.csv" for row in rows],
+        "spectra": [f"{row.folder}/spectra.csv" for row in rows],
+        "simulated": list(simulated.parts.values()),
+        "measured": [path for row in rows[1:] for path in row.parts.values()],
+    }
+
+
+def from_members(pattern):
+    """Return an input function: a file of each member of a study."""
+    return lambda w: [one.file(pattern, study=w.study) for one, _ in study.comparisons[w.study].members]
 
 
 rule compare_member:
@@ -22,24 +32,42 @@ rule compare_member:
         summary=FOLDING["summary"],
     output:
         COMPARED_MEMBER,
+    log:
+        f"{SWEEP}/logs/compare_member.{{run}}.{{brain}}.log",
+    benchmark:
+        f"{SWEEP}/benchmarks/compare_member.{{run}}.{{brain}}.tsv"
+    conda:
+        ENVIRONMENT
     params:
         real=lambda w: {real.id: real.population for real in study.comparisons[w.study].real[w.brain]},
-        population=from_brain("population"),
-        parts=lambda w: ["whole", *study.brains[w.brain].sides],
+        population=lambda w: brain_of(w).population,
+        parts=lambda w: ["whole", *brain_of(w).sides],
     script:
         "../scripts/compare_member.py"
 
 
 rule study_tables:
     input:
-        unpack(lambda w: study.comparisons[w.study].inputs),
+        comparisons=from_members(COMPARED_MEMBER),
+        params=from_members(PARAMETERS),
+        summaries=from_members(FOLDING["summary"]),
+        zones=from_members(FOLDING["zones"]),
         published=PUBLISHED,
     output:
-        members=f"{STUDY}/{{study}}/members.csv",
-        comparison=f"{STUDY}/{{study}}/comparison.csv",
-        nearest=f"{STUDY}/{{study}}/nearest.csv",
+        members=f"{SWEEP}/members.csv",
+        comparison=f"{SWEEP}/comparison.csv",
+        nearest=f"{SWEEP}/nearest.csv",
+    log:
+        f"{SWEEP}/logs/study_tables.log",
+    benchmark:
+        f"{SWEEP}/benchmarks/study_tables.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        members=lambda w: study.comparisons[w.study].rows,
+        members=lambda w: [
+            {"run": one.run, "subject": one.start.id, "values": dict(values)}
+            for one, values in study.comparisons[w.study].members
+        ],
         week=lambda w: study.comparisons[w.study].week,
     script:
         "../scripts/study_tables.py"
@@ -49,7 +77,7 @@ rule study_tables:
 rule replication:
     input:
         **{
-            name: expand(f"{STUDY}/{{study}}/{name}.csv", study=study.comparisons)
+            name: expand(f"{SWEEP}/{name}.csv", study=study.comparisons)
             for name in ("members", "comparison", "nearest")
         },
         published=PUBLISHED,
@@ -58,6 +86,12 @@ rule replication:
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
+    log:
+        f"{STUDY}/logs/replication.log",
+    benchmark:
+        f"{STUDY}/benchmarks/replication.tsv"
+    conda:
+        ENVIRONMENT
     params:
         studies={
             name: {"varied": list(asked.vary), "week": asked.compare_week}

@@ -9,8 +9,8 @@ LIMITS = (
 
 def surface_memory(wildcards):
     """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
-    brain = study.brains[wildcards.brain]
-    return surface_memory_mib(brain.given.label_volume, brain.week) if brain.given.has_labels else 4000
+    brain = brain_of(wildcards)
+    return surface_memory_mib(brain.labels.path, brain.week) if brain.labels else 4000
 
 
 def surface_settings(*names):
@@ -20,23 +20,34 @@ def surface_settings(*names):
 
 def pial_settings(wildcards):
     """Return the surface settings that the data of a brain needs."""
-    brain = study.brains[wildcards.brain]
+    brain = brain_of(wildcards)
     if brain.given.source == "shape":
         return {}
-    if not brain.given.has_labels:
+    if not brain.labels:
         return surface_settings("edge_length_mm", "max_hole_mm")
     return surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci}
+
+
+def labels_or_white(wildcards):
+    """Return the labels of a brain, or its white surfaces."""
+    brain = brain_of(wildcards)
+    return brain.labels.path if brain.labels else list(brain.given.white_files.values())
 
 
 # a simple shape in the place of a brain
 rule shape:
     output:
         SHAPE,
+    log:
+        f"{BRAIN}/logs/shape.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/shape.tsv"
     wildcard_constraints:
         brain=brains_with(lambda brain: brain.given.source == "shape"),
+    conda:
+        ENVIRONMENT
     params:
-        shape=lambda w: study.brains[w.brain].given.shape.model_dump(mode="json")
-        | surface_settings("edge_length_mm"),
+        shape=lambda w: brain_of(w).given.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
         "../scripts/shape.py"
 
@@ -47,21 +58,26 @@ for name, (source, sides) in PIAL_RULES.items():
         name:
             name
         input:
-            SHAPE if source == "shape" else from_brain("given.files"),
+            SHAPE if source == "shape" else lambda w: brain_of(w).given.files,
         output:
             **pial_of(*sides),
+        log:
+            f"{BRAIN}/logs/{name}.log",
+        benchmark:
+            f"{BRAIN}/benchmarks/{name}.tsv"
         wildcard_constraints:
             brain=brains_with(lambda brain: brain.given.source == source and brain.sides == sides),
+        conda:
+            ENVIRONMENT
         resources:
             mem_mb=surface_memory,
         params:
             source=source,
-            week=from_brain("week"),
+            week=lambda w: brain_of(w).week,
             side=sides[0] if len(sides) == 1 else None,
-            coordinates=from_brain("given.coordinates"),
-            affine_from=from_brain("given.affine_from"),
-            scheme=from_brain("scheme"),
-            checksums=from_brain("checksums"),
+            coordinates=lambda w: brain_of(w).given.coordinates,
+            labels=lambda w: brain_of(w).labels,
+            checksums=lambda w: brain_of(w).checksums,
             settings=pial_settings,
             limits=LIMITS if source == "hemispheres" else {},
         script:
@@ -70,20 +86,25 @@ for name, (source, sides) in PIAL_RULES.items():
 
 rule cortical_thickness:
     input:
-        given=lambda w: list(study.brains[w.brain].thickness_from.values()),
+        given=labels_or_white,
         surface=PIAL["whole"],
         report=PIAL["report"],
     output:
         **THICKNESS,
+    log:
+        f"{BRAIN}/logs/cortical_thickness.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/cortical_thickness.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.thickness_from),
+        brain=brains_with(lambda brain: brain.has_thickness),
+    conda:
+        ENVIRONMENT
     resources:
         mem_mb=surface_memory,
     params:
+        labels=lambda w: brain_of(w).labels,
         # exchanged files are the same inputs to Snakemake
-        given=from_brain("thickness_from"),
-        affine_from=from_brain("given.affine_from"),
-        scheme=from_brain("scheme"),
+        white=lambda w: brain_of(w).given.white_files,
     script:
         "../scripts/thickness.py"
 

@@ -6,27 +6,46 @@ rule ready_surfaces:
         start=PIAL["whole"],
     output:
         **READY,
+    log:
+        f"{STUDY}/logs/ready_surfaces.{{brain}}.{WEEK}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/ready_surfaces.{{brain}}.{WEEK}.tsv"
+    conda:
+        ENVIRONMENT
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/ready_surfaces.py"
 
 
+def ready_files(start, weeks):
+    """Return the files of `ready_surfaces` of a start brain, by kind, one for each of the weeks."""
+    return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in READY.items()}
+
+
 rule validation:
     input:
-        unpack(from_simulation("validation_files")),
+        unpack(lambda w: ready_files(w.brain, simulation_of(w).real)),
+        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
+        whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
         params=PARAMETERS,
         # what the errors of runs that follow no curve are errors against
-        curves=lambda w: (CURVES["curves"] if study.simulations[w.run, w.brain].series else []),
+        curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
     output:
         VALIDATION,
+    log:
+        f"{RUN}/logs/validation.log",
+    benchmark:
+        f"{RUN}/benchmarks/validation.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        start_week=from_brain("week"),
-        series=from_simulation("series"),
-        weeks=lambda w: list(study.simulations[w.run, w.brain].real),
+        start_week=lambda w: brain_of(w).week,
+        series=lambda w: simulation_of(w).series,
+        weeks=lambda w: list(simulation_of(w).real),
         run=lambda w: w.run,
-        real=lambda w: [brain.id for brain in study.simulations[w.run, w.brain].real.values()],
-        kind=from_simulation("kind"),
+        real=lambda w: [brain.id for brain in simulation_of(w).real.values()],
+        kind=lambda w: simulation_of(w).kind,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
@@ -34,21 +53,36 @@ rule validation:
 
 rule prediction:
     input:
-        unpack(from_simulation("validation_files")),
-        atlas=lambda w: study.chains[w.brain, "atlas"].surfaces,
+        unpack(lambda w: ready_files(w.brain, simulation_of(w).real)),
+        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
+        whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
+        atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
         mesh=MESH["mesh"],
         data=MESH["data"],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         PREDICTION,
+    log:
+        f"{RUN}/logs/prediction.log",
+    benchmark:
+        f"{RUN}/benchmarks/prediction.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        start_week=from_brain("week"),
-        weeks=lambda w: list(study.simulations[w.run, w.brain].real),
+        start_week=lambda w: brain_of(w).week,
+        weeks=lambda w: list(simulation_of(w).real),
         atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
-        of_atlas=from_simulation("from_others_only"),
+        of_atlas=lambda w: simulation_of(w).from_others_only,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/prediction.py"
+
+
+def deviating(wildcards):
+    """Return the start brain, the run from it at its first week and at another, and the real brain of that week."""
+    one, week = simulation_of(wildcards), float(wildcards.week)
+    simulated = {"first": one.at(one.start.week), "expected": one.at(week)}
+    return {"start": one.start.measured, **simulated, "real": one.real[week].measured}
 
 
 def deviation_labels(wildcards):
@@ -61,11 +95,25 @@ def deviation_labels(wildcards):
 
 rule deviation:
     input:
-        unpack(lambda w: study.simulations[w.run, w.brain].deviation_files(float(w.week))),
+        unpack(lambda w: {name: row.parts["whole"] for name, row in deviating(w).items()}),
+        # in the order of the surfaces, where all of them have one
+        thickness=lambda w: (
+            [row.thickness for row in deviating(w).values()]
+            if all(row.thickness for row in deviating(w).values())
+            else []
+        ),
+        sides=lambda w: deviating(w)["expected"].hemispheres,
+        regions=lambda w: list(deviating(w)["expected"].regions.values()),
     output:
         **DEVIATION,
+    log:
+        f"{RUN}/logs/deviation.{WEEK}.log",
+    benchmark:
+        f"{RUN}/benchmarks/deviation.{WEEK}.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        sides=from_brain("sides"),
+        sides=lambda w: brain_of(w).sides,
         labels=deviation_labels,
     script:
         "../scripts/deviation.py"
@@ -76,6 +124,12 @@ rule deviation_scores:
         f"{STUDY}/deviation.csv",
     output:
         f"{STUDY}/deviation_centiles.csv",
+    log:
+        f"{STUDY}/logs/deviation_scores.log",
+    benchmark:
+        f"{STUDY}/benchmarks/deviation_scores.tsv"
+    conda:
+        ENVIRONMENT
     params:
         individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
     script:
@@ -84,15 +138,22 @@ rule deviation_scores:
 
 rule registration_ceiling:
     input:
-        unpack(lambda w: study.ceiling_files(w.brain)),
+        unpack(lambda w: ready_files(w.brain, study.ceiling_weeks(w.brain))),
+        whole=lambda w: [study.references[w.brain, week][0].pial for week in study.ceiling_weeks(w.brain)],
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
         carried=CARRIED_MESH,
     output:
         CEILING,
+    log:
+        f"{STUDY}/logs/registration_ceiling.{{brain}}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/registration_ceiling.{{brain}}.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        start_week=from_brain("week"),
+        start_week=lambda w: brain_of(w).week,
         weeks=lambda w: study.ceiling_weeks(w.brain),
         run="registration",
         real=lambda w: [study.references[w.brain, week][0].id for week in study.ceiling_weeks(w.brain)],
@@ -108,35 +169,68 @@ rule displacement_agreement:
         carried=CARRIED_MESH,
     output:
         AGREEMENT,
+    log:
+        f"{RUN}/logs/displacement_agreement.log",
+    benchmark:
+        f"{RUN}/benchmarks/displacement_agreement.tsv"
+    conda:
+        ENVIRONMENT
     params:
         labels=lambda w: {
             "run": w.run,
-            "start_week": study.brains[w.brain].week,
+            "start_week": brain_of(w).week,
         },
-        registered=from_simulation("follows_registration"),
+        registered=lambda w: simulation_of(w).follows_registration,
     script:
         "../scripts/displacement_agreement.py"
+
+
+def onset_surfaces(wildcards):
+    """Return the hemispheres of a run and of the real brains that follow its start, and the last one's regions."""
+    one, real = simulation_of(wildcards), study.chains[wildcards.brain, "self"].brains
+    run_files = {f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides}
+    real_files = {f"real_{side}": [brain.measured.parts[side] for brain in real] for side in one.start.sides}
+    return {**run_files, **real_files, **real[-1].regions}
 
 
 # the weeks in which sulci begin, in a simulated brain and in the real ones that follow its start
 rule onset:
     input:
-        unpack(lambda w: study.onset_files(w.run, w.brain)),
+        unpack(onset_surfaces),
+        reports=lambda w: [brain.report for brain in study.chains[w.brain, "self"].brains],
+        correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         ONSET,
+    log:
+        f"{RUN}/logs/onset.log",
+    benchmark:
+        f"{RUN}/benchmarks/onset.tsv"
+    conda:
+        ENVIRONMENT
     params:
-        sides=from_brain("sides"),
+        sides=lambda w: brain_of(w).sides,
         radius_mm=CONFIG.metrics.curvature_radius_mm,
         run=lambda w: w.run,
         subject=lambda w: w.brain,
-        run_weeks=from_simulation("weeks"),
+        run_weeks=lambda w: simulation_of(w).weeks,
         real_weeks=lambda w: study.chains[w.brain, "self"].weeks,
     script:
         "../scripts/onset.py"
 
 
+# the tables of validation, and the files that each is joined from
+VALIDATION_TABLES = {
+    "prediction": [one.file(PREDICTION) for one in study.predictions],
+    "deviation": [one.file(DEVIATION["table"], week=week) for one in study.expected for week in one.real],
+    "validation": [one.file(VALIDATION) for one in study.validated],
+    "displacement_agreement": [one.file(AGREEMENT) for one in study.validated_carried],
+    "registration_ceiling": expand(CEILING, brain=study.carried),
+    "onset": [one.file(ONSET) for one in study.validated_carried],
+}
+
+
 rule validate:
     input:
-        [f"{STUDY}/{name}.csv" for name, files in study.validation_tables.items() if files],
+        [f"{STUDY}/{name}.csv" for name, files in VALIDATION_TABLES.items() if files],
         rules.deviation_scores.output if study.expected else [],
         asked_for(FIGURES, "validate"),

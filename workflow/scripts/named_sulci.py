@@ -8,26 +8,23 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.growth.carried_regions import PLACES_MM, find_places, regions_by_deformation
 from gyriflow.growth.channels import channels
 from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
-from gyriflow.io.volumes import read_label_volume
+from gyriflow.io.volumes import LabelSource, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
-from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import NO_REGION, SIDES, STRUCTURES
 from gyriflow.step import step
 
-files, read = snakemake.input, snakemake.params.read
+files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0], files.volume):
     drawing, drawn = read_yaml(files.drawing), read_label_volume(files.drawn)
     names = {number: sulcus["name"] for number, sulcus in enumerate(drawing["sulci"], start=1)}
+    drawn_on = LabelSource(Path(files.drawing).parent / drawing["labels"], "auto", SCHEMES[drawing["scheme"]])
     brains = []
-    for path, affine_from, scheme in (
-        (files.volume, read["affine_from"], LabelScheme(**read["scheme"])),
-        (Path(files.drawing).parent / drawing["labels"], "auto", SCHEMES[drawing["scheme"]]),
-    ):
-        volume = read_label_volume(path, affine_from=affine_from)
+    for labels in (params.labels, drawn_on):
+        volume, scheme = labels.read(), labels.scheme
         parts = {"cerebrum": scheme.cerebrum, "cortex": scheme.cortex}
         brains.append(channels(volume.labels, volume.affine, **parts, voxel_mm=PLACES_MM))
     between = find_places(*brains, threads=snakemake.threads)
-    back = np.eye(4) if snakemake.params.posed else read_pose(files.report).inverse
+    back = np.eye(4) if params.posed else read_pose(files.report).inverse
     for side in SIDES:
         points = transform_points(read_surface(files[side]).vertices, back)
         labels = np.full(len(points), NO_REGION)

@@ -4,8 +4,6 @@ from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, fro
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_surface, write_brain
-from gyriflow.io.volumes import read_label_volume
-from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
@@ -13,10 +11,9 @@ files = list(snakemake.input)
 settings = {"week": params.week, **params.settings}
 with step(snakemake.log[0], *files):
     require_checksums(params.checksums)
-    if params.scheme:
-        volume = read_label_volume(files[0], affine_from=params.affine_from, cropped=True)
-        scheme = LabelScheme(**params.scheme)
-        surface = from_labels(volume.labels, volume.affine, scheme, params.side, **settings)
+    if params.labels:
+        volume = params.labels.read(cropped=True)
+        surface = from_labels(volume.labels, volume.affine, params.labels.scheme, params.side, **settings)
     elif params.source == "hemispheres":
         left, right, declared = read_hemispheres(*files)
         settings |= {"coordinates": params.coordinates, **params.limits}

@@ -10,29 +10,26 @@ from gyriflow.io.surfaces import (
     write_surface,
     write_vertex_maps,
 )
-from gyriflow.io.volumes import read_label_volume
 from gyriflow.metrics.measure import measure_white
-from gyriflow.settings.schemes import LabelScheme
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
-source, settings = params.source, dict(params.surface)
-with step(snakemake.log[0], *source.values()):
+labels, settings = params.labels, dict(params.surface)
+with step(snakemake.log[0], *files.given):
     pial, pose = {side: read_surface(files[side]) for side in SIDES if files.get(side)}, read_pose(files.report)
     max_hole_mm = settings.pop("max_hole_mm")
-    if "labels" in source:
-        volume = read_label_volume(source["labels"], affine_from=params.affine_from, cropped=True)
-        of_labels = volume.labels, volume.affine, LabelScheme(**params.scheme)
-        sides = white_from_labels(*of_labels, pial, pose, **settings)
+    if labels:
+        volume = labels.read(cropped=True)
+        sides = white_from_labels(volume.labels, volume.affine, labels.scheme, pial, pose, **settings)
     else:
         whites = {
             name: read_one_hemisphere(path, name) if name in SIDES else read_surface(path)
-            for name, path in source.items()
+            for name, path in params.white.items()
         }
         sides = white_from_surfaces(whites, pial, pose, max_hole_mm=max_hole_mm, **settings)
     table, maps = measure_white(sides, params.curvature_radius_mm)
-    write_table(output.metrics, table.assign(**params.labels)[[*params.labels, *table.columns]])
+    write_table(output.metrics, table.assign(**params.columns)[[*params.columns, *table.columns]])
     for side, mesh in sides.items():
         write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side])
         write_vertex_maps(output[f"{side}_maps"], maps[side], STRUCTURES[side])

@@ -17,7 +17,7 @@ from ..geometry.triangles import Floats, transformed
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, write_json, write_text
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
-from .volumes import LabelVolume, read_label_volume, write_label_volume
+from .volumes import LabelVolume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
 BIDS_MAPS = {
@@ -81,7 +81,7 @@ class ExportedBrain:
     The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
     simulated brain, all but run, week and files are those of its start. The report has the pose of its surface.
     `template_maps` are at the vertices of another brain. The volume, which simulated brains of labels have, names the
-    start's `labels` with `affine_from`, in whose grid theirs are written, and `surface` and `thickness` of the whole.
+    start's `labels`, in whose grid theirs are written, and `surface` and `thickness` of the whole.
     """
 
     brain: str
@@ -225,7 +225,7 @@ def _template(measured: Sequence[ExportedBrain], names: Names) -> tuple[str, dic
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
-    start = read_label_volume(brain.volume["labels"], brain.volume["affine_from"])
+    start = brain.volume["labels"].read()
     mesh = transformed(read_surface(brain.volume["surface"]), back)
     (thickness,) = read_vertex_maps(brain.volume["thickness"]).values()
     return LabelVolume(layer_labels(mesh, thickness, start.labels.shape, start.affine), start.affine)

@@ -4,6 +4,7 @@ import logging
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import nibabel as nib
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
+from ..settings.schemes import LabelScheme
 from ..settings.terms import AffineSource
 from .files import AGAIN, AnyPath, atomic_write, reading, require_finite
 
@@ -40,6 +42,19 @@ class ScalarVolume:
 
     values: Floats
     affine: Floats
+
+
+class LabelSource(NamedTuple):
+    """A file of tissue labels, which of NIfTI's two matrices counts, and what its labels mean."""
+
+    # a tuple: Snakemake sees no change in parameters of other classes
+    path: str
+    affine_from: AffineSource
+    scheme: LabelScheme
+
+    def read(self, *, cropped: bool = False) -> LabelVolume:
+        """Read the volume as `read_label_volume` does."""
+        return read_label_volume(self.path, self.affine_from, cropped=cropped)
 
 
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:

@@ -305,7 +305,7 @@ def _of_regions(study: Study) -> Iterator[Figure]:
 def _of_validation(study: Study) -> Iterator[Figure]:
     options, target = {"runs": list(study.config.runs)}, "validate"
     if study.validated:
-        ceiling = f"{STUDY}/registration_ceiling.csv" if study.validation_tables["registration_ceiling"] else None
+        ceiling = f"{STUDY}/registration_ceiling.csv" if study.carried else None
         inputs: Given = {"validation": f"{STUDY}/validation.csv", "ceiling": ceiling}
         path = f"{OF_STUDY}/validation.png"
         yield Figure("validation_figure", path, "scores.validation_chart", inputs, options, target=target)
@@ -337,7 +337,7 @@ def _of_expected(one: Simulation) -> Iterator[Figure]:
     path = f"{OF_RUN}/expected.png"
     yield Figure("expected_figure", path, "pictures.runs_by_week", inputs, options, one.names, target="validate")
     for quantity in ("log_area", "thickness_difference_mm"):
-        if quantity == "log_area" or one.start.thickness_from:
+        if quantity == "log_area" or one.start.has_thickness:
             inputs = {"brains": {"real less expected": {week: [files] for week, files in away.items()}}}
             options, names = {"quantity": quantity, "views": AROUND}, {**one.names, "quantity": quantity}
             path = f"{OF_RUN}/deviation_{{quantity}}.png"

@@ -9,8 +9,11 @@ from ..units import week_tag
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
+SWEEP = f"{STUDY}/{{study}}"
 CALIBRATION = f"{STUDY}/calibration"
 WEEK = "week-{week}"
+PLACE = "results/{where}"
+"""The metrics of a brain, measured or simulated."""
 
 
 def file_of(pattern: str, **names: str | float) -> str:
@@ -37,10 +40,10 @@ def folded_of(*sides: Side) -> dict[str, str]:
 
 def maps_of(*sides: Side) -> dict[str, str]:
     """Return the files with maps on some hemispheres, beside the metrics of a brain."""
-    return {side: f"results/{{where}}/{side}.shape.gii" for side in sides}
+    return {side: f"{PLACE}/{side}.shape.gii" for side in sides}
 
 
-TEMPLATE_MAPS = "results/{where}/{side}.template.shape.gii"
+TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
 """Maps at the vertices of the study's template."""
 
 
@@ -100,7 +103,7 @@ FOLDING = {
     "summary": f"{RUN}/folding/summary.json",
 }
 
-MEASURES = {name: f"results/{{where}}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
+MEASURES = {name: f"{PLACE}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
 """Tables that are made for every brain, whatever hemispheres it has."""
 DISPLACEMENT = f"{RUN}/metrics/displacement.csv"
 VOLUMES = {"volumes": f"{BRAIN}/metrics/volumes.csv", "scores": f"{BRAIN}/metrics/published_centiles.csv"}
@@ -116,10 +119,10 @@ DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/met
 VALIDATION = f"{RUN}/metrics/validation.csv"
 AGREEMENT = f"{RUN}/metrics/displacement_agreement.csv"
 ONSET = f"{RUN}/metrics/onset.csv"
-COMPARED_MEMBER = f"{STUDY}/{{study}}/members/{{run}}/{{brain}}.csv"
+COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}.csv"
 CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
 
-_FOLDERS = (BRAIN, RUN, "results/{where}", f"{STUDY}/{{study}}", CALIBRATION, STUDY, "results/report")
+_FOLDERS = (BRAIN, RUN, PLACE, SWEEP, CALIBRATION, STUDY, "results/report")
 """Folders with logs and benchmarks of their own, those within others first."""
 
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from ..io.volumes import LabelSource
 from ..io.yaml_files import SCHEMES
 from ..settings.brains import Brain as GivenBrain
 from ..settings.folding import VARYING
 from ..settings.runs import Run
 from ..settings.terms import MEASURED, Side
-from ..settings.varying import Varying, files_of
+from ..settings.varying import Varying
 from . import paths
 
 Origin = Literal["self", "atlas"]
@@ -59,16 +60,16 @@ class Measured:
 class Brain:
     """A brain of the study, as `given` by the configuration.
 
-    `scheme` holds the fields of its labels' scheme. The files `thickness_from` and `white_from`, by what they are of,
-    give the thickness of its cortex and its white surfaces, if they are measured. Regions of the cortex are `given`,
-    `carried` from another brain, or `named` sulci; its metrics are measured by them where it `has_regions`.
+    `labels` is None where it is given by surfaces. Where it `has_thickness` or `has_white`, the thickness of its cortex
+    and its white surfaces are measured, from its labels or from given white surfaces. Regions of the cortex are
+    `given`, `carried` from another brain, or `named` sulci; its metrics are measured by them where it `has_regions`.
     `checksums` are the atlas and the SHA-256 of those of its files that are an atlas's, by path.
     """
 
     given: GivenBrain
-    scheme: Mapping[str, Any] | None
-    thickness_from: Mapping[str, str]
-    white_from: Mapping[str, str]
+    labels: LabelSource | None
+    has_thickness: bool
+    has_white: bool
     regions_from: Literal["given", "carried", "named"] | None
     has_regions: bool
     checksums: Mapping[str, tuple[str, str]]
@@ -105,15 +106,13 @@ class Brain:
         return [one for one in alike if None in (subject, one.given.subject) or one.given.subject == subject]
 
     @property
-    def registered_volume(self) -> str:
+    def registered(self) -> LabelSource:
         """The volume by which it is registered: its labels, or a mask made of its surface."""
-        return self.given.label_volume or paths.MASK.format(brain=self.id)
+        return self.labels or LabelSource(paths.MASK.format(brain=self.id), "auto", SCHEMES["binary"])
 
     @property
-    def registered(self) -> dict[str, Any]:
-        """How this volume is read, and the image beside it."""
-        scheme = self.scheme or SCHEMES["binary"].model_dump()
-        return {"image": self.given.image, "affine_from": self.given.affine_from, "scheme": scheme}
+    def scheme(self) -> dict[str, Any] | None:
+        return self.labels and self.labels.scheme.model_dump()
 
     @property
     def pial(self) -> str:
@@ -137,7 +136,7 @@ class Brain:
             week=self.week,
             sides=self.sides,
             surfaces=f"results/brains/{self.id}/surface",
-            thickness=paths.THICKNESS["measured"].format(brain=self.id) if self.thickness_from else [],
+            thickness=paths.THICKNESS["measured"].format(brain=self.id) if self.has_thickness else [],
             report=self.report,
             regions=self.regions if self.has_regions else {},
         )
@@ -158,7 +157,7 @@ class Brain:
             "image": self.given.image or [],
             "white": list(self.given.white_files.values()),
             "thickness": self.measured.thickness,
-            "measured": paths.THICKNESS["report"].format(brain=self.id) if self.thickness_from else [],
+            "measured": paths.THICKNESS["report"].format(brain=self.id) if self.has_thickness else [],
         }
 
 
@@ -253,22 +252,15 @@ class Simulation:
         return paths.TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
 
     @property
-    def map_sources(self) -> dict[str, dict[str, list[str]]]:
-        """The user's files of each parameter that has a map, under "map" and "surface"."""
-        return {
-            name: {"map": files_of(value.map), "surface": files_of(value.surface)}
-            for name in VARYING
-            if isinstance(value := getattr(self.settings, name), Varying) and value.map is not None
-        }
-
-    @property
-    def map_files(self) -> list[str]:
-        return [file for files in self.map_sources.values() for kind in files.values() for file in kind]
+    def mapped(self) -> dict[str, Varying]:
+        """Its parameters that the user gives a map of."""
+        values = {name: getattr(self.settings, name) for name in VARYING}
+        return {name: value for name, value in values.items() if isinstance(value, Varying) and value.map is not None}
 
     @property
     def maps(self) -> str | list[str]:
         """The file with the maps of its parameters and the shapes that it grows towards; none where it has neither."""
-        return paths.MAPS.format(run=self.base, brain=self.start.id) if self.shapes or self.map_sources else []
+        return paths.MAPS.format(run=self.base, brain=self.start.id) if self.shapes or self.mapped else []
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -305,31 +297,6 @@ class Simulation:
     def measured(self) -> list[Measured]:
         return [self.at(week) for week in self.weeks]
 
-    @property
-    def validation_files(self) -> dict[str, list[str]]:
-        """The files that tell what the run is worth, of each kind one for each week that has a real brain."""
-        return {
-            "simulated": [self.at(week).parts["whole"] for week in self.real],
-            "whole": [real.pial for real in self.real.values()],
-            **{name: [self.file(file, week=week) for week in self.real] for name, file in paths.READY.items()},
-        }
-
-    def deviation_files(self, week: float) -> dict[str, str | list[str]]:
-        """Return the files that tell how the real brain of a week deviates from the simulated one.
-
-        Those of `thickness` are in the order of the surfaces; there are none where one is not known.
-        """
-        expected = self.at(week)
-        rows = {"start": self.start.measured, "first": self.at(self.start.week), "expected": expected}
-        rows["real"] = self.real[week].measured
-        complete = all(row.thickness for row in rows.values())
-        return {
-            **{name: row.parts["whole"] for name, row in rows.items()},
-            "thickness": [str(row.thickness) for row in rows.values()] if complete else [],
-            "sides": expected.hemispheres,
-            "regions": list(expected.regions.values()),
-        }
-
 
 @dataclass(frozen=True)
 class Comparison:
@@ -343,31 +310,6 @@ class Comparison:
     week: float
     members: tuple[tuple[Simulation, Mapping[str, Any]], ...]
     real: Mapping[str, tuple[Brain, ...]]
-
-    @property
-    def inputs(self) -> dict[str, list[str]]:
-        """The files that the tables of the study are made from, member by member."""
-        patterns = {"comparisons": paths.COMPARED_MEMBER, "params": paths.PARAMETERS}
-        patterns |= {"summaries": paths.FOLDING["summary"], "zones": paths.FOLDING["zones"]}
-        return {name: [one.file(file, study=self.name) for one, _ in self.members] for name, file in patterns.items()}
-
-    @property
-    def rows(self) -> list[dict[str, Any]]:
-        return [{"run": one.run, "subject": one.start.id, "values": dict(values)} for one, values in self.members]
-
-    def files(self, run: str, brain: str) -> dict[str, list[str]]:
-        """Return the tables and surfaces of a run at the week of comparison and of the real brains, by kind.
-
-        The surfaces are the whole and its hemispheres, those of the real brains one after the other.
-        """
-        simulated = next(one for one, _ in self.members if one.names == {"run": run, "brain": brain}).at(self.week)
-        real = [brain.measured for brain in self.real[brain]]
-        folders = [row.folder for row in (simulated, *real)]
-        return {
-            **{name: [f"{folder}/{name}.csv" for folder in folders] for name in ("metrics", "spectra")},
-            "simulated": list(simulated.parts.values()),
-            "measured": [path for row in real for path in row.parts.values()],
-        }
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any, Literal
 
 from ..errors import InputError
+from ..io.volumes import LabelSource
 from ..io.yaml_files import SCHEMES
 from ..settings.brains import Brain as GivenBrain
 from ..settings.folding import output_weeks
@@ -70,9 +71,10 @@ def label_scheme(config: Config, brain: GivenBrain) -> LabelScheme:
 def _brain(
     given: GivenBrain, config: Config, refused: Collection[str], checksums: Mapping[str, tuple[str, str]]
 ) -> Brain:
-    scheme = label_scheme(config, given) if given.has_labels else None
-    labels = {"labels": str(given.label_volume)} if scheme and scheme.cortex else {}
-    all_white = config.metrics.white_surfaces == "all"
+    labels = None
+    if (volume := given.label_volume) is not None:
+        labels = LabelSource(volume, given.affine_from, label_scheme(config, given))
+    has_thickness = bool(given.white_files) or (labels is not None and bool(labels.scheme.cortex))
     whole = len(given.sides) == len(SIDES)
     regions = config.metrics.regions
     with_regions = [name for name in regions if name not in refused] if isinstance(regions, dict) else []
@@ -85,9 +87,9 @@ def _brain(
         regions_from = "named"
     return Brain(
         given=given,
-        scheme=scheme.model_dump() if scheme else None,
-        thickness_from=labels or given.white_files,
-        white_from=given.white_files or (labels if all_white else {}),
+        labels=labels,
+        has_thickness=has_thickness,
+        has_white=bool(given.white_files) or (has_thickness and config.metrics.white_surfaces == "all"),
         regions_from=regions_from,
         has_regions=bool(regions_from) and (bool(with_regions) or regions == "named_sulci"),
         checksums={path: checksums[path] for path in given.files if path in checksums},

@@ -69,7 +69,7 @@ class Study:
     def with_thickness_curve(self) -> list[str]:
         """The ids of the brains whose cortical thickness gives a curve, where some run follows it."""
         followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
-        return [brain.id for _, brain in self.growing if followed and brain.thickness_from]
+        return [brain.id for _, brain in self.growing if followed and brain.has_thickness]
 
     @property
     def unmatched_starts(self) -> dict[str, str]:
@@ -129,48 +129,19 @@ class Study:
         return [one for one in self.validated if one.start in starts and one.kind == "predicted"]
 
     @cached_property
-    def carried(self) -> list[str]:
-        """The ids of start brains that others of their series follow."""
-        return [start.id for start in self.starts if self.chains[start.id, "self"].later]
-
-    @cached_property
     def validated_carried(self) -> list[Simulation]:
-        return [one for one in self.validated if one.start.id in self.carried]
+        """Those of them whose start is registered with later brains of its series."""
+        return [one for one in self.validated if self.chains[one.start.id, "self"].later]
 
-    @cached_property
-    def validation_tables(self) -> dict[str, list[str]]:
-        """The tables of validation by name, and the files that each is joined from."""
-        compared = {one.start.id for one in self.validated}
-        table = paths.DEVIATION["table"]
-        return {
-            "prediction": [one.file(paths.PREDICTION) for one in self.predictions],
-            "deviation": [one.file(table, week=week) for one in self.expected for week in one.real],
-            "validation": [one.file(paths.VALIDATION) for one in self.validated],
-            "displacement_agreement": [one.file(paths.AGREEMENT) for one in self.validated_carried],
-            "registration_ceiling": [paths.CEILING.format(brain=id) for id in self.carried if id in compared],
-            "onset": [one.file(paths.ONSET) for one in self.validated_carried],
-        }
+    @property
+    def carried(self) -> list[str]:
+        """The ids of their start brains."""
+        starts = {one.start for one in self.validated_carried}
+        return [start.id for start in self.starts if start in starts]
 
     def ceiling_weeks(self, brain: str) -> list[float]:
         """Return the compared weeks that a start brain's mesh is carried to."""
         return [week for week in self.chains[brain, "self"].later_weeks if (brain, week) in self.references]
-
-    def ceiling_files(self, brain: str) -> dict[str, list[str]]:
-        """Return the surfaces that tell what registration alone is worth, week by week."""
-        weeks, files = self.ceiling_weeks(brain), paths.READY.items()
-        ready = {name: [paths.file_of(file, brain=brain, week=week) for week in weeks] for name, file in files}
-        return ready | {"whole": [self.references[brain, week][0].pial for week in weeks]}
-
-    def onset_files(self, run: str, brain: str) -> dict[str, str | list[str]]:
-        """Return the surfaces in which the beginning of sulci is looked for, and how they correspond."""
-        one, chain = self.simulations[run, brain], self.chains[brain, "self"]
-        return {
-            **{f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides},
-            **{f"real_{side}": [real.measured.parts[side] for real in chain.brains] for side in one.start.sides},
-            **chain.brains[-1].regions,
-            "reports": [real.report for real in chain.brains],
-            "correspondences": list(chain.correspondences),
-        }
 
     # what is measured
 
@@ -193,7 +164,7 @@ class Study:
             for brain in self.brains.values()
             for file in (
                 *paths.pial_of(*brain.sides).values(),
-                *(paths.THICKNESS.values() if brain.thickness_from else ()),
+                *(paths.THICKNESS.values() if brain.has_thickness else ()),
             )
         ]
 
@@ -205,24 +176,6 @@ class Study:
             for file in paths.folded_of(*one.start.sides).values()
             for week in one.weeks
         ]
-
-    @cached_property
-    def tables(self) -> dict[str, list[str]]:
-        """The tables of metrics by name, and the files that each is joined from."""
-        folders = [row.folder for row in self.measured.values()]
-        white = [brain.id for brain in self.brains.values() if brain.white_from]
-        labelled = [brain.id for brain in self.brains.values() if brain.given.has_labels]
-        return {
-            "metrics": [
-                *(f"{folder}/metrics.csv" for folder in folders),
-                *(paths.white_of()["metrics"].format(brain=id) for id in white),
-            ],
-            "spectra": [f"{folder}/spectra.csv" for folder in folders],
-            "regions": [f"{row.folder}/regions.csv" for row in self.measured.values() if row.regions],
-            "volumes": [paths.VOLUMES["volumes"].format(brain=id) for id in labelled],
-            "published_centiles": [paths.VOLUMES["scores"].format(brain=id) for id in labelled],
-            "displacement": self.files(paths.DISPLACEMENT),
-        }
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:
@@ -281,39 +234,11 @@ class Study:
         given = [one for one in self.brains.values() if one.regions_from == "given"]
         return min(given, key=lambda other: abs(other.week - week))
 
-    def region_inputs(self, brain: str) -> dict[str, str]:
-        """Return the regions that a brain gets, the surfaces that they are given on, and what carries them."""
-        given = self.giver_of_regions(brain)
-        surfaces = {f"given_{side}": given.measured.parts[side] for side in SIDES}
-        between = self.series.correspondence(given, self.brains[brain])
-        return {**given.regions, **surfaces, "given_report": given.report, "correspondence": between}
-
-    def posed_regions(self, brain: str) -> list[bool]:
-        """Return for the brain of the regions and the one that gets them whether they correspond in their poses."""
-        return self.series.posed(self.giver_of_regions(brain), self.brains[brain])
-
     def template_sides(self, row: Measured) -> list[Side]:
         """Return the hemispheres of a brain that have maps at the template's vertices."""
         # it may have been refused
         template = self.brains.get(self.config.metrics.template or "")
         return [side for side in row.sides if template is not None and side in template.sides]
-
-    def template_inputs(self, where: str, side: Side) -> dict[str, Any]:
-        """Return the surfaces of the template's hemisphere and of one that has maps, and how their brains correspond.
-
-        A simulated brain's surface is that of its start, whose vertices it keeps.
-        """
-        row, template = self.places[where], self.brains[self.config.metrics.template or ""]
-        brain = self.brains[row.subject]
-        if row.run != MEASURED:
-            row = self.simulations[row.run, row.subject].at(brain.week)
-        return {
-            "template": template.measured.parts[side],
-            "template_report": template.report,
-            "surface": row.parts[side],
-            "report": brain.report,
-            "correspondence": [] if brain is template else [self.series.correspondence(template, brain)],
-        }
 
     @property
     def exported(self) -> list[dict[str, Any]]:
@@ -322,12 +247,11 @@ class Study:
 
     def _exported(self, row: Measured, brain: Brain) -> dict[str, Any]:
         real = row.run == MEASURED
-        labels = {"labels": brain.given.label_volume, "affine_from": brain.given.affine_from}
-        white = paths.white_of(*row.sides) if real and brain.white_from else {}
+        white = paths.white_of(*row.sides) if real and brain.has_white else {}
         whites = {name: file.format(brain=brain.id) for name, file in white.items()}
         sides = [side for side in row.sides if whites]
         template = {side: paths.TEMPLATE_MAPS.format(where=row.where, side=side) for side in self.template_sides(row)}
-        volume = {**labels, "surface": row.parts["whole"], "thickness": row.thickness}
+        volume = {"labels": brain.labels, "surface": row.parts["whole"], "thickness": row.thickness}
         return {
             "brain": row.subject,
             "run": row.run,
@@ -342,7 +266,7 @@ class Study:
             "white_maps": {side: whites[f"{side}_maps"] for side in sides},
             "template": self.config.metrics.template,
             "template_maps": template,
-            "volume": volume if brain.given.has_labels and not real else {},
+            "volume": volume if brain.labels and not real else {},
         }
 
     # what the report and the table of quality say beside figures

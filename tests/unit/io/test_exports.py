@@ -24,7 +24,8 @@ from gyriflow.io.surfaces import (
     write_vertex_labels,
     write_vertex_maps,
 )
-from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.volumes import LabelSource, LabelVolume, read_label_volume, write_label_volume
+from gyriflow.io.yaml_files import SCHEMES
 
 VALIDATOR = shutil.which("bids-validator-deno")
 TABLES = {"metrics_wide": pd.DataFrame({"subject": ["case_1"], "area": [3.5], "depth": [np.nan]})}
@@ -147,7 +148,7 @@ def labels_of(folder):
     ball = sphere(10.0)
     write_surface(files["surface"], transformed(ball, POSE))
     write_vertex_maps(files["thickness"], {"thickness_mm": np.full(len(ball.vertices), 3.0)})
-    return files | {"affine_from": "auto"}
+    return files | {"labels": LabelSource(files["labels"], "auto", SCHEMES["binary"])}
 
 
 def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
@@ -183,7 +184,7 @@ def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain
     folder, volume = tmp_path / "bids", labels_of(tmp_path)
     export_bids(folder, [brain, replace(brain, run="a", week=24.0, volume=volume)], {}, "1", {})
     found = read_label_volume(folder / "sub-case1" / "anat" / "sub-case1_desc-agw2400_dseg.nii.gz")
-    start = read_label_volume(volume["labels"])
+    start = volume["labels"].read()
     np.testing.assert_array_equal(found.affine, start.affine)
     assert found.labels.shape == start.labels.shape
     assert found.labels[20, 20, 10] == 1

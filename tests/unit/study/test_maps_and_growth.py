@@ -35,15 +35,14 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     }
     assert list(settings["growth_rate_per_s"]["weeks"]) == [21.0, 30.0]
     assert "ranks" not in settings
-    assert with_maps.map_sources == {
-        "thickness_mm": {
-            "map": [str(tmp_path / "left.gii"), str(tmp_path / "right.gii")],
-            "surface": [str(tmp_path / "left.surf.gii"), str(tmp_path / "right.surf.gii")],
-        },
-        "growth_rate_per_s": {"map": [str(tmp_path / "left.gii")], "surface": [str(tmp_path / "left.surf.gii")]},
-        "shear_modulus_core_pa": {"map": [str(tmp_path / "soft.nii.gz")], "surface": []},
+    given = {name: (value.map, value.surface) for name, value in with_maps.mapped.items()}
+    left, right = (str(tmp_path / side) for side in ("left", "right"))
+    assert given == {
+        "thickness_mm": tuple((f"{left}{kind}", f"{right}{kind}") for kind in (".gii", ".surf.gii")),
+        "growth_rate_per_s": (f"{left}.gii", f"{left}.surf.gii"),
+        "shear_modulus_core_pa": (str(tmp_path / "soft.nii.gz"), None),
     }
-    assert plain.map_sources == {}
+    assert plain.mapped == {}
     assert plain.parameters["thickness_mm"] == 1e-8
 
 

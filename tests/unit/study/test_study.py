@@ -11,7 +11,7 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
-from gyriflow.study.paths import CURVES, FOLDING
+from gyriflow.study.paths import CURVES
 
 EXAMPLES = Path(__file__).parents[3] / "config" / "examples"
 CURVE = {21: 99, 24: 150}
@@ -96,7 +96,11 @@ def test_maps_are_made_for_the_runs_that_have_any(files, labels):
     found = study([labels(21), labels(24)], runs=runs, calibrate=search)
     maps = {run: found.simulations[run, "b21"].maps for run in runs}
     assert maps == {"plain": []} | {run: f"results/runs/{run}/b21/folding/maps.h5" for run in list(runs)[1:]}
-    assert found.simulations["thick", "b21"].map_files == [*pair, *pair]
+    assert {run: list(found.simulations[run, "b21"].mapped) for run in ("thick", "soft", "shapes")} == {
+        "thick": ["thickness_mm"],
+        "soft": ["shear_modulus_core_pa"],
+        "shapes": [],
+    }
     # runs of the calibration have the maps of its base
     assert found.simulations["calibration-00", "b21"].maps == maps["soft"]
 
@@ -348,9 +352,9 @@ def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_the
     start = {"id": "own22", "week": 22, "pial": str(files / "pial.gii"), "population": "own"}
     found = study([start, *of_two()], **EXPECTED)
     assert list(found.chains["own22", "atlas"].posed) == [[True, False], [False, False], [False, False]]
-    assert found.brains["own22"].registered_volume == "results/brains/own22/surface/mask.nii.gz"
-    assert found.brains["own22"].registered["scheme"]["name"] == "binary"
-    assert found.brains["b21"].registered_volume == str(files / "labels.nii.gz")
+    assert found.brains["own22"].registered.path == "results/brains/own22/surface/mask.nii.gz"
+    assert found.brains["own22"].registered.scheme.name == "binary"
+    assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
 
 
 def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(of_two):
@@ -389,16 +393,11 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
 
 
 def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
-    found = study(of_two(22, 23, 24), **EXPECTED)
-    compared = found.simulations["a", "own22"].deviation_files(24)
-    assert compared["expected"] == "results/runs/a/own22/surfaces/week-24.00/pial.surf.gii"
-    assert compared["real"] == surface("own24")
-    places = [path.split("/")[-2] for path in compared["thickness"]]
-    assert places == ["surface", "week-22.00", "week-24.00", "surface"]
-    assert len(found.validation_tables["deviation"]) == 2
+    (expected,) = study(of_two(22, 23, 24), **EXPECTED).expected
+    assert ids(expected.real.values()) == ["own23", "own24"]
     # whose growth is its own explains
     own = study(of_two(22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
-    assert own.validation_tables["deviation"] == own.expected == []
+    assert own.expected == []
 
 
 # studies and calibration
@@ -408,18 +407,11 @@ def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real
     varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 23}
     found = study(real, runs={"reference": {"thickness_mm": 1.0}}, studies={"thick": varied})
     compared = found.comparisons["thick"]
-    assert [row["run"] for row in compared.rows] == ["reference", "thick-2"]
-    assert compared.inputs["summaries"] == [
-        FOLDING["summary"].format(run=run, brain="b21") for run in ("reference", "thick-2")
-    ]
+    assert [one.run for one, _ in compared.members] == ["reference", "thick-2"]
     place = found.places["runs/thick-2/b21/metrics/week-23.00"]
     assert place.labels == {"subject": "b21", "run": "thick-2", "week": 23}
     assert place.thickness == "results/runs/thick-2/b21/surfaces/week-23.00/thickness.shape.gii"
     assert place.where not in found.measured
-    files = compared.files("thick-2", "b21")
-    assert files["metrics"] == [f"{place.folder}/metrics.csv", "results/brains/b23/metrics/metrics.csv"]
-    assert files["simulated"] == list(place.parts.values())
-    assert files["measured"][0] == surface("b23")
     assert [brain.population for brain in compared.real["b21"]] == ["unknown"]
 
 
@@ -441,32 +433,20 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
     sphere = {"id": "sphere", "week": 22, **SPHERE}
     found = study([labels(21), labels(22), sphere], metrics={"regions": given})
     assert [brain.regions_from for brain in found.brains.values()] == ["given", "carried", None]
-    inputs = found.region_inputs("b22")
-    assert inputs["left_regions"] == "results/brains/b21/metrics/left.regions.label.gii"
-    assert inputs["given_left"] == "results/brains/b21/surface/left.pial.surf.gii"
-    assert inputs["correspondence"] == "results/study/registration/b21/b22.h5"
     # those of a run hold at all its weeks
     regions = found.places["runs/reference/b21/metrics/week-22.00"].regions
     assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
 
 
-def test_named_sulci_are_those_of_real_whole_brains_and_name_what_begins(real):
+def test_named_sulci_are_those_of_real_whole_brains(real):
     sphere = {"id": "sphere", "week": 22, **SPHERE}
     found = study([*real, sphere])
     assert [brain.regions_from for brain in found.brains.values()] == ["named"] * 4 + [None]
     assert [one.regions for one in found.measured.values()] == [{}] * len(found.measured)
-    onset = found.onset_files("reference", "b21")
-    assert onset["left_regions"] == "results/brains/b24/metrics/left.regions.label.gii"
     everywhere = study([*real, sphere], metrics={"regions": "named_sulci"}).brains.values()
     assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
 
 
 def test_maps_are_brought_to_a_template_that_is_there(labels):
     found = study([labels(21), labels(22)], metrics={"template": "b22"})
-    inputs = found.template_inputs("runs/reference/b21/metrics/week-24.00", "left")
-    # a simulated brain keeps the vertices of its start
-    assert inputs["surface"] == "results/runs/reference/b21/surfaces/week-21.00/left.pial.surf.gii"
-    assert inputs["template"] == "results/brains/b22/surface/left.pial.surf.gii"
-    assert inputs["correspondence"] == ["results/study/registration/b22/b21.h5"]
-    assert found.template_inputs("brains/b22/metrics", "left")["correspondence"] == []
     assert {len(one["template_maps"]) for one in found.exported} == {2}
