@@ -24,7 +24,7 @@ import pandas as pd
 from scipy.ndimage import map_coordinates
 
 from gyriflow.compare.distances import aligned_distances
-from gyriflow.compare.placement import correlation, values_on
+from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -166,7 +166,7 @@ def main() -> None:
             for model, surface in models.items():
                 row = {"law": law, "individual": name, "horizon": week - start, "model": model}
                 row["distance_mm"] = aligned_distances(surface, real)["distance_mm"]
-                values = values_on(folds, prepare_for_comparison(surface, real))[0]["shape_index"]
+                values = interpolate_measures(prepare_for_comparison(surface, real), folds)[0]["shape_index"]
                 row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
                 rows.append(row)
     for value in ("distance_mm", "r_shape_index"):

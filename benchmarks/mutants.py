@@ -47,9 +47,11 @@ BY_TESTS = {
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
     "compare/test_placement.py": [
-        ("src/gyriflow/compare/placement.py", "SKILLED_FROM = 1.5", "SKILLED_FROM = 0.5"),
-        ("src/gyriflow/compare/prediction.py", '["run", "target"]', '["run"]'),
-        ("src/gyriflow/compare/prediction.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),
+        ("src/gyriflow/compare/placement.py", "MIN_SKILL_HORIZON_GW = 1.5", "MIN_SKILL_HORIZON_GW = 0.5")
+    ],
+    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '["run", "target"]', '["run"]')],
+    "compare/test_deviation.py": [("src/gyriflow/compare/prediction.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0")],
+    "compare/test_validation.py": [
         ("src/gyriflow/compare/validation.py", 'row[f"real_{name}"] - 1', '-row[f"real_{name}"] + 1'),
     ],
     "compare/test_calibration.py": [("src/gyriflow/compare/calibration.py", "- finished.min()", "- finished.max()")],

@@ -1,8 +1,6 @@
-"""How the displacement of a run's pial vertices agrees with that of the real brains, interval by interval."""
+"""How the displacement of a run's pial vertices agrees with the measured one, interval by interval."""
 
-import numpy as np
-
-from gyriflow.compare.validation import displacement_table
+from gyriflow.compare.displacement import displacement_table
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.files import write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
@@ -12,10 +10,10 @@ from gyriflow.step import step
 files, labels = snakemake.input, snakemake.params.labels
 with step(snakemake.log[0]):
     carried, weeks = read_weekly_shapes(files.carried), read_weeks(files.frames)
-    both = [week for week in weeks if week in carried.weeks]
+    shared = [week for week in weeks if week in carried.weeks]
     start = read_positions(files.frames, weeks[0])
     surface, pial = boundary_surface(TetrahedralMesh(start, read_tets(files.frames)))
-    simulated = np.stack([read_positions(files.frames, week)[pial] for week in both])
-    measured = np.stack([carried.positions[np.flatnonzero(carried.weeks == week)[0]][pial] for week in both])
-    table = displacement_table(both, simulated, measured, surface.faces, registered=snakemake.params.registered)
+    simulated = [read_positions(files.frames, week)[pial] for week in shared]
+    measured = [carried.positions[carried.index(week)][pial] for week in shared]
+    table = displacement_table(shared, simulated, measured, surface.faces, registered=snakemake.params.registered)
     write_table(snakemake.output[0], table.assign(**labels)[[*labels, *table.columns]])

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from gyriflow.compare.placement import drawn_patches
+from gyriflow.compare.placement import make_patches
 from gyriflow.compare.prediction import endpoints, with_skill
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -22,7 +22,7 @@ with step(snakemake.log[0]):
     for number, week in enumerate(params.weeks):
         real = read_surface(files.whole[number])
         real_shape = PreparedSurface(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
-        patch, _ = drawn_patches(real_shape, mirrored=True)
+        patch, _ = make_patches(real_shape, mirrored=True)
         at = int(np.argmin(np.abs(targets.weeks - week)))
         target = TriangleMesh(targets.positions[at][used], start.faces)
         volume = signed_volume(target)

@@ -16,7 +16,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
-from .placement import MEASURES, correlation, values_on
+from .placement import MEASURES, correlation, interpolate_measures
 from .shapes import PreparedSurface, curvature_differences
 
 DIGITS = 6
@@ -95,7 +95,7 @@ def shape_scores(run: PreparedSurface, real: PreparedSurface, names: Collection[
     shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is
     curvature_distance_per_mm of `shapes.curvature_differences`.
     """
-    values, _ = values_on(real, run)
+    values, _ = interpolate_measures(run, real)
     scores = {measure: 1 - correlation(getattr(real, measure), values[measure], real.areas) for measure in MEASURES}
     scores["curvature_distribution"] = curvature_differences(run, real)["curvature_distance_per_mm"]
     return {name: scores[name] for name in names}

@@ -1,4 +1,4 @@
-"""Whether folds are where they are in the real brain: correlation of curvature, and skill over no folding at all."""
+"""Placement of folds: correlation of curvature with the observed brain, and skill over a brain without new folds."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,68 +11,81 @@ from .shapes import PreparedSurface
 
 MEASURES = ("shape_index", "mean_curvature")
 
-PATCH_MM = 20.0
+PATCH_EDGE_MM = 20.0
 """Edge of the patches that the bootstrap draws: wider than a gyrus with its sulcus."""
 
-SYMMETRIC_MM = 0.4
-"""Mean distance of a brain from its mirror image below which its sides are one observation: half a voxel of atlases."""
+SYMMETRY_TOL_MM = 0.4
+"""Mean distance to the mirror image below which both sides count as one observation: half a voxel of atlases."""
 
-SKILLED_FROM = 1.5
-"""Weeks: before, the adjacent brain is the start itself."""
+MIN_SKILL_HORIZON_GW = 1.5
+"""Within shorter horizons the adjacent brain is the start itself, so skill has no baseline."""
 
-DRAWS = 2000
+N_DRAWS = 2000
 INTERVAL = (0.025, 0.975)
 
 
-def correlation(one: Floats, other: Floats, weights: Floats) -> float:
+def correlation(x: Floats, y: Floats, weights: Floats) -> float:
     """Return the weighted Pearson correlation of (n,) values; NaN where one of them is constant."""
-    return float(_correlations(_products(one, other, weights).sum(axis=0)[None])[0])
+    return float(_correlations(_products(x, y, weights).sum(axis=0)[None])[0])
 
 
 def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
-    """Return (r − r_start)/(r_adjacent − r_start): 1 is as good as the real brain of the week before, 0 as the start.
+    """Return (r − r_start)/(r_adjacent − r_start): 0 is as good as the scaled start, 1 as the observed week before.
 
-    NaN within two weeks of the start, and where the adjacent week is no better than the start.
+    NaN for horizons (GW) up to `MIN_SKILL_HORIZON_GW`, and where the adjacent week is no better than the start.
     """
     room = r_adjacent - r_start
-    return float((r - r_start) / room) if horizon > SKILLED_FROM and room > 0 else float("nan")
+    return float((r - r_start) / room) if horizon > MIN_SKILL_HORIZON_GW and room > 0 else float("nan")
 
 
-def values_on(real: PreparedSurface, other: PreparedSurface) -> tuple[dict[str, Floats], float]:
-    """Take the measures of another shape at the vertices of the real one, both laid onto each other.
+def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) -> tuple[dict[str, Floats], float]:
+    """Interpolate the measures of a surface at the n vertices of the observed one, both aligned.
 
-    To each vertex belongs the nearest point of the other whose normal agrees. Returns (n,) values by measure, and the
-    part of the real area for which there is such a point.
+    Each vertex takes the value at the nearest point whose normal agrees. Returns (n,) values by measure, and the share
+    of the observed area for which there is such a point.
     """
-    match = match_surface(real.mesh, other.mesh)
-    values = {measure: values_at(match, getattr(other, measure)) for measure in MEASURES}
-    return values, float(np.average(match.agrees, weights=real.areas))
+    match = match_surface(observed.mesh, surface.mesh)
+    values = {measure: values_at(match, getattr(surface, measure)) for measure in MEASURES}
+    return values, float(np.average(match.agrees, weights=observed.areas))
 
 
-def placement(
-    real: PreparedSurface, run: PreparedSurface, start: PreparedSurface, adjacent: PreparedSurface, *, horizon: float
+def score_placement(
+    simulated: PreparedSurface,
+    observed: PreparedSurface,
+    start: PreparedSurface,
+    adjacent: PreparedSurface,
+    *,
+    horizon: float,
 ) -> dict[str, float | bool]:
-    """Tell how well the folds of a run are placed in a week, all shapes ready and laid onto the real brain.
+    """Score how well the folds of a simulated brain lie where the observed brain has its own.
 
-    Correlations are those of `values_on`, weighted by area over the whole surface. For each of `MEASURES`: r_…,
-    r_start_…, r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… from patches drawn with
-    replacement (Efron and Tibshirani 1993), and skill_…. matched_share is the part of the real surface's area for which
-    an agreeing point of the run was found. asymmetry_mm and mirrored_patches are those of `drawn_patches`.
+    Correlations r are weighted by area over the whole observed surface. For each of `MEASURES`: r_…, r_start_…,
+    r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… from patches drawn with
+    replacement (Efron and Tibshirani 1993), and skill_…. Further matched_share, the share of the observed area with a
+    matching point on the simulated brain, and asymmetry_mm and mirrored_patches of `make_patches`.
 
-    `start` is the start brain scaled up: no folding at all; `adjacent` the real brain of the week before. The horizon
-    is in weeks since the start.
+    Parameters
+    ----------
+    simulated, observed
+        Prepared for comparison and aligned, as are the baselines.
+    start
+        The start brain scaled to the observed volume, which has no new folds.
+    adjacent
+        The observed brain of the week before.
+    horizon
+        Weeks since the start.
     """
-    on_run, share = values_on(real, run)
-    (on_start, _), (on_adjacent, _) = values_on(real, start), values_on(real, adjacent)
-    patch, drawn = drawn_patches(real)
-    row = {"matched_share": share} | drawn
-    areas = real.areas
+    simulated_values, matched_share = interpolate_measures(simulated, observed)
+    start_values, adjacent_values = (interpolate_measures(surface, observed)[0] for surface in (start, adjacent))
+    patch, symmetry = make_patches(observed)
+    row = {"matched_share": matched_share} | symmetry
+    areas = observed.areas
     for measure in MEASURES:
-        truth = getattr(real, measure)
-        r = correlation(truth, on_run[measure], areas)
-        r_start = correlation(truth, on_start[measure], areas)
-        r_adjacent = correlation(truth, on_adjacent[measure], areas)
-        low, high = gain_interval(truth, on_run[measure], on_start[measure], areas, patch)
+        truth = getattr(observed, measure)
+        r = correlation(truth, simulated_values[measure], areas)
+        r_start = correlation(truth, start_values[measure], areas)
+        r_adjacent = correlation(truth, adjacent_values[measure], areas)
+        low, high = gain_interval(truth, simulated_values[measure], start_values[measure], areas, patch)
         row |= {
             f"r_{measure}": r,
             f"r_start_{measure}": r_start,
@@ -85,73 +98,73 @@ def placement(
     return row
 
 
-def drawn_patches(real: PreparedSurface, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
-    """Return for each vertex the number of the patch that is drawn with it, and how patches were made.
+def make_patches(surface: PreparedSurface, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
+    """Return the (n,) patch number of each vertex, and how symmetric the brain is.
 
-    asymmetry_mm is the mean distance of the brain from its mirror image. Where it is below `SYMMETRIC_MM`, or where
-    `mirrored` asks for it, a patch is drawn together with its mirror image: mirrored_patches is true.
+    asymmetry_mm is the mean distance of the brain from its mirror image. mirrored_patches is true if a patch and its
+    mirror image are drawn together: below `SYMMETRY_TOL_MM`, or on request (`mirrored`).
     """
-    image, asymmetry_mm = mirror_places(real.mesh, real.areas)
-    together = mirrored or asymmetry_mm < SYMMETRIC_MM
-    patch = patches(real.mesh.vertices, real.areas, PATCH_MM, image if together else None)
+    image, asymmetry_mm = mirror_image(surface.mesh, surface.areas)
+    together = mirrored or asymmetry_mm < SYMMETRY_TOL_MM
+    patch = number_patches(surface.mesh.vertices, surface.areas, PATCH_EDGE_MM, image if together else None)
     return patch, {"asymmetry_mm": asymmetry_mm, "mirrored_patches": together}
 
 
-def mirror_places(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
-    """Return where the mirror image of each vertex lies, (n, 3), and the mean distance of the two surfaces in mm.
+def mirror_image(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
+    """Return the (n, 3) mirror images of the vertices, and the mean distance in mm of the image from the surface.
 
-    The image, mirrored along x (left to right), is laid onto the surface rigidly.
+    The surface is mirrored along x (left to right) and aligned with itself.
     """
     image = transformed(mesh, MIRROR)
     aligned = align(image, mesh)
     return aligned.vertices, float(np.average(nearest_on(aligned.vertices, mesh)[0], weights=areas))
 
 
-def patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
-    """Number the patches, about `edge_mm` wide, of (n,) vertices; the same in every call.
+def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
+    """Divide (n, 3) points into patches about `edge_mm` wide and return the (n,) number of each point's patch.
 
-    Patches are nearest to seeds that are spread by farthest points. With the (n, 3) places of the vertices' mirror
-    images, a patch and its mirror image have one number.
+    Patches are the Voronoi cells of seeds chosen by farthest-point sampling, so every call gives the same. With
+    `mirrored`, the (n, 3) mirror images of the points, a patch and its mirror image have the same number.
     """
     sides = 1
     if mirrored is not None:
         sides, points = 2, np.where((points[:, 0] < mirrored[:, 0])[:, None], points, mirrored)
     count = max(2, round(float(areas.sum()) / edge_mm**2 / sides))
     seeds = [0]
-    away = np.linalg.norm(points - points[0], axis=1)
+    distances = np.linalg.norm(points - points[0], axis=1)
     for _ in range(count - 1):
-        seeds.append(int(away.argmax()))
-        away = np.minimum(away, np.linalg.norm(points - points[seeds[-1]], axis=1))
+        seeds.append(int(distances.argmax()))
+        distances = np.minimum(distances, np.linalg.norm(points - points[seeds[-1]], axis=1))
     return np.asarray(cKDTree(points[seeds]).query(points)[1], dtype=np.int64)
 
 
 def gain_interval(
-    truth: Floats, run: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer]
+    truth: Floats, simulated: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer]
 ) -> tuple[float, float]:
-    """Return the 95 % interval of r(run) − r(start) when whole patches of the surface are drawn with replacement."""
+    """Return the 95 % interval of r(simulated) − r(start) when whole patches are drawn with replacement."""
     drawn = draw_patches(patch)
-    r_run, r_start = (drawn_correlations(truth, values, areas, patch, drawn) for values in (run, start))
-    low, high = np.nanquantile(r_run - r_start, INTERVAL)
+    r_simulated, r_start = (drawn_correlations(truth, values, areas, patch, drawn) for values in (simulated, start))
+    low, high = np.nanquantile(r_simulated - r_start, INTERVAL)
     return float(low), float(high)
 
 
 def draw_patches(patch: NDArray[np.integer]) -> Ints:
-    """Draw patches with replacement: how often each of p is drawn, (DRAWS, p)."""
+    """Draw patches with replacement: how often each of p is drawn, (N_DRAWS, p)."""
     count = int(patch.max()) + 1
-    return np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=DRAWS)
+    return np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
 
 
 def drawn_correlations(
-    truth: Floats, other: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
+    truth: Floats, values: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
 ) -> Floats:
-    """Return the (DRAWS,) correlations of values at vertices over the patches that are drawn."""
-    columns = _products(truth, other, areas).T
+    """Return the (N_DRAWS,) area-weighted correlations of (n,) values over the patches of each draw."""
+    columns = _products(truth, values, areas).T
     sums: Floats = np.stack([np.bincount(patch, column) for column in columns], axis=1)
     return _correlations(np.asarray(drawn @ sums, dtype=float))
 
 
-def _products(one: Floats, other: Floats, weights: Floats) -> Floats:
-    return weights[:, None] * np.stack([np.ones_like(one), one, other, one * one, other * other, one * other], axis=1)
+def _products(x: Floats, y: Floats, weights: Floats) -> Floats:
+    return weights[:, None] * np.stack([np.ones_like(x), x, y, x * x, y * y, x * y], axis=1)
 
 
 def _correlations(sums: Floats) -> Floats:

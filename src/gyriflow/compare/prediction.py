@@ -19,7 +19,7 @@ from ..geometry.triangles import (
     vertex_normals,
 )
 from .distances import drawn_distances, pairwise_distances, surface_distances
-from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, values_on
+from .placement import INTERVAL, MEASURES, correlation, draw_patches, drawn_correlations, interpolate_measures
 from .shapes import PreparedSurface, cortex_dice
 
 SMOOTHING_MM = 3.0
@@ -61,7 +61,7 @@ def endpoints(
     """
     aligned = align(predicted, real)
     pair, areas = pairwise_distances(aligned, real, real_shape.mesh), real_shape.areas
-    values, _ = values_on(real_shape, shape)
+    values, _ = interpolate_measures(shape, real_shape)
     drawn = draw_patches(patch)
     away = drawn_distances(pair, real_shape.mesh.vertices, patch, drawn)
     r = drawn_correlations(real_shape.shape_index, values["shape_index"], areas, patch, drawn)

@@ -58,14 +58,22 @@ def followed_sizes(
     return tables
 
 
-def curves_of_run(growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None) -> list[Curve]:
-    """Return the curves of `SIZES` that a run followed, those through the measured brains, or none.
+def sizes_on_curves(
+    growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float]
+) -> dict[float, dict[str, float]]:
+    """Return by week the `SIZES` that a run was to have, or those of the measured brains; empty where neither is known.
 
-    `growth` is the section of the run's parameters.
+    `growth` is the section of the run's parameters, with tables of the sizes if it followed any. `curves` has the
+    columns series, quantity, week and value; InputError where it is given without the start brain's `series`.
     """
     if SIZES[0] in growth:
-        return [tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True) for name in SIZES]
-    return [] if curves is None else [_measured(curves, series, name) for name in SIZES]
+        found = [tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True) for name in SIZES]
+    elif curves is not None:
+        found = [_measured(curves, series, name) for name in SIZES]
+    else:
+        found = []
+    by_name = dict(zip(SIZES, found, strict=False))
+    return {week: {name: float(value(curve, week)) for name, curve in by_name.items()} for week in weeks}
 
 
 def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:

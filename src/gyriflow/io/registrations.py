@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.triangles import Floats, TriangleMesh
 from .files import AnyPath, new_hdf5, reading_hdf5
@@ -54,6 +55,14 @@ class WeeklyShapes:
     positions: Floats
     sizes: Mapping[str, Floats] = field(default_factory=dict)
     surfaces: Mapping[str, Sequence[Floats]] = field(default_factory=dict)
+
+    def index(self, week: float) -> int:
+        """Return the number of a week among those of the shapes; InputError where it is missing."""
+        found = np.flatnonzero(self.weeks == week)
+        if not len(found):
+            weeks = ", ".join(f"{known:g}" for known in self.weeks)
+            raise InputError(f"the mesh has no shape at {week:g} GW", found=f"shapes at {weeks} GW", remedy=AGAIN)
+        return int(found[0])
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:

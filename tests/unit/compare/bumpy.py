@@ -18,10 +18,10 @@ def field(directions: Floats, seed: int, sharpness: float = 12.0, bumps: int = 4
     return np.exp(sharpness * (directions @ places.T - 1)) @ generator.choice([-1.0, 1.0], bumps)
 
 
-def bumpy(seed: int, height: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
+def bumpy(seed: int, height: float = 1.0, sharpness: float = 12.0, subdivisions: int = 4) -> TriangleMesh:
     """Return a sphere with bumps and dents of a height in mm."""
     ball = sphere(1.0, subdivisions)
-    radius = RADIUS + height * field(ball.vertices, seed)
+    radius = RADIUS + height * field(ball.vertices, seed, sharpness)
     return TriangleMesh(ball.vertices * radius[:, None], ball.faces)
 
 

@@ -112,6 +112,10 @@ def test_carried_meshes_are_read_as_written(tmp_path):
     read = read_weekly_shapes(tmp_path / "carried.h5")
     assert read.weeks.tolist() == [21.0, 22.5]
     assert read.positions == pytest.approx(carried.positions, abs=1e-5)
+    assert [read.index(week) for week in (21.0, 22.5)] == [0, 1]
+    with pytest.raises(InputError) as refused:
+        read.index(22.0)
+    assert all(fact in str(refused.value) for fact in ("22 GW", "21, 22.5 GW"))
     (tmp_path / "torn.h5").write_bytes(b"torn")
     with pytest.raises(InputError, match=r"torn\.h5: cannot be read as shapes of a mesh"):
         read_weekly_shapes(tmp_path / "torn.h5")

@@ -6,7 +6,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.growth.curves import curve_table, errors, fitted, interval, rate, tabulated, value
-from gyriflow.growth.following import fits_of_series, followed_sizes
+from gyriflow.growth.following import fits_of_series, followed_sizes, sizes_on_curves
 from gyriflow.growth.rates import growth_rates, rates_of_series
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -132,6 +132,19 @@ def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
         with pytest.raises(InputError, match="no measured curve of area_cm2"):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
+
+
+def test_sizes_of_a_week_are_those_followed_or_else_the_measured_ones():
+    table = {"area_cm2": {21.0: 100.0, 25.0: 144.0}, "volume_ml": {21.0: 40.0, 25.0: 90.0}}
+    followed = sizes_on_curves({"model": "sizes", **table}, curves(), "volume", [21.0, 23.0])
+    assert followed[21.0] == pytest.approx({"area_cm2": 100, "volume_ml": 40})
+    # logarithms are interpolated
+    assert followed[23.0] == pytest.approx({"area_cm2": 120, "volume_ml": 60})
+    measured = sizes_on_curves({"model": "rates"}, curves(), "volume", [23.0])
+    assert measured[23.0] == pytest.approx({"area_cm2": 90 * 1.21, "volume_ml": 46 * 1.44}, rel=5e-3)
+    assert sizes_on_curves({"model": "rates"}, None, None, [23.0]) == {23.0: {}}
+    with pytest.raises(InputError):
+        sizes_on_curves({"model": "rates"}, curves(), "other", [23.0])
 
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
