@@ -30,7 +30,7 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
-from ..settings.terms import MOST_HOLE_MM
+from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
 from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks
@@ -251,7 +251,7 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[0]:.1f} mm across",
             expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
             remedy="Give a closed surface, or raise surface.max_hole_mm if the opening may be covered."
-            if wide[0] <= MOST_HOLE_MM
+            if wide[0] <= MAX_HOLE_MM
             else "Give a closed surface: holes of this size are not to be covered.",
         )
     vertices, faces = [mesh.vertices], [mesh.faces]

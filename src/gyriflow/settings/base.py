@@ -1,6 +1,6 @@
-"""The base of all settings: a key's docstring is its description, with the unit, and problems are told together.
+"""Base class of all settings. A key's docstring is its description; all problems are reported together.
 
-Pydantic checks single keys. `Settings.problems` checks them against each other, where all are valid.
+Pydantic checks single keys. `Settings.problems` checks keys against each other once each is valid.
 """
 
 import difflib
@@ -26,24 +26,24 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from ..errors import InputError
 
 PROBLEM = "problem"
-"""Type of the errors whose message says what was found."""
+"""Type of the errors whose message already contains the value found."""
 
 
 @dataclass(frozen=True)
 class KeyProblem:
-    """A mistake, and the path of its key below the settings that are checked."""
+    """A mistake and the path of its key, relative to the settings that are checked."""
 
     text: str
     key: tuple[str | int, ...] = ()
 
 
 def refused(text: str) -> PydanticCustomError:
-    """Return the error that a validator of one key raises so that `text` becomes its whole message."""
+    """Return an error for a validator of one key, with `text` as its complete message."""
     return PydanticCustomError(PROBLEM, text)
 
 
 class Settings(BaseModel):
-    """Settings that are validated as a whole and cannot change afterwards."""
+    """Frozen settings, validated as a whole."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -77,7 +77,7 @@ class Settings(BaseModel):
         return settings
 
     def problems(self) -> Iterable[KeyProblem]:
-        """Return what is wrong between keys that are valid each."""
+        """Return the problems between keys that are each valid."""
         return ()
 
     def is_set(self, key: str) -> bool:
@@ -115,15 +115,15 @@ def dotted(path: Key) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint for an unknown name: the known names that end with it, the most similar one, or all of them."""
+    """Return a hint for an unknown name: the valid names that end with it, the most similar one, or all of them."""
     names = list(names)
-    longer = [other for other in names if other.endswith(f"_{name}")]
+    longer = [candidate for candidate in names if candidate.endswith(f"_{name}")]
     near = longer or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
+    return f"did you mean {' or '.join(near)}?" if near else f"valid names are {', '.join(names)}"
 
 
 def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
-    # pydantic puts tags into the path: of a union's member, here in parentheses, and of what is wrong with a name
+    # pydantic puts tags into the path: of a union's member, here in parentheses, and `[key]` for a wrong key
     path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
@@ -147,51 +147,51 @@ def keys_at(kind: Any, path: Key) -> list[str]:
 # paths of input files
 
 WILDCARD = re.compile(r"\{.*\}", re.DOTALL)
-"""What Snakemake would replace in a path, as it knows no way to escape braces."""
+"""Part of a path that Snakemake takes for a wildcard; braces cannot be escaped."""
 
 
-def beside(folder: Path, path: str) -> Path:
-    """Return the place of a file that is named relative to a folder, or below a home folder (`~/scans/a.nii.gz`)."""
+def path_in(folder: Path, path: str) -> Path:
+    """Return the path of a file that is given relative to a folder or to a home folder (`~/scans/a.nii.gz`)."""
     try:
         return folder / Path(path).expanduser()
-    except RuntimeError:  # no home folder of that name: `~` is part of the file's
+    except RuntimeError:  # no home folder of that name: `~` is part of the file name
         return folder / path
 
 
 def located(folder: Path | str, path: str) -> Path:
-    """Return the absolute path of a file or folder in a folder or else, where it is only there, in the working one."""
-    places = [beside(Path(folder), path), Path.cwd() / path]
+    """Return the absolute path of a file in a folder or, if it only exists there, in the working directory."""
+    places = [path_in(Path(folder), path), Path.cwd() / path]
     return next((place for place in places if place.exists()), places[0]).resolve()
 
 
 def _absolute(path: str, info: ValidationInfo) -> str:
-    """Return the path of a file, which must exist: absolute, or relative in a working directory with braces.
+    """Return the absolute path of a file that must exist (a relative one if the working directory has braces).
 
-    The context names the `folder` of the configuration, which is searched for relative paths before the working
-    directory, and `awaited` files, which need not exist yet. Without a context the path is returned unchanged.
+    The validation context has the `folder` of the configuration, which is searched before the working directory, and
+    `awaited` files, which may not exist yet. Without a context the path is returned unchanged.
     """
     if not info.context:
         return path
     folder, place = Path(info.context["folder"]), located(info.context["folder"], path)
     if not place.is_file() and path not in info.context.get("awaited", ()):
-        raise refused(f"no such file: {beside(folder, path)}{_present_instead(beside(folder, path))}")
+        raise refused(f"no such file: {path_in(folder, path)}{_present_instead(path_in(folder, path))}")
     if not WILDCARD.search(str(place)):
         return str(place)
-    # braces of the working directory need not be named
+    # a relative path avoids the braces of the working directory
     if WILDCARD.search(inside := os.path.relpath(place)) or not place.is_file():
-        raise refused(f"found {place}; braces in a path are placeholders to Snakemake: rename the file or its folder")
+        raise refused(f"found {place}; Snakemake takes braces in a path for wildcards: rename the file or its folder")
     return inside
 
 
 InputFile = Annotated[str, AfterValidator(_absolute)]
-"""The path of a file that is read; relative to the configuration file or else to the working directory."""
+"""The path of an input file, relative to the configuration file or else to the working directory."""
 
 
 def _present_instead(path: Path) -> str:
-    """Return the files beside a missing one that differ from it only in a number, such as other weeks."""
+    """Return a hint with existing files whose names differ from a missing one only in a number, such as the week."""
     pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
     try:
-        names = sorted(other.name for other in path.parent.iterdir() if pattern.fullmatch(other.name))
+        names = sorted(file.name for file in path.parent.iterdir() if pattern.fullmatch(file.name))
     except OSError:
         names = []
     return f"; there are {', '.join(names)}" if names else ""

@@ -1,4 +1,4 @@
-"""The brains of a study: the data of their pial surfaces, and regions given on them."""
+"""Settings of brains: the data that their pial surfaces are made from, and regions given on them."""
 
 from collections.abc import Iterator
 
@@ -7,25 +7,25 @@ from pydantic import Field
 from .base import InputFile, KeyProblem, Settings
 from .schemes import Label
 from .synthetic import ShapeSettings
-from .terms import LONGEST_NAME, SIDES, AffineSource, Coordinates, Side
+from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
 from .varying import FileOrPair, Week, files_of
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
-"""The keys of which a brain has exactly one."""
+"""A brain has exactly one of these keys."""
 
 VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
 """How the names of volumes end."""
 
 HEMISPHERE_LABELS, HEMISPHERE_SURFACE = "labels of a hemisphere", "a hemisphere's surface"
-OF_LABELS = ("labels", HEMISPHERE_LABELS)
-OF_SURFACES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
-MEANINGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("scheme", "image", "affine_from"), OF_LABELS),
-    "coordinates": OF_SURFACES,
-    "white": OF_SURFACES,
-    "population": (*OF_LABELS, *OF_SURFACES),
+LABEL_SOURCES = ("labels", HEMISPHERE_LABELS)
+SURFACE_SOURCES = ("hemispheres", HEMISPHERE_SURFACE, "pial")
+KEY_SOURCES: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("scheme", "image", "affine_from"), LABEL_SOURCES),
+    "coordinates": SURFACE_SOURCES,
+    "white": SURFACE_SOURCES,
+    "population": (*LABEL_SOURCES, *SURFACE_SOURCES),
 }
-"""Keys that make sense only with some sources."""
+"""Keys that can only be used with some sources."""
 
 
 class HemisphereFiles(Settings):
@@ -38,36 +38,35 @@ class HemisphereFiles(Settings):
 
 
 class OneHemisphere(Settings):
-    """The only hemisphere of a brain, after hemispherectomy or where the data has one side."""
+    """The only hemisphere of a brain, after hemispherectomy or if the data has one side."""
 
     file: InputFile
-    """Its closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other
-    hemisphere."""
+    """Closed pial surface or, with the brain's `scheme`, a label volume without cortex of the other hemisphere."""
     side: Side
-    """Which hemisphere it is."""
+    """The hemisphere, `left` or `right`."""
 
 
 class Brain(Settings):
     """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial` and `shape`."""
 
-    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=LONGEST_NAME)
+    id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)
     """Name in paths and tables: letters, digits, - _ ."""
     week: Week
     """Gestational age; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
     """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
     subject: str | None = Field(None, min_length=1)
-    """Subject of whom several brains are scans. Change between scans is tabled, and simulations are compared
-    with scans of their subject first."""
+    """Subject, if several brains are scans of one. Changes between scans are tabulated, and simulations are compared
+    with scans of their own subject first."""
     covariates: dict[str, str] = Field({})
-    """What else is known of it, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
+    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
     labels: InputFile | None = None
     """Tissue label volume (NIfTI or MGZ)."""
     image: InputFile | None = None
     """T2-weighted volume (NIfTI) of the labels, shown in a figure."""
     scheme: str | None = None
-    """What the labels mean: the name of a file in the folder `schemes`, such as `dhcp-19`, or of the key
-    `schemes`. Needed with `labels`."""
+    """Label scheme: the name of a file in the folder `schemes`, such as `dhcp-19`, or of an entry of the key
+    `schemes`. Required with `labels`."""
     affine_from: AffineSource = "auto"
     """NIfTI affine of `labels` and `image`; `auto` refuses two that disagree."""
     hemispheres: HemisphereFiles | None = None
@@ -77,10 +76,10 @@ class Brain(Settings):
     pial: InputFile | None = None
     """Closed surface of the whole brain."""
     white: FileOrPair | None = None
-    """White surface in the same coordinates, for the cortical thickness: a file, with `hemispheres` a list of the
-    left and the right one."""
+    """White surface in the same coordinates, for the cortical thickness: a file; with `hemispheres`, a list of the
+    left and the right file."""
     coordinates: Coordinates = "auto"
-    """Axes of surface files; `auto` finds any pose."""
+    """Axes of surface files; `auto` determines any pose from the shape."""
     shape: ShapeSettings | None = None
     """A simple geometry in place of a brain."""
 
@@ -108,14 +107,14 @@ class Brain(Settings):
 
     @property
     def has_vertices(self) -> bool:
-        # they may be those of other brains too
+        # other brains may have corresponding vertices
         return not self.has_labels and self.source in ("hemispheres", "hemisphere", "pial")
 
     @property
     def files(self) -> list[str]:
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
-        one = None if self.hemisphere is None else self.hemisphere.file
-        return [path for path in (self.labels, self.pial, *sides, one) if path is not None]
+        single = None if self.hemisphere is None else self.hemisphere.file
+        return [path for path in (self.labels, self.pial, *sides, single) if path is not None]
 
     @property
     def white_files(self) -> dict[str, str]:
@@ -137,14 +136,16 @@ class Brain(Settings):
             text = f"found {' and '.join(given) or 'none'} as its source; expected exactly one of {', '.join(SOURCES)}"
             yield KeyProblem(text)
         else:
-            for key, kinds in MEANINGS.items():
+            for key, kinds in KEY_SOURCES.items():
                 if key in self.model_fields_set and self._kind not in kinds:
-                    yield KeyProblem(f"has no meaning with {self._kind}; only with {' or '.join(kinds)}", (key,))
+                    yield KeyProblem(
+                        f"is not used with {self._kind}, only with {' or '.join(kinds)}; remove it", (key,)
+                    )
             pair = self._kind == "hemispheres"
-            if self.white is not None and self._kind in OF_SURFACES and ("left" in self.white_files) != pair:
-                yield KeyProblem("should have as many files as there are pial surfaces", ("white",))
-            if self._kind in OF_LABELS and self.scheme is None:
-                yield KeyProblem("is missing; it says what the labels mean", ("scheme",))
+            if self.white is not None and self._kind in SURFACE_SOURCES and ("left" in self.white_files) != pair:
+                yield KeyProblem("should have one file for each pial surface", ("white",))
+            if self._kind in LABEL_SOURCES and self.scheme is None:
+                yield KeyProblem("is missing; it defines the meaning of the labels", ("scheme",))
 
 
 # regions
@@ -162,7 +163,7 @@ class SurfaceRegions(Settings):
 class GivenRegions(Settings):
     """Regions of a brain, from a label volume or from labels of both hemispheres' surfaces.
 
-    Left and right regions of one name are compared. Other brains get the regions of the brain nearest in week.
+    Left and right regions with the same name are compared. Other brains get the regions of the brain closest in week.
     """
 
     volume: InputFile | None = None
@@ -172,8 +173,8 @@ class GivenRegions(Settings):
     right: SurfaceRegions | None = None
     """Labels of the right hemisphere."""
     names: dict[Label, str] = Field({})
-    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`; labels of one name are one region,
-    unnamed ones none. Needed with a volume; else the label files' names count."""
+    """Region of each label, such as `{1: frontal, 2: frontal, 3: parietal}`. Labels with the same name are one region;
+    labels without a name are ignored. Required with a volume; by default the label files' own names are used."""
 
     def problems(self) -> Iterator[KeyProblem]:
         sides = [side for side in SIDES if self.is_set(side)]
@@ -183,7 +184,7 @@ class GivenRegions(Settings):
             missing = "right" if sides == ["left"] else "left"
             yield KeyProblem("is missing; both hemispheres need labels", (missing,))
         if self.volume is not None and not self.names:
-            yield KeyProblem("is missing; it names the regions of the volume", ("names",))
+            yield KeyProblem("is missing; it defines the regions of the volume", ("names",))
 
     @property
     def files(self) -> dict[str, str]:

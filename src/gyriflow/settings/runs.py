@@ -1,4 +1,4 @@
-"""Runs, and what differs between them: growth's series of brains, studies, calibration."""
+"""Settings of runs, growth series, sweeps and calibration."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
@@ -10,13 +10,13 @@ from .base import KeyProblem, Settings
 from .brains import Brain
 from .folding import FoldingSettings
 from .growth import SIZES
-from .terms import LONGEST_NAME, SCORES, Score
+from .terms import MAX_NAME_LENGTH, SCORES, Score
 from .varying import EndWeek
 
 ALL = "all"
-"""The word for all brains in `start`."""
+"""Value of `start` for all brains."""
 FIRST = "first"
-"""The word for the first brain of `brains` in `start`: of an atlas its earliest, if no other stands before it."""
+"""Value of `start` for the first of `brains`. The first of an atlas is its earliest week."""
 
 Start = Annotated[
     Annotated[str, Tag("(id)")] | Annotated[tuple[str, ...], Tag("(list)")],
@@ -24,9 +24,9 @@ Start = Annotated[
 ]
 """The id of a brain, a list of ids, `first` or `all`."""
 
-RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=LONGEST_NAME)]
-StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=LONGEST_NAME)]
-"""Names of folders: letters, digits and these marks, first a letter or digit."""
+RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=MAX_NAME_LENGTH)]
+StudyName = Annotated[str, Field(pattern=r"^[^\W_][\w-]*$", max_length=MAX_NAME_LENGTH)]
+"""Names that are used as folder names: letters, digits and these marks, beginning with a letter or digit."""
 
 FREE_GROWTH: dict[str, Any] = {
     "step_s": 86_400.0,
@@ -37,10 +37,10 @@ FREE_GROWTH: dict[str, Any] = {
     "contact": {"kind": "global"},
     "no_growth": {"kind": "none"},
 }
-"""Everything grows and nothing is held; with a cortex as stiff as the core, growth makes the folds, not buckling."""
+"""Growth everywhere, a free body, a cortex as stiff as the core: growth makes the folds, not buckling."""
 
 PRESETS: dict[str, dict[str, Any]] = {
-    # the paper's model, whatever the defaults become; its linear elements are `order: 1` of the mesh
+    # the paper's model, independent of our defaults; its linear elements are `mesh.order: 1`
     "fetalfoldsim": {
         "step_s": 43_200.0,
         "growth": {"model": "rates"},
@@ -57,36 +57,38 @@ PRESETS: dict[str, dict[str, Any]] = {
         "contact": {"kind": "planes", "gap_mm": 2.5},
         "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
-    # growth that takes the brain to its measured shapes
+    # growth towards the shapes that were measured on the brain's own series
     "measured": {**FREE_GROWTH, "growth": {"model": "shapes"}},
-    # the brain as it is to be expected: as `measured`, towards where the growth of another population would take it
+    # a prediction: growth towards the shapes that an atlas' growth gives the brain
     "expected": {**FREE_GROWTH, "growth": {"model": "shapes", "of": "atlas"}},
 }
-"""Sets of parameters by name, from which a configuration starts; its own keys come on top."""
+"""Sets of parameters by name. Keys of the configuration override them."""
 
 
 class Run(FoldingSettings):
-    """The complete settings of a run: those of `folding` with the run's own on top."""
+    """The complete settings of a run: those of `folding`, overridden by its own."""
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "null"], "required": []})
 
     start: Start | None = None
     """Id of the brain that is folded, a list of ids, `first` or `all`; `null`: the study's `start`."""
 
-    # unlike `folding`, it may have rates that its growth model does not use; parameters hold the sizes of the shapes
+    # unlike `folding`, a run may have rates that its growth model does not use
     def problems(self) -> Iterator[KeyProblem]:
         for key in SIZES:
             if self.growth.model == "shapes" and getattr(self.growth, key) != "measured":
-                yield KeyProblem("has no meaning with the model shapes; expected sizes", ("growth", key))
+                yield KeyProblem(
+                    "is not used by the growth model shapes; remove it, or use the model sizes", ("growth", key)
+                )
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
-    """Return those of the ids of all brains that a run folds."""
+    """Return the ids of the brains that a run folds, in the order of `ids`."""
     start = study_start if run.start is None else run.start
     if start == FIRST:
         return list(ids[:1])
-    named = ids if start == ALL else [start] if isinstance(start, str) else start or ()
-    return [brain for brain in ids if brain in named]
+    starts = ids if start == ALL else [start] if isinstance(start, str) else start or ()
+    return [brain for brain in ids if brain in starts]
 
 
 # growth
@@ -99,28 +101,27 @@ Series = Annotated[
 
 
 class GrowthSettings(Settings):
-    """Which brains growth is measured on."""
+    """The brains on which growth is measured."""
 
     brains: Series | None = None
-    """Ids of the brains whose areas and volumes are used, of at least two weeks; or several such lists by name,
-    as `{surface: [...], volume: [...]}`. `null`: all brains. Each subject and each population is then a series of
-    its own, as are surfaces (`surface`) and label volumes (`volume`) if both have two weeks. Only a series by name
-    may chain several subjects, such as all: `{cohort: [all]}`."""
+    """Ids of the brains whose areas and volumes are used, at two weeks or more; or several such lists by name,
+    `{surface: [...], volume: [...]}`. `null`: all brains. Each subject and each population is then a series, and
+    surfaces (`surface`) and label volumes (`volume`) are separate series if both have two weeks. Only a named series
+    may combine several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
-    """Series that gives measured curves or an atlas' growth, of several; `null`: the start brain's."""
+    """The series, if there are several, that gives measured curves or an atlas' growth. `null`: the start brain's."""
     matched_surfaces: bool = True
-    """Whether equal vertices and triangles of a series' surfaces mean equal places, so that brains
-    correspond without registration."""
+    """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
+    needed."""
 
 
 def growth_series(
     brains: Sequence[Brain], given: Sequence[str] | Mapping[str, Sequence[str]] | None
 ) -> dict[str, list[str]]:
-    """Return the ids of the brains of each series of growth rates, without series of fewer than two weeks.
+    """Return the ids of the brains of each growth series that has two weeks or more.
 
-    `given` is the setting `brains`, whose ids must be known. Only a series that it names may have several subjects or
-    mix populations; `all` stands for all brains. A hemisphere that is alone shares none with whole brains or with the
-    other one.
+    `given` is the setting `brains`; its ids must exist. Only a named series may combine several subjects or
+    populations; `all` stands for all brains. Single hemispheres and whole brains are never in one series.
     """
     series: dict[str, Sequence[Brain]] = {}
     if isinstance(given, Mapping):
@@ -133,10 +134,10 @@ def growth_series(
                 groups.setdefault((brain.subject, brain.population, side), []).append(brain)
         for (subject, population, side), members in groups.items():
             by_kind = _series_by_kind(members)
-            for kind, chosen in by_kind.items():
+            for kind, same_kind in by_kind.items():
                 parts = [subject or "", population or "", side]
                 parts += [kind] if len(by_kind) > 1 or not (subject or population) else []
-                series[", ".join(part for part in parts if part) if len(groups) > 1 else kind] = chosen
+                series[", ".join(part for part in parts if part) if len(groups) > 1 else kind] = same_kind
     return {name: [brain.id for brain in members] for name, members in series.items() if _ages(members) > 1}
 
 
@@ -145,7 +146,7 @@ def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
     surfaces = [brain for brain in brains if not brain.has_labels]
     by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
     given = {kind: members for kind, members in by_kind.items() if members}
-    # a kind with a single age can only be compared across kinds
+    # a kind with a single week can only be compared across kinds
     return given if len(given) == 1 or all(_ages(members) > 1 for members in given.values()) else {"all": brains}
 
 
@@ -159,53 +160,53 @@ Value = Annotated[
     Annotated[float, Tag("(number)")] | Annotated[str, Tag("(text)")],
     Discriminator(lambda value: "(text)" if isinstance(value, str) else "(number)"),
 ]
-"""A value of a parameter that a study varies."""
+"""A value of a parameter that a sweep varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
-"""Keys of a run that say nothing of its model, or that the study sets."""
+"""Keys that do not belong to the model of a run, or that the sweep sets."""
 CURVES = tuple(f"growth.{size}" for size in SIZES)
-"""Further curves than those of parameters that may vary."""
-MOST_PARAMETERS = 3
-LEAST_FIRST_RUNS, MOST_RUNS = 3, 40
-"""Of a calibration."""
+"""Curves that may vary besides those of parameters."""
+MAX_PARAMETERS = 3
+MIN_FIRST_ROUND, MAX_RUNS = 3, 40
+"""Limits of a calibration."""
 
 
 class Compared(Settings):
-    """What runs are compared with: real brains of a week."""
+    """The observed brains of one week that runs are compared with."""
 
     base: str
-    """Name of the run that all others differ from."""
+    """Name of the run whose settings are changed."""
     compare_week: EndWeek
     """Week of the comparison, at which the runs end. [GW]"""
     compare_with: tuple[str, ...] | None = None
-    """Ids of the real brains of that week to compare with; `null`: all of the start's population, or of any if
+    """Ids of the observed brains of that week; `null`: all of the start brain's population, or of any population if
     it has none."""
 
 
 class Study(Compared):
-    """A run for each combination of the varied values, compared with real brains of `compare_week`.
+    """A sweep: a run for each combination of the varied values, compared with observed brains of `compare_week`.
 
-    Equal runs are solved once. A run that diverges is reported in the study's tables, and the others go on.
+    Equal runs are solved once. A run that diverges is reported in the tables; the others continue.
     """
 
     vary: dict[str, tuple[Value, ...]]
     """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots
     (`contact.gap_mm`)."""
     fixed: dict[str, Value] = Field({})
-    """Keys of `folding` that differ from the base's in all runs."""
+    """Keys of `folding` that are changed in all runs."""
     fixed_at: dict[float, dict[str, Value]] = Field({})
-    """The same for the runs of single values of the first varied key, such as `{1.5: {step_s: 43200}}`."""
+    """Keys that are changed for one value of the first varied key, such as `{1.5: {step_s: 43200}}`."""
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all keys by which the run of some varied values differs from the base."""
+        """Return all keys by which the run with these varied values differs from the base."""
         at_first = next((self.fixed_at.get(first, {}) for first in values.values()), {})
         return {**self.fixed, **at_first, **values, "end_week": self.compare_week}
 
 
 class Calibration(Compared):
-    """A search for the parameters whose brain is nearest to the real one of a week.
+    """A search for the parameters whose brain is most similar to the observed one of a week.
 
-    The runs of the first round are spread over the bounds (a scrambled Sobol sequence), those of later ones where a
-    Gaussian process through the scores expects the most. Runs that diverge count as worse than all others.
+    The first round is a scrambled Sobol sequence within the bounds. Later rounds are placed where a Gaussian process
+    fitted to the scores has the largest expected improvement. Runs that diverge count as worse than all others.
     """
 
     parameters: dict[str, tuple[Annotated[float, Field(allow_inf_nan=False)], ...]]
@@ -214,17 +215,17 @@ class Calibration(Compared):
     scales the base run's curve of KEY."""
     score: dict[Score, Annotated[float, Field(gt=0)]]
     """What is minimised: the weights of one or more measures (docs/metrics.md)."""
-    rounds: tuple[Annotated[int, Field(ge=1, le=MOST_RUNS)], ...] = (12, 4, 4, 4)
-    """How many runs each round has, the first at least 3, all together at most 40."""
+    rounds: tuple[Annotated[int, Field(ge=1, le=MAX_RUNS)], ...] = (12, 4, 4, 4)
+    """Number of runs in each round: at least 3 in the first, at most 40 in all."""
     seed: int = Field(0, ge=0)
     """Seed of the sequence and of the Gaussian process."""
 
     def problems(self) -> Iterator[KeyProblem]:
-        if not 1 <= len(self.parameters) <= MOST_PARAMETERS:
-            yield KeyProblem(f"found {len(self.parameters)}; expected 1 to {MOST_PARAMETERS}", ("parameters",))
-        if not self.rounds or self.rounds[0] < LEAST_FIRST_RUNS or sum(self.rounds) > MOST_RUNS:
-            text = f"found {list(self.rounds)}; expected {LEAST_FIRST_RUNS} runs or more in the first round"
-            yield KeyProblem(f"{text} and at most {MOST_RUNS} in all", ("rounds",))
+        if not 1 <= len(self.parameters) <= MAX_PARAMETERS:
+            yield KeyProblem(f"found {len(self.parameters)}; expected 1 to {MAX_PARAMETERS}", ("parameters",))
+        if not self.rounds or self.rounds[0] < MIN_FIRST_ROUND or sum(self.rounds) > MAX_RUNS:
+            text = f"found {list(self.rounds)}; expected at least {MIN_FIRST_ROUND} runs in the first round"
+            yield KeyProblem(f"{text} and at most {MAX_RUNS} in all", ("rounds",))
         for key, bounds in self.parameters.items():
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 yield KeyProblem(
@@ -235,15 +236,15 @@ class Calibration(Compared):
 
     @property
     def runs(self) -> dict[str, int]:
-        # the round of each run by its name
+        # the round of each run, by name
         rounds = [number for number, size in enumerate(self.rounds) for _ in range(size)]
         return {f"calibration-{index:02d}": number for index, number in enumerate(rounds)}
 
 
 def changed(run: Run, changes: Mapping[str, Any]) -> Run:
-    """Return a run with some settings changed, by keys with dots for inner ones.
+    """Return a run with some settings changed; inner keys have dots.
 
-    ValidationError where they are not valid; KeyError where there is no such key.
+    ValidationError if a value is not valid; KeyError if a key does not exist.
     """
     raw = run.model_dump(mode="json")
     for key, value in changes.items():
@@ -258,7 +259,7 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
 
 
 def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the name and the varied values of each run of a study of a name, the last key varying fastest."""
+    """Yield the name and the varied values of each run of a sweep, the last key varying fastest."""
     for values in product(*study.vary.values()):
         texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
         yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))

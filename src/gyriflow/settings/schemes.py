@@ -1,6 +1,6 @@
-"""Label schemes: which numbers of a tissue label volume make the cerebrum, the cortex, left and right.
+"""Label schemes: the numbers of a tissue label volume that are cerebrum, cortex, left, right and other tissues.
 
-Those that come with gyriflow are the files of `schemes`; `io.yaml_files` reads them.
+The shipped schemes are the files of the folder `schemes`, read by `io.yaml_files`.
 """
 
 from collections.abc import Iterator
@@ -12,35 +12,35 @@ from ..shipped import SHIPPED
 from .base import KeyProblem, Settings
 
 SCHEME_FILES = {path.stem: path for path in sorted((SHIPPED / "schemes").glob("*.yaml"))}
-"""The files of the schemes that come with gyriflow, by name."""
+"""Files of the shipped schemes, by name."""
 Label = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class SchemeSettings(Settings):
-    """What the labels of a volume mean; 0 is background. A brain names its scheme: `scheme: NAME`."""
+    """Meaning of the labels of a volume; 0 is background. A brain refers to it by `scheme: NAME`."""
 
     cerebrum: tuple[Label, ...]
-    """Labels that together fill the cerebrum inside the pial surface; not all need occur."""
+    """Labels that together fill the cerebrum inside the pial surface. Not all of them need to occur."""
     cortex: tuple[Label, ...] = ()
-    """Those of the cortex, of which some must occur: for opening the fissure, and for cortical thickness."""
+    """Labels of the cortex, one of which must occur. Used to open the fissure and to measure cortical thickness."""
     left: tuple[Label, ...] = ()
-    """Those of the left hemisphere only, which with `right` part the brain."""
+    """Labels of the left hemisphere only. With `right` they separate the hemispheres."""
     right: tuple[Label, ...] = ()
-    """Those of the right hemisphere only."""
+    """Labels of the right hemisphere only."""
     white_matter: tuple[Label, ...] = ()
-    """Those of white matter, of which some must occur."""
+    """Labels of white matter, one of which must occur."""
     ventricles: tuple[Label, ...] = ()
-    """Those of fluid, which is left out where tissue does not enclose it."""
+    """Labels of fluid, which is left out where it is not enclosed by tissue."""
     cerebellum: tuple[Label, ...] = ()
-    """Labels outside the cerebrum; with `brainstem`, for the pose."""
+    """Labels of the cerebellum, outside the cerebrum. Used with `brainstem` to determine the pose."""
     brainstem: tuple[Label, ...] = ()
     """Labels of the brainstem, outside the cerebrum."""
     known: dict[Label, str] = Field({})
-    """Tissue by label, such as `{4: outer CSF}`; every label in no list must be named here."""
+    """Tissue of every label that is in none of the lists, such as `{4: outer CSF}`."""
 
     @property
     def labels(self) -> dict[int, str]:
-        # a label without a name is called after the list that it is in
+        # a label without a name gets the name of its list
         named = dict.fromkeys(self.cerebrum, "cerebrum")
         for tissue in ("white_matter", "ventricles", "cortex", "cerebellum", "brainstem"):
             named |= dict.fromkeys(getattr(self, tissue), tissue.replace("_", " "))
@@ -58,7 +58,7 @@ class SchemeSettings(Settings):
         if self.cortex and set(self.cerebrum) <= set(self.cortex):
             yield KeyProblem("found all of the cerebrum; the tissue inside the cortex is missing", ("cortex",))
         if both := sorted(set(self.left) & set(self.right)):
-            yield KeyProblem(f"found {_as_text(both)}, which are in left too", ("right",))
+            yield KeyProblem(f"found {_as_text(both)}, which are also in left", ("right",))
         if bool(self.left) != bool(self.right):
             missing = "right" if self.left else "left"
             yield KeyProblem("is missing; the hemispheres are separated by both left and right", (missing,))
@@ -68,7 +68,7 @@ class LabelScheme(SchemeSettings):
     """A label scheme with its name."""
 
     name: str
-    """The scheme's name."""
+    """Name of the scheme."""
 
 
 def _as_text(labels: list[int]) -> str:

@@ -1,4 +1,4 @@
-"""Settings of simple shapes in place of brains."""
+"""Settings of simple shapes that take the place of brains."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -7,9 +7,9 @@ from pydantic import Field
 
 from .base import KeyProblem, Settings
 
-MOST_UNEQUAL_AXES = 2.0
-"""Longest over shortest semi-axis of a shape: beyond this the ends are too sharp for even triangles."""
-MOST_NOISE = 0.02
+MAX_AXIS_RATIO = 2.0
+"""Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for even triangles."""
+MAX_NOISE = 0.02
 """Largest height of the bumps relative to the shortest semi-axis."""
 Length = Annotated[float, Field(ge=5, le=150)]
 
@@ -31,10 +31,10 @@ class ShapeSettings(Settings):
 
     def problems(self) -> Iterator[KeyProblem]:
         shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
-        if longest > MOST_UNEQUAL_AXES * shortest:
-            text = f"found {longest:g} as the longest; expected at most {MOST_UNEQUAL_AXES:g} times the shortest"
+        if longest > MAX_AXIS_RATIO * shortest:
+            text = f"found {longest:g} as the longest; expected at most {MAX_AXIS_RATIO:g} times the shortest"
             yield KeyProblem(text, ("semi_axes_mm",))
         # the default suits the default sizes; only a given value can be wrong
-        if self.is_set("noise_mm") and self.noise_mm > MOST_NOISE * shortest:
-            text = f"found {self.noise_mm:g}; expected at most {MOST_NOISE * shortest:g}, a fiftieth of the shortest"
+        if self.is_set("noise_mm") and self.noise_mm > MAX_NOISE * shortest:
+            text = f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a fiftieth of the shortest"
             yield KeyProblem(f"{text} semi-axis", ("noise_mm",))

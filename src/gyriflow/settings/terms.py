@@ -1,12 +1,13 @@
 """Names and codes that files, settings and figures share."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = get_args(Side)
 STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
-"""What GIFTI files call the cortex of each side."""
+"""Names of each side's cortex in GIFTI files."""
 
 RegionField = Literal["zones", "distance", "cortex_weight", "growth", "shear_modulus", "bulk_modulus", "normal"]
 VertexField = Literal["displacement", RegionField, "contact_pressure"]
@@ -20,12 +21,12 @@ REGION_FIELDS: tuple[RegionField, ...] = get_args(RegionField)
 
 Mesher = Literal["pytetwild", "tetgen"]
 """The programs that fill a surface with tetrahedra."""
-MOST_HOLE_MM = 20.0
-"""The largest hole of a surface that can be asked to be closed."""
+MAX_HOLE_MM = 20.0
+"""Upper bound of the setting `max_hole_mm`."""
 Coordinates = Literal["auto", "ras", "lps"]
-"""Axes of the coordinates in surface files; `auto`: to be found."""
+"""Axes of the coordinates in surface files; `auto`: determined from the shape."""
 AffineSource = Literal["auto", "sform", "qform"]
-"""Which affine of a NIfTI file is used; `auto` refuses two that disagree."""
+"""The affine of a NIfTI file that is used; `auto` refuses two that disagree."""
 
 MaterialName = Literal["neo-hookean", "compressible-neo-hookean"]
 """Names of the constitutive laws; each is a class of `mechanics.materials`."""
@@ -40,7 +41,7 @@ ZONE_NAMES = (
 SHAPE_CUTS = (BASE, SIDE_X, SIDE_Y)
 """Zones of simple shapes only: flat cuts through tissue."""
 FLAT_CUTS = (*SHAPE_CUTS, MEDIAL_WALL)
-"""Zones without cortex: the cuts, and the medial wall of a hemisphere that is alone."""
+"""Zones without cortex: the cuts, and the medial wall of a single hemisphere."""
 
 LEFT, RIGHT, BRIDGE = 1, 2, 3
 """Tags of the hemispheres, and of the tissue between the contact planes."""
@@ -48,14 +49,13 @@ CORTEX, CORE = 1, 2
 """Tags of the layers."""
 
 ELEMENTS_NEEDED = {1: 2.0, 2: 0.8}
-"""Elements through the cortex by their order, below which folds may be the mesh's: thickness over the mean edge of the
-elements in it. For quadratic ones it comes from the table of docs/verification.md (Convergence on a brain): two
-distances of nodes to the thickness at the surface are enough for sizes and places, and that mesh counts 0.81 at its
-start over the cortex's volume, where elements are longer. As it grows the count falls (0.49 at 28 GW, where the errors
-of that table were found), so that what is said of later weeks is cautious."""
+"""Minimum number of elements through the cortex, by element order: thickness over the mean edge length there. With
+fewer, folds may depend on the mesh. The value for quadratic elements comes from docs/verification.md (Convergence on a
+brain): two node distances through the thickness at the surface are enough, and that mesh has a count of 0.81 at its
+start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious."""
 
-LONGEST_NAME = 100
-"""Characters that the name of a brain, run or study has at most: names of files have 255 bytes."""
+MAX_NAME_LENGTH = 100
+"""Longest name of a brain, run or study; file names are limited to 255 bytes."""
 
 MEASURED = "real"
 """The run of measured brains in tables."""
@@ -65,13 +65,13 @@ REAL_BRAIN = "real brain"
 NO_REGION = 0
 """The label of what is in no region."""
 
-MOST_COLOURED = 6
-"""Values of a covariate that charts tell apart by colours."""
+MAX_COLOURS = 6
+"""Largest number of covariate values that charts show by colour."""
 SPREAD_UNKNOWN = "spread of individuals unknown"
-"""The flag of a brain that is compared with averages, such as an atlas: they have a curve, and no centiles."""
+"""Flag of a brain that is compared with averages, such as an atlas, which have a curve but no centiles."""
 
 CORTICAL_STEEPNESS = 10.0
-"""Of the cortical weight w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core."""
+"""Steepness of the cortical weight w = 1/(1 + exp(10 (d/H − 1))), which is ½ at the border of cortex and core."""
 
 # metrics
 
@@ -79,18 +79,18 @@ LastBand = Literal["B4", "B5", "B6"]
 """The last complete band of eigenmodes."""
 
 CURVATURE_RADIUS_MM = 3.0
-"""At edges of 0.8 mm its bias is that of three rings of neighbours, with half their noise (docs/metrics.md)."""
+"""With edges of 0.8 mm it has the bias of three rings of neighbours and half their noise (docs/metrics.md)."""
 SPANGY_MODES: LastBand = "B5"
 
 FOLD_BANDS = (4, 5, 6)
 """Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
 
-# what a calibration may be scored by
+# scores of calibration
 
 Score = Literal["shape_index", "mean_curvature", "curvature_distribution", "size", "surface_distance"]
-"""A measure of how far a simulated brain is from a real one of its week.
+"""A measure of the difference between a simulated and an observed brain of the same week.
 
-- shape_index, mean_curvature: 1 − r, with r the correlation over the pial surface after scaling to the real volume;
+- shape_index, mean_curvature: 1 − r, with r the correlation over the pial surface after scaling to the observed volume;
 - curvature_distribution: distance between the two distributions of mean curvature (1/mm);
 - size: √(a² + v²), with a, v the relative differences of pial area and volume;
 - surface_distance: mean distance of the two surfaces, each to the other, in mm.
@@ -98,7 +98,7 @@ Score = Literal["shape_index", "mean_curvature", "curvature_distribution", "size
 SCORES: tuple[Score, ...] = get_args(Score)
 
 AMPLITUDE = ".amplitude"
-"""Ending of a parameter that scales a curve of the base run."""
+"""Suffix of a parameter that scales a curve of the base run."""
 STIFFNESS_RATIO = "stiffness_ratio"
 """The parameter that sets the shear modulus of the cortex to a multiple of that of the core."""
 
@@ -110,7 +110,7 @@ CARBON_INTENSITY_G_PER_KWH = 475.0
 
 
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:
-    """Return what (run, brain) pairs are called in figures: their run, with the brain where a run has several."""
+    """Return names of (run, brain) pairs for figures: the run, with the brain if the run has several."""
     pairs = [(run, brain) for run, brain in folded]
-    several = {run for run, _ in pairs if sum(run == other for other, _ in pairs) > 1}
-    return [f"{run} · {brain}" if run in several else run for run, brain in pairs]
+    counts = Counter(run for run, _ in pairs)
+    return [f"{run} · {brain}" if counts[run] > 1 else run for run, brain in pairs]

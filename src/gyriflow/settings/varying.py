@@ -1,4 +1,4 @@
-"""Parameters that may vary: a number, a curve over weeks, a map over the brain, or map times curve."""
+"""Parameters that may vary in time and space: a number, a curve over weeks, a map over the brain, or both."""
 
 import operator
 from collections.abc import Iterator, Mapping
@@ -12,16 +12,16 @@ from pydantic.fields import FieldInfo
 from .base import InputFile, KeyProblem, Settings
 
 Maps = Mapping[str, NDArray[np.float64]]
-"""Values at the mesh's vertices by parameter name; they move with the tissue."""
+"""Values at the mesh vertices, by parameter name. They move with the tissue."""
 WEEKS = (15.0, 45.0)
-"""First and last gestational week that gyriflow knows."""
+"""First and last valid gestational week."""
 AnyWeek = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
 """A gestational week, such as one that a curve has a value at."""
 _two_decimals = AfterValidator(lambda week: round(week, 2))
 Week = Annotated[AnyWeek, _two_decimals]
 """The week of a brain, rounded to the two decimals of file names and tables: equal weeks are equal numbers."""
 EndWeek = Annotated[float, Field(gt=WEEKS[0], le=WEEKS[1]), _two_decimals]
-"""The same of a brain that is simulated, which has begun earlier."""
+"""The last week of a simulation, rounded likewise."""
 FileOrPair = Annotated[
     Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
     Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
@@ -29,7 +29,7 @@ FileOrPair = Annotated[
 
 
 class Varying(Settings):
-    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or both, which are multiplied.
+    """A parameter that varies: a curve over `weeks`, a `map` over the brain, or their product.
 
     A map is a GIFTI file with a value per vertex of `surface` (or one for each hemisphere), or a NIfTI volume in world
     coordinates. Maps move with the tissue.
@@ -47,9 +47,9 @@ class Varying(Settings):
     def _numbers_by_week(cls, value: Any) -> Any:
         if isinstance(value, dict):
             if any(isinstance(number, bool) for number in value.values()):
-                raise ValueError("should hold numbers, not true or false")
+                raise ValueError("should contain numbers, not true or false")
             if len({float(week) for week in value}) < len(value):
-                raise ValueError("should name each week once")
+                raise ValueError("should contain each week only once")
         return value
 
     @field_validator("weeks")
@@ -66,9 +66,9 @@ class Varying(Settings):
         elif surfaces and len(maps) != len(surfaces):
             yield KeyProblem("should have as many files as `map`", ("surface",))
         elif surfaces and any(path.endswith((".nii", ".nii.gz")) for path in maps):
-            yield KeyProblem("has no meaning where the map is a volume", ("surface",))
+            yield KeyProblem("is not used if the map is a volume; remove it", ("surface",))
         elif not surfaces and (len(maps) > 1 or any(path.endswith(".gii") for path in maps)):
-            yield KeyProblem("is missing; it is the surface whose vertices the map belongs to", ("surface",))
+            yield KeyProblem("is missing; it is the surface that the values of the map belong to", ("surface",))
 
 
 def files_of(files: str | tuple[str, str] | None) -> list[str]:
@@ -88,22 +88,22 @@ BOUND_TEXTS = {
     "ge": ("minimum", "greater than or equal to", operator.ge),
     "le": ("maximum", "less than or equal to", operator.le),
 }
-"""The bounds of parameters that may vary: how they are called in JSON schemas and messages, and when they hold."""
+"""Bounds of varying parameters: their names in JSON schemas, in messages, and their operators."""
 
 
 def varying(default: float, **bounds: float) -> Any:
-    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) hold for each number in it."""
+    """Return a field for a parameter that may vary; `bounds` (gt, ge, le) apply to each number in it."""
     return Field(default, json_schema_extra={BOUND_TEXTS[name][0]: bound for name, bound in bounds.items()})
 
 
 def bounds_of(field: FieldInfo) -> dict[str, float]:
-    """Return the bounds (gt, ge, le) of a parameter that may vary, none for other keys."""
+    """Return the bounds (gt, ge, le) of a parameter that may vary; empty for other keys."""
     extra: Any = field.json_schema_extra or {}
     return {name: extra[key] for name, (key, *_) in BOUND_TEXTS.items() if key in extra}
 
 
 def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
-    """Raise ValueError where a number, or one of a curve without a map, is out of its bounds."""
+    """Raise ValueError if a number, or one of a curve without a map, is out of bounds."""
     if isinstance(value, Varying):
         numbers = [] if value.map is not None else list((value.weeks or {}).values())
     else:
@@ -115,17 +115,17 @@ def require_bounds(value: float | Varying, bounds: Mapping[str, float]) -> None:
 
 
 def map_of(value: float | Varying) -> str | None:
-    """Return the name of the map of a parameter in a run's parameters, None where it has none."""
+    """Return the name of the map of a parameter in a run's parameters, or None."""
     return value.map if isinstance(value, Varying) and isinstance(value.map, str) else None
 
 
 def weeks_of(value: float | Varying) -> dict[float, float]:
-    """Return the curve of a parameter, {week: value} in ascending order; empty where it has none."""
+    """Return the curve of a parameter, {week: value} in ascending order; empty if it has none."""
     return (value.weeks or {}) if isinstance(value, Varying) else {}
 
 
 def curve_at(value: float | Varying, week: float) -> float:
-    """Return the number, or the curve's value at a week: linear in between, constant beyond, 1 without a curve."""
+    """Return the number, or the curve's value at a week: linear in between, constant outside, 1 without a curve."""
     if not isinstance(value, Varying):
         return value
     curve = weeks_of(value)
@@ -133,13 +133,13 @@ def curve_at(value: float | Varying, week: float) -> float:
 
 
 def value_at(value: float | Varying, week: float, maps: Maps) -> float | NDArray[np.float64]:
-    """Return a parameter's value at a week: a number, or (n,) values where there is a map."""
+    """Return a parameter's value at a week: a number, or (n,) values if it has a map."""
     name = map_of(value)
     return curve_at(value, week) if name is None else curve_at(value, week) * maps[name]
 
 
 def value_range(value: float | Varying, maps: Maps, start: float, end: float) -> tuple[float, float]:
-    """Return the smallest and the largest value of a parameter from a week to a week, over all places."""
+    """Return the smallest and the largest value of a parameter between two weeks, over all vertices."""
     name = map_of(value)
     places = np.ones(1) if name is None else maps[name]
     # the extremes of a curve lie at its weeks, or at the ends

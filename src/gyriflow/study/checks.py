@@ -23,7 +23,7 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.terms import AMPLITUDE, MEASURED, MOST_COLOURED, STIFFNESS_RATIO
+from ..settings.terms import AMPLITUDE, MAX_COLOURS, MEASURED, STIFFNESS_RATIO
 from ..settings.varying import Varying
 from .atlases import used_atlases
 
@@ -156,9 +156,9 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     norm = [name for name in given.norm_reference or () if name not in atlases]
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
     values = {brain.covariates.get(given.colour_by or "") for brain in config.brains} - {None}
-    if given.colour_by and not 1 < len(values) <= MOST_COLOURED:
+    if given.colour_by and not 1 < len(values) <= MAX_COLOURS:
         yield KeyProblem(
-            f"found {len(values)} values of {given.colour_by!r}; colours tell 2 to {MOST_COLOURED} apart",
+            f"found {len(values)} values of {given.colour_by!r}; colours tell 2 to {MAX_COLOURS} apart",
             ("metrics", "colour_by"),
         )
     with_regions = given.regions if isinstance(given.regions, dict) else {}

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..settings.terms import MOST_COLOURED, REAL_BRAIN, run_names
+from ..settings.terms import MAX_COLOURS, REAL_BRAIN, run_names
 from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
 from .records import Brain, Comparison, Measured, Simulation
 from .study import Study
@@ -279,7 +279,7 @@ def _groups(study: Study) -> dict[str, str]:
     for name in [wanted] if wanted else dict.fromkeys(name for brain in brains for name in brain.given.covariates):
         values = {brain.id: of[name] for brain in brains if name in (of := brain.given.covariates)}
         subjects = {study.brains[brain].subject for brain in values}
-        if 1 < len(set(values.values())) <= MOST_COLOURED and (wanted or len(set(values.values())) < len(subjects)):
+        if 1 < len(set(values.values())) <= MAX_COLOURS and (wanted or len(set(values.values())) < len(subjects)):
             return {brain: f"{name}: {value}" for brain, value in values.items()}
     return {}
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io.files import read_json, read_tab_separated
-from ..settings.base import beside, located
+from ..settings.base import located, path_in
 from ..settings.brains import SOURCES, VOLUME_SUFFIXES
 from ..settings.participants import ParticipantsSettings
 from ..settings.varying import WEEKS
@@ -192,7 +192,7 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
         value: Any = values[column]
         if column in PATHS:
             parts = value.split(";") if column == "white" else [value]
-            places = [beside(folder, part.strip()).resolve() for part in parts]
+            places = [path_in(folder, part.strip()).resolve() for part in parts]
             if lost := [place for place in places if not place.is_file()]:
                 return {}, f"{column}: no such file: {lost[0]}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))
