@@ -159,22 +159,6 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
 # which real brains a run is compared with
 
 
-def test_runs_are_compared_with_the_population_and_the_sides_of_their_start_only(labels, files):
-    brains = [
-        labels(21, population="well"),
-        labels(22, population="ill", id="ill"),
-        labels(22, population="well"),
-        {"id": "half", "week": 22, "hemisphere": {"file": str(files / "left.gii"), "side": "left"}},
-    ]
-    found = study(brains)
-    assert ids(found.simulations["reference", "b21"].compared[22]) == ["b22"]
-    assert [ids(pair) for pair in found.references.values()] == [["b22", "b21"]]
-    assert found.places["brains/half/metrics"].parts == {
-        "whole": surface("half"),
-        "left": "results/brains/half/surface/left.pial.surf.gii",
-    }
-
-
 def test_a_week_of_days_is_one_number_everywhere(labels):
     """24 weeks and 2 days are 24.2857...: of the brain, the end of the runs and the comparison."""
     days = 24 + 2 / 7
@@ -189,14 +173,6 @@ def test_a_week_of_days_is_one_number_everywhere(labels):
     spectra = next(figure for figure in figures_of(found) if figure.name == "influence_spectra")
     assert spectra.options["week"] == 24.29
     assert one.measured[-1].where.endswith("/week-24.29")
-
-
-def test_later_scans_of_the_subject_come_first(labels):
-    brains = [labels(21, subject="s"), labels(22, id="other"), labels(22, id="own", subject="s")]
-    one = study(brains).simulations["reference", "b21"]
-    assert ids(one.compared[22]) == ["own", "other"]
-    assert ids(one.real.values()) == ["own"]
-    assert study(brains).scans == {"s": ["b21", "own"]}
 
 
 def cohort(labels):

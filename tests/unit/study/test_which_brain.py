@@ -38,6 +38,11 @@ def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared
         23: ["c", "b"],
         24: ["d", "c"],
     }
+    folder = "results/brains/half/surface"
+    assert found.places["brains/half/metrics"].parts == {
+        "whole": f"{folder}/pial.surf.gii",
+        "left": f"{folder}/left.pial.surf.gii",
+    }
 
 
 def test_the_observed_brain_of_a_week_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
@@ -75,7 +80,6 @@ def test_brains_are_comparable_by_their_hemispheres_population_and_subject(start
 
 
 def test_half_a_brain_grows_by_no_atlas_of_whole_ones():
-    """The only atlas of another population has both hemispheres."""
     own = [brain("half", 22, side="left", population="own"), brain("full", 22, population="own")]
     atlas = [brain(f"atlas{week}", week, population="atlas") for week in (22, 23, 24)]
     halves = [brain(f"left{week}", week, side="left", population="halves") for week in (22, 23, 24)]
