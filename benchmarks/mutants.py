@@ -46,9 +46,7 @@ BY_TESTS = {
     "study/test_participants.py": [("src/gyriflow/study/participants.py", "whole[3]) / 7", "whole[3]) / 10")],
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
-    "compare/test_placement.py": [
-        ("src/gyriflow/compare/placement.py", "MIN_SKILL_HORIZON_GW = 1.5", "MIN_SKILL_HORIZON_GW = 0.5")
-    ],
+    "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "HORIZON_GW = 1.5", "HORIZON_GW = 0.5")],
     "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '["run", "target"]', '["run"]')],
     "compare/test_deviation.py": [("src/gyriflow/compare/prediction.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0")],
     "compare/test_validation.py": [
