@@ -42,7 +42,7 @@ ARROWS = {
     # the solver is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io", "code_hash"},
     "study": PLAIN | {"io"},
-    "running": PLAIN | {"study", "anatomy", "folding", "io", "shipped", "step", "version"},
+    "running": PLAIN | {"code_hash", "study", "anatomy", "folding", "io", "shipped", "step", "version"},
     "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
 }
 """The rooms, and what each may import besides itself. Siblings meet in plain geometry, settings and files."""
@@ -151,6 +151,14 @@ def test_scripts_are_thin():
     # draw.py is that of all figures
     lengths = {short(path): len(path.read_text().splitlines()) for path in SCRIPTS if path.name != "draw.py"}
     assert {name: lines for name, lines in lengths.items() if not 5 <= lines <= 45} == {}
+
+
+def test_every_rule_that_runs_something_has_a_log_and_the_environment():
+    text = "\n".join(path.read_text() for path in RULE_FILES)
+    rules = re.split(r"^ *(?:rule|checkpoint)\b.*:\n", text, flags=re.MULTILINE)
+    keywords = [re.findall(r"^ +(log|conda|script|shell):", rule, flags=re.MULTILINE) for rule in rules]
+    running = [found for found in keywords if {"script", "shell"} & set(found)]
+    assert {tuple(sorted(found)) for found in running} == {("conda", "log", "script"), ("conda", "log", "shell")}
 
 
 def test_every_script_is_used_and_there():

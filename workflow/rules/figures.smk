@@ -22,12 +22,16 @@ for name, figures in by_rule(FIGURES).items():
             lambda wildcards, of=figure_of: files_in(inputs_of(of(wildcards))),
         output:
             some.outputs,
+        log:
+            figure_log(name, some.pattern),
         wildcard_constraints:
             **{
                 key: one_of(dict.fromkeys(figure.names[key] for figure in figures.values()))
                 for key in some.names
                 if f"{{{key}}}" in some.pattern
             },
+        conda:
+            ENVIRONMENT
         params:
             draw=some.draw,
             inputs=lambda wildcards, of=figure_of: inputs_of(of(wildcards)),

@@ -73,6 +73,12 @@ rule regions:
         sides=lambda w: [PIAL[side] for side in brain_of(w).sides],
     output:
         **REGIONS,
+    log:
+        f"{RUN}/logs/regions.log",
+    benchmark:
+        f"{RUN}/benchmarks/regions.tsv"
+    conda:
+        ENVIRONMENT
     script:
         "../scripts/regions.py"
 

@@ -6,6 +6,12 @@ rule quality_page:
         png=f"{BRAIN}/figures/quality.png",
         pdf=f"{BRAIN}/figures/quality.pdf",
         row=f"{BRAIN}/quality.json",
+    log:
+        f"{BRAIN}/logs/quality_page.log",
+    benchmark:
+        f"{BRAIN}/benchmarks/quality_page.tsv"
+    conda:
+        ENVIRONMENT
     params:
         white_files=from_brain("given.white_files"),
         affine_from=from_brain("given.affine_from"),
@@ -21,6 +27,12 @@ rule quality_table:
         expand(rules.quality_page.output.row, brain=study.brains),
     output:
         f"{STUDY}/quality.csv",
+    log:
+        f"{STUDY}/logs/quality_table.log",
+    benchmark:
+        f"{STUDY}/benchmarks/quality_table.tsv"
+    conda:
+        ENVIRONMENT
     params:
         refused=study.refused_rows(REFUSED),
         order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],

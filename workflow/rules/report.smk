@@ -2,6 +2,8 @@
 # each brain.
 from itertools import takewhile
 
+from gyriflow.running.reruns import benchmark_patterns
+
 PAGE = f"{workflow.basedir}/workflow/report/page"
 
 
@@ -15,14 +17,18 @@ rule study_resources:
         csv=f"{STUDY}/resources.csv",
         table=f"{STUDY}/resources.html",
         warnings=f"{STUDY}/warnings.csv",
+    log:
+        f"{STUDY}/logs/study_resources.log",
+    benchmark:
+        f"{STUDY}/benchmarks/study_resources.tsv"
+    conda:
+        ENVIRONMENT
     params:
         brains=[brain.id for brain in CONFIG.brains],
         # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
-        benchmarks=lambda w: {
-            job.name: job.benchmark.regex().pattern
-            for job in takewhile(lambda job: job.name != "study_resources", workflow.rules)
-            if job.benchmark
-        },
+        benchmarks=lambda w: benchmark_patterns(
+            takewhile(lambda rule: rule.name != "study_resources", workflow.rules)
+        ),
         folded=study.pairs,
     script:
         "../scripts/study_resources.py"
@@ -42,10 +48,16 @@ rule provenance:
         study=f"{STUDY}/provenance.json",
         brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
         runs=study.files(f"{RUN}/provenance.json"),
-        report="results/report/provenance.json",
-        methods="results/report/methods.rst",
+        report=f"{REPORT}/provenance.json",
+        methods=f"{REPORT}/methods.rst",
         # the configuration with its paths, for those who have the files
-        config="results/report/config.yaml",
+        config=f"{REPORT}/config.yaml",
+    log:
+        f"{STUDY}/logs/provenance.log",
+    benchmark:
+        f"{STUDY}/benchmarks/provenance.tsv"
+    conda:
+        ENVIRONMENT
     params:
         config=study.used_settings,
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
@@ -68,7 +80,7 @@ OF_PAGES = dict(
     page=f"{PAGE}/page.html",
     style=f"{PAGE}/style.css",
 )
-PAGE_OF_BRAIN = "results/report/brains/{brain}.html"
+PAGE_OF_BRAIN = f"{REPORT}/brains/{{brain}}.html"
 
 
 def figures_on_page(brain=None):
@@ -97,7 +109,13 @@ rule html_report:
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:
-        "results/report/report.html",
+        f"{REPORT}/report.html",
+    log:
+        f"{REPORT}/logs/html_report.log",
+    benchmark:
+        f"{REPORT}/benchmarks/html_report.tsv"
+    conda:
+        ENVIRONMENT
     params:
         figures=figures_on_page(),
         brains=study.described_brains,
@@ -115,6 +133,12 @@ rule brain_page:
         **OF_PAGES,
     output:
         PAGE_OF_BRAIN,
+    log:
+        f"{REPORT}/logs/brain_page.{{brain}}.log",
+    benchmark:
+        f"{REPORT}/benchmarks/brain_page.{{brain}}.tsv"
+    conda:
+        ENVIRONMENT
     params:
         figures=lambda w: figures_on_page(w.brain),
         brains=lambda w: [brain for brain in study.described_brains if brain["id"] == w.brain],

@@ -20,6 +20,8 @@ rule atlas_file:
         f"{STUDY}/logs/atlas_file/{{file}}.log",
     wildcard_constraints:
         file=one_of(ATLAS_FILES),
+    conda:
+        ENVIRONMENT
     params:
         url=lambda w: ATLAS_FILES[w.file].url,
         sha256=lambda w: ATLAS_FILES[w.file].record.sha256,

@@ -9,6 +9,7 @@ from ..units import week_tag
 BRAIN = "results/brains/{brain}"
 RUN = "results/runs/{run}/{brain}"
 STUDY = "results/study"
+REPORT = "results/report"
 SWEEP = f"{STUDY}/{{study}}"
 CALIBRATION = f"{STUDY}/calibration"
 WEEK = "week-{week}"
@@ -122,21 +123,14 @@ ONSET = f"{RUN}/metrics/onset.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}.csv"
 CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
 
-_FOLDERS = (BRAIN, RUN, PLACE, SWEEP, CALIBRATION, STUDY, "results/report")
-"""Folders with logs and benchmarks of their own, those within others first."""
-
 
 def one_of(names: Iterable[str]) -> str:
     """Return a pattern that matches exactly these names, or nothing if there are none."""
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
-def job_files(rule: str, output: str) -> tuple[str, str]:
-    """Return the log and the benchmark file of a rule's jobs, beside the results that its first `output` is among.
-
-    They are called by the rule, and by those wildcards that the folder does not name.
-    """
-    folder = next((folder for folder in _FOLDERS if output.startswith(f"{folder}/")), STUDY)
-    others = [name for name in re.findall(r"{(\w+)}", output) if f"{{{name}}}" not in folder]
-    name = ".".join([rule, *(WEEK if other == "week" else f"{{{other}}}" for other in dict.fromkeys(others))])
-    return f"{folder}/logs/{name}.log", f"{folder}/benchmarks/{name}.tsv"
+def figure_log(rule: str, pattern: str) -> str:
+    """Return the log of a figure, called by its rule, and by those of its wildcards that the folder does not name."""
+    folder = next(place for place in (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT) if pattern.startswith(f"{place}/"))
+    others = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
+    return f"{folder}/logs/{'.'.join([rule, *others])}.log"

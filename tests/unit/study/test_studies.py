@@ -10,7 +10,7 @@ from facts import Facts
 from gyriflow.errors import InputError
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
-from gyriflow.study.paths import STUDY, job_files
+from gyriflow.study.paths import STUDY, figure_log
 
 ROOT = Path(__file__).parents[3]
 
@@ -118,7 +118,7 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
 
 def test_folders_of_results_are_no_names_of_studies():
     sources = [*ROOT.glob("workflow/rules/*.smk"), *ROOT.glob("src/gyriflow/study/*.py")]
-    paths = [*(path.read_text() for path in sources), *job_files("rule", f"{STUDY}/metrics.csv")]
+    paths = [*(path.read_text() for path in sources), figure_log("rule", f"{STUDY}/metrics.png")]
     folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
     assert folders > {"logs", "benchmarks", "figures", "calibration", "registration"}
     for folder in folders:

@@ -1,0 +1,39 @@
+"""Have Snakemake run jobs again after a change of code or of contents, by internals of it that nothing else uses."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..code_hash import code_hash
+
+
+def rerun_on_changes(rules: Iterable[Any], contents: Mapping[str, str], scripts: Path) -> None:
+    """Give rules parameters that change with the code of their script and with what their inputs hold.
+
+    Snakemake reruns a job whose parameters have changed. It sees no change of a package that a script imports, and none
+    of an input that is replaced by an older file. A rule without a script has to name its code itself.
+
+    Parameters
+    ----------
+    rules : all rules of a workflow, as `workflow.rules` has them
+    contents : hashes of input files by path
+    scripts : folder of the scripts
+    """
+    for rule in rules:
+        if rule.script or rule.shellcmd:
+            rule.set_params(contents=_contents_of(rule, contents))
+        if rule.script and not hasattr(rule.params, "code"):
+            rule.set_params(code=code_hash(scripts / Path(rule.script).name))
+
+
+def _contents_of(rule: Any, contents: Mapping[str, str]) -> Any:
+    def read_by_job(wildcards: Any) -> list[str]:
+        inputs = rule.expand_input(wildcards)[0]
+        return [f"input with the content {contents[path]}" for path in inputs if path in contents]
+
+    return read_by_job
+
+
+def benchmark_patterns(rules: Iterable[Any]) -> dict[str, str]:
+    """Return the regular expression of the benchmark files of each rule that has any, with wildcards as groups."""
+    return {rule.name: rule.benchmark.regex().pattern for rule in rules if rule.benchmark}

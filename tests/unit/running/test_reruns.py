@@ -1,0 +1,49 @@
+"""What gyriflow uses of Snakemake's internals, tried with the Snakemake that is installed."""
+
+import os
+import sys
+
+from processes import ran
+
+from gyriflow.code_hash import code_hash
+
+SNAKEFILE = """
+from pathlib import Path
+from gyriflow.running.reruns import benchmark_patterns, rerun_on_changes
+
+rule target:
+    input: "made-a"
+
+rule copy:
+    input: "given"
+    output: "made-{name}"
+    log: "logs/{name}.log"
+    benchmark: "benchmarks/{name}.tsv"
+    script: "scripts/copy.py"
+
+rule coded:
+    output: "coded"
+    params: code="own"
+    shell: "touch {output}"
+
+rerun_on_changes(workflow.rules, {"given": Path("given").read_text()}, Path("scripts").absolute())
+print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
+"""
+SCRIPT = "import shutil\nfrom gyriflow.units import ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
+
+
+def test_jobs_run_again_after_a_change_of_code_or_where_an_older_file_takes_the_place_of_their_input(tmp_path):
+    script, given = tmp_path / "scripts" / "copy.py", tmp_path / "given"
+    script.parent.mkdir()
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+    script.write_text(SCRIPT)
+    given.write_text("one")
+    snakemake = [sys.executable, "-m", "snakemake", "--cores", "1"]
+    first = ran(*snakemake, cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    said = str({"copy": r"benchmarks/(?P<name>.+)\.tsv$"})
+    assert f"{said} {[None, code_hash(script), 'own']}" in first.stdout
+    given.write_text("two")
+    os.utime(given, ns=(0, 0))
+    again = ran(*snakemake, "-n", cwd=tmp_path)
+    assert "input with the content two" in again.stdout + again.stderr
