@@ -46,7 +46,7 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
-from gyriflow.metrics.measure import folding_rows, measure_hemisphere, size_rows, spectrum_rows
+from gyriflow.metrics.measure import folding_metrics, measure_hemisphere, size_metrics, spectrum_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -177,8 +177,8 @@ def carried(frames: Path, week: float) -> Carried:
     match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
     surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
     side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, "B5")
-    rows = size_rows(surface, side.crossing) + folding_rows([side]) + spectrum_rows(side)
-    return Carried(surface, side.bend.mean, {name: value for name, value, _ in rows})
+    metrics = size_metrics(surface, side.crossing) | folding_metrics([side]) | spectrum_metrics(side)
+    return Carried(surface, side.bend.mean, metrics)
 
 
 def parse() -> argparse.Namespace:

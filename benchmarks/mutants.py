@@ -55,7 +55,9 @@ BY_TESTS = {
     "compare/test_calibration.py": [("src/gyriflow/compare/calibration.py", "- finished.min()", "- finished.max()")],
     "metrics/test_norms.py": [("src/gyriflow/metrics/tables.py", " / (to_week - from_week)", "")],
     "metrics/test_gyrification.py": [("src/gyriflow/metrics/gyrification.py", "RADIUS_MM = 10.0", "RADIUS_MM = 15.0")],
-    "metrics/test_measure.py": [("src/gyriflow/metrics/regions.py", '"curvedness": "1/mm"', '"curvedness": "1"')],
+    "metrics/test_measure.py": [
+        ("src/gyriflow/quantities.py", '"curvedness",\n        unit="1/mm"', '"curvedness",\n        unit="1"')
+    ],
     # figures, pages and files
     "report/test_quality.py": [("src/gyriflow/report/quality.py", 'else "LR"', 'else "RL"')],
     "report/test_pictures.py": [
@@ -74,7 +76,7 @@ BY_TESTS = {
     ],
     "compare/test_comparison_scripts.py": [("workflow/scripts/deviation.py", " * run / run_at_start", "")],
     "io/test_exports.py": [
-        ("src/gyriflow/io/exports.py", '"sulc", "mm"', '"sulc", "1"'),
+        ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),
         ("src/gyriflow/io/exports.py", "_hemi-{side[0].upper()}{desc}_{kind}", "_hemi-L{desc}_{kind}"),
     ],
     # simulations, jobs and exit codes

@@ -1,25 +1,259 @@
-"""What is measured at each vertex of a brain's surface and drawn as a map."""
+"""What is measured on brains: a record for each map over a surface and for each number of the tables of metrics.
+
+Whatever measures, draws, tabulates or exports a quantity looks it up here by name; a name without a record is an error.
+Units are written as in the tables: "1/mm2" for mm⁻², "1" for none.
+"""
 
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
-class VertexMeasure:
-    """How a map per vertex is drawn: the colour bar's label and the colours.
+class Registry[Record](dict[str, Record]):
+    """Records by name; KeyError that names this file for a name without a record."""
 
-    The limits are the ends of the colour scale; None: from 0 to the `quantile` of all vertices.
+    def __missing__(self, name: str) -> Record:
+        raise KeyError(f"{name!r} has no record in gyriflow/quantities.py")
+
+
+@dataclass(frozen=True)
+class VertexMap:
+    """A value at each vertex of a surface.
+
+    `name` is that of the array in its file; `bids_suffix` and `description` are used in the export. `is_averaged`: its
+    mean is given by region. A map with `colours`, a colour map of Matplotlib, is drawn, between `limits` or else from 0
+    to the `quantile` of the vertices, and as far below 0 if it `is_signed` or has negative values. The colour bar has
+    the `label` with the unit, or with what the `ends` of the scale mean.
     """
 
+    name: str
+    unit: str
     label: str
-    colours: str = "YlGnBu"
+    bids_suffix: str
+    description: str
+    is_averaged: bool = True
+    colours: str = ""
     limits: tuple[float, float] | None = None
     quantile: float = 0.995
+    is_signed: bool = False
+    ends: str = ""
+
+    @property
+    def mean_name(self) -> str:
+        """The metric that is the mean of the map over a region."""
+        return f"mean_{self.name.removesuffix('_mm').removeprefix('mean_')}"
 
 
-SHAPE_MEASURES = {
-    "shape_index": VertexMeasure("shape index (sulci −½, gyri +½)", colours="RdBu_r", limits=(-1.0, 1.0)),
-    "curvedness": VertexMeasure("curvedness (mm⁻¹)", quantile=0.98),
-    "sulcal_depth_mm": VertexMeasure("sulcal depth (mm)"),
-    "thickness_mm": VertexMeasure("cortical thickness (mm)"),
-}
-"""The arrays per vertex of a brain's metrics that are drawn as maps, by name."""
+@dataclass(frozen=True)
+class Metric:
+    """A number of a whole brain, a hemisphere or a region.
+
+    `label` is its name in figures and reports. `has_norm` is False if it describes the mesh or the analysis rather than
+    the brain: it is not compared with that of other brains. `is_reported` is False if it is only given in the tables.
+    """
+
+    name: str
+    unit: str
+    label: str
+    has_norm: bool = True
+    is_reported: bool = True
+
+
+POSITIVE_COLOURS, SIGNED_COLOURS = "YlGnBu", "RdBu_r"
+
+_BRAIN_MAPS = (
+    VertexMap(
+        name="shape_index",
+        unit="1",
+        label="shape index",
+        bids_suffix="shapeIndex",
+        description="Shape index",
+        colours=SIGNED_COLOURS,
+        limits=(-1.0, 1.0),
+        ends="sulci −½, gyri +½",
+    ),
+    VertexMap(
+        name="curvedness",
+        unit="1/mm",
+        label="curvedness",
+        bids_suffix="curvedness",
+        description="Curvedness, the root mean square of the principal curvatures",
+        colours=POSITIVE_COLOURS,
+        quantile=0.98,
+    ),
+    VertexMap(
+        name="mean_curvature",
+        unit="1/mm",
+        label="mean curvature",
+        bids_suffix="curv",
+        description="Mean curvature, positive on gyri: FreeSurfer's files named curv have the opposite sign",
+    ),
+    VertexMap(
+        name="gaussian_curvature",
+        unit="1/mm2",
+        label="Gaussian curvature",
+        bids_suffix="gaussCurv",
+        description="Gaussian curvature",
+        is_averaged=False,
+    ),
+    VertexMap(
+        name="sulcal_depth_mm",
+        unit="mm",
+        label="sulcal depth",
+        bids_suffix="sulc",
+        description="Sulcal depth: distance to the convex hull of the hemisphere",
+        colours=POSITIVE_COLOURS,
+    ),
+    VertexMap(
+        name="local_gyrification_index",
+        unit="1",
+        label="local gyrification index",
+        bids_suffix="localGyrificationIndex",
+        description="Local gyrification index",
+    ),
+    VertexMap(
+        name="reliable",
+        unit="1",
+        label="reliable",
+        bids_suffix="reliable",
+        description="Reliable",
+        is_averaged=False,
+    ),
+    VertexMap(
+        name="thickness_mm",
+        unit="mm",
+        label="cortical thickness",
+        bids_suffix="thickness",
+        description="Cortical thickness",
+        colours=POSITIVE_COLOURS,
+    ),
+    VertexMap(
+        name="spangy_dominant_band",
+        unit="1",
+        label="dominant SpAnGy band",
+        bids_suffix="spangyDominantBand",
+        description="Spangy dominant band",
+        is_averaged=False,
+    ),
+    VertexMap(
+        name="template_distance_mm",
+        unit="mm",
+        label="distance from the template",
+        bids_suffix="templateDistance",
+        description="Template distance",
+        is_averaged=False,
+    ),
+)
+_DEVIATION_MAPS = (
+    VertexMap(
+        name="distance_mm",
+        unit="mm",
+        label="distance, outwards",
+        bids_suffix="distance",
+        description="Distance of the real surface from the expected one, positive outwards",
+        colours=SIGNED_COLOURS,
+        is_signed=True,
+    ),
+    VertexMap(
+        name="log_area",
+        unit="1",
+        label="logarithm of the area's ratio",
+        bids_suffix="logArea",
+        description="Logarithm of the real over the expected area",
+        colours=SIGNED_COLOURS,
+        is_signed=True,
+    ),
+    VertexMap(
+        name="thickness_difference_mm",
+        unit="mm",
+        label="difference of thickness",
+        bids_suffix="thicknessDifference",
+        description="Real less expected cortical thickness",
+        colours=SIGNED_COLOURS,
+        is_signed=True,
+    ),
+)
+_SIMULATION_MAPS = (
+    VertexMap(
+        name="displacement_mm",
+        unit="mm",
+        label="displacement since the start",
+        bids_suffix="displacement",
+        description="Displacement since the start of the simulation",
+        is_averaged=False,
+        colours=POSITIVE_COLOURS,
+    ),
+    VertexMap(
+        name="area_growth_percent_per_gw",
+        unit="% per week",
+        label="growth of area",
+        bids_suffix="areaGrowth",
+        description="Growth of area",
+        is_averaged=False,
+        colours=POSITIVE_COLOURS,
+    ),
+)
+MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
+"""The maps, by name."""
+COMPARED_MAPS = ("shape_index", "mean_curvature")
+"""The maps by which a simulated brain is correlated with a real one."""
+
+_SIZES = (
+    Metric("volume", "mL", "volume"),
+    Metric("area", "cm2", "pial area"),
+    Metric("area_share", "1", "area share"),
+    Metric("volume_tissue", "mL", "volume of tissue"),
+    Metric("volume_ventricles", "mL", "volume of ventricles"),
+    Metric("volume_cortex", "mL", "volume of cortex"),
+    Metric("area_ratio", "1", "area ratio", has_norm=False),
+    Metric("crossing_faces", "1", "crossing faces", has_norm=False, is_reported=False),
+)
+_FOLDING = (
+    Metric("gyrification_index", "1", "gyrification index, hulls"),
+    Metric("gyrification_index_envelope", "1", "gyrification index, envelopes"),
+    Metric("mean_shape_index", "1", "mean shape index"),
+    Metric("mean_curvedness", "1/mm", "mean curvedness"),
+    Metric("sulcal_area_share", "1", "sulcal area share"),
+    Metric("curvature_radius", "mm", "curvature radius", has_norm=False, is_reported=False),
+    Metric("curvature_wavelength", "mm", "curvature wavelength", has_norm=False),
+    Metric("mean_sulcal_depth", "mm", "mean depth below the hull"),
+    Metric("sulcal_depth_95", "mm", "depth below the hull, 95 %"),
+    Metric("intrinsic_curvature_index", "1", "intrinsic curvature index"),
+    Metric("folding_index", "1", "folding index"),
+    Metric("mean_curvature_norm", "1", "mean curvature norm"),
+    Metric("gaussian_curvature_norm", "1", "Gaussian curvature norm"),
+    Metric("mean_curvature_q05", "1/mm", "mean curvature q05", is_reported=False),
+    Metric("mean_curvature_q25", "1/mm", "mean curvature q25", is_reported=False),
+    Metric("mean_curvature_q50", "1/mm", "mean curvature q50", is_reported=False),
+    Metric("mean_curvature_q75", "1/mm", "mean curvature q75", is_reported=False),
+    Metric("mean_curvature_q95", "1/mm", "mean curvature q95", is_reported=False),
+)
+_THICKNESS = (
+    Metric("mean_thickness", "mm", "mean cortical thickness"),
+    Metric("thickness_sd", "mm", "cortical thickness, SD"),
+    Metric("thickness_q05", "mm", "thickness q05", is_reported=False),
+    Metric("thickness_q95", "mm", "thickness q95", is_reported=False),
+    Metric("thickness_measured_share", "1", "thickness measured share", has_norm=False, is_reported=False),
+)
+_SPECTRUM = (
+    *(Metric(f"spangy_B{band}_power", "mm2", f"SpAnGy B{band} power") for band in range(7)),
+    *(Metric(f"spangy_B{band}_relative_power", "1", f"SpAnGy B{band} relative power") for band in range(1, 7)),
+    Metric("spangy_modes", "1", "SpAnGy modes", has_norm=False),
+    Metric("spangy_captured_share", "1", "SpAnGy captured share", has_norm=False),
+    Metric("weyl_number", "1", "Weyl number", has_norm=False),
+)
+_DEVIATIONS = tuple(Metric(m.mean_name.removeprefix("mean_"), m.unit, m.label) for m in _DEVIATION_MAPS)
+_REGION_MEANS = tuple(Metric(m.mean_name, m.unit, m.label) for m in _BRAIN_MAPS if m.is_averaged)
+WHITE_METRICS = (
+    "area",
+    "gyrification_index",
+    "gyrification_index_envelope",
+    "mean_shape_index",
+    "mean_curvedness",
+    "sulcal_area_share",
+    "mean_sulcal_depth",
+    "sulcal_depth_95",
+)
+"""The metrics that are also given of white surfaces, with `white_` before their names."""
+_PIAL = {m.name: m for m in (*_REGION_MEANS, *_SIZES, *_FOLDING, *_THICKNESS, *_SPECTRUM, *_DEVIATIONS)}
+_WHITE = (Metric(f"white_{n}", _PIAL[n].unit, f"white {n.replace('_', ' ')}") for n in WHITE_METRICS)
+METRICS = Registry(_PIAL | {m.name: m for m in _WHITE})
+"""The metrics, by name."""

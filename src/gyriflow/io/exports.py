@@ -14,24 +14,13 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
+from ..quantities import MAPS, VertexMap
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, write_json, write_text
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
-BIDS_MAPS = {
-    "mean_curvature": (
-        "curv",
-        "1/mm",
-        "Mean curvature, positive on gyri: FreeSurfer's files named curv have the opposite sign",
-    ),
-    "sulcal_depth_mm": ("sulc", "mm", "Sulcal depth: distance to the convex hull of the hemisphere"),
-    "thickness_mm": ("thickness", "mm", "Cortical thickness"),
-    "gaussian_curvature": ("gaussCurv", "1/mm^2", "Gaussian curvature"),
-    "curvedness": ("curvedness", "1/mm", "Curvedness, the root mean square of the principal curvatures"),
-}
-"""Suffix, unit and description of maps whose own names do not tell them."""
 OF_STUDY = ("participants", "metrics_wide", "metrics_long")
 """Tables of all subjects."""
 IGNORED = """\
@@ -205,12 +194,12 @@ def _write_maps(
     )
     for files, entity, desc, more in kinds:
         for side, path in files.items():
-            for quantity, values in read_vertex_maps(path).items():
-                suffix, unit, text = BIDS_MAPS.get(quantity) or _described(quantity)
-                sidecars["_".join(filter(None, (entity, suffix)))] = {"Description": text, "Units": unit, **more}
+            for name, values in read_vertex_maps(path).items():
+                suffix, about = MAPS[name].bids_suffix, _described(MAPS[name])
+                sidecars["_".join(filter(None, (entity, suffix)))] = {**about, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
-                write_vertex_maps(named, {quantity: values}, STRUCTURES[side])
+                write_vertex_maps(named, {name: values}, STRUCTURES[side])
     return sidecars
 
 
@@ -293,10 +282,10 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Names) -
         write_json(folder / f"{name}.json", columns)
 
 
-def _described(quantity: str) -> tuple[str, str, str]:
-    first, *others = quantity.removesuffix("_mm").split("_")
-    suffix = _alphanumeric(first + "".join(word.capitalize() for word in others))
-    return suffix, "mm" if quantity.endswith("_mm") else "arbitrary", " ".join((first.capitalize(), *others))
+def _described(quantity: VertexMap) -> dict[str, Any]:
+    # BIDS writes powers with ^, and "arbitrary" for no unit
+    unit = "arbitrary" if quantity.unit == "1" else quantity.unit.replace("mm2", "mm^2")
+    return {"Description": quantity.description, "Units": unit}
 
 
 def _alphanumeric(text: str) -> str:

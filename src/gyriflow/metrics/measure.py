@@ -1,7 +1,8 @@
-"""All metrics of one brain: what is measured on its hemispheres, and the rows of its tables.
+"""Measure a brain: the metrics of its surfaces and the maps over them.
 
-A metric is a row (name, value, unit) of `size_rows` (of any surface), `folding_rows` (of one hemisphere or both),
-`thickness_rows` or `spectrum_rows` (of a hemisphere); a map is an entry of `Hemisphere.maps`.
+A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hemisphere or both), `thickness_metrics` or
+`spectrum_metrics` (one hemisphere); a map is an entry of `Folds.maps` or `Hemisphere.maps`. Each has a record in
+`gyriflow.quantities`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ from ..errors import MeshError
 from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
+from ..quantities import METRICS, WHITE_METRICS
 from ..settings.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
@@ -23,13 +25,8 @@ from .laplace_beltrami import laplacian
 from .spangy import SpangyModes, Spectrum, first_eigenvalue, modes_of, spectrum, weyl_number
 from .thickness import at_part
 
-type Row = tuple[str, float, str]
-
-OF_WHITE = (
-    *("gyrification_index", "gyrification_index_envelope", "mean_shape_index", "mean_curvedness", "sulcal_area_share"),
-    *("mean_sulcal_depth", "sulcal_depth_95"),
-)
-"""The rows of folding that are given for white surfaces, too."""
+type Metrics = dict[str, float]
+"""Values by the names of their records, in their units."""
 
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
@@ -118,17 +115,17 @@ def measure_hemisphere(
     )
 
 
-def size_rows(mesh: TriangleMesh, crossing: int) -> list[Row]:
-    """Return the rows of size of a hemisphere or of the whole, and the number of faces that cut others."""
-    return [
-        ("volume", signed_volume(cap(mesh)) * ML_PER_MM3, "mL"),
-        ("area", area(mesh) * CM2_PER_MM2, "cm2"),
-        ("crossing_faces", float(crossing), "1"),
-    ]
+def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
+    """Return volume and area of a hemisphere or of the whole, and the number of faces that cut others."""
+    return {
+        "volume": signed_volume(cap(mesh)) * ML_PER_MM3,
+        "area": area(mesh) * CM2_PER_MM2,
+        "crossing_faces": float(crossing),
+    }
 
 
-def folding_rows(sides: Sequence[Folds]) -> list[Row]:
-    """Return the rows of folding of one hemisphere, or of a brain's two together; what is near cuts is left out.
+def folding_metrics(sides: Sequence[Folds]) -> Metrics:
+    """Return the metrics of folding of one hemisphere, or of both together; vertices near cuts are left out.
 
     Indices are of both hemispheres' areas, each in its own hull; means are over the vertices of both, by area.
     """
@@ -145,53 +142,55 @@ def folding_rows(sides: Sequence[Folds]) -> list[Row]:
 
     depth = np.concatenate([side.depth for side in sides])
     deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
-    return [
-        ("gyrification_index", gyrification_index(meshes, [side.hull for side in sides]), "1"),
-        ("gyrification_index_envelope", gyrification_index(meshes, [side.envelope for side in sides]), "1"),
-        ("mean_shape_index", mean(bend.shape_index), "1"),
-        ("mean_curvedness", mean(bend.curvedness), "1/mm"),
-        ("sulcal_area_share", mean(bend.shape_index < 0), "1"),
-        ("curvature_radius", mean(bend.radius_mm), "mm"),
-        ("curvature_wavelength", RESOLVED_RADII * mean(bend.radius_mm), "mm"),
-        ("mean_sulcal_depth", mean(depth), "mm"),
-        ("sulcal_depth_95", float(deep), "mm"),
-        *((name, value, "1") for name, value in curvature_integrals(bend, weights).items()),
-        *((name, value, "1/mm") for name, value in mean_curvature_quantiles(bend, weights).items()),
-    ]
+    return {
+        "gyrification_index": gyrification_index(meshes, [side.hull for side in sides]),
+        "gyrification_index_envelope": gyrification_index(meshes, [side.envelope for side in sides]),
+        "mean_shape_index": mean(bend.shape_index),
+        "mean_curvedness": mean(bend.curvedness),
+        "sulcal_area_share": mean(bend.shape_index < 0),
+        "curvature_radius": mean(bend.radius_mm),
+        "curvature_wavelength": RESOLVED_RADII * mean(bend.radius_mm),
+        "mean_sulcal_depth": mean(depth),
+        "sulcal_depth_95": float(deep),
+        **curvature_integrals(bend, weights),
+        **mean_curvature_quantiles(bend, weights),
+    }
 
 
-def thickness_rows(values: Floats, areas: Floats) -> list[Row]:
-    """Return the rows of thickness at (n,) vertices, NaN where it was not measured; weights by area."""
+def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
+    """Return the metrics of thickness at (n,) vertices, NaN where it was not measured, weighted by area.
+
+    Empty where it was measured nowhere.
+    """
     measured = np.isfinite(values)
     if not measured.any():
-        return []
+        return {}
     chosen, weights = values[measured], areas[measured]
     mean = float(np.average(chosen, weights=weights))
     low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
-    return [
-        ("mean_thickness", mean, "mm"),
-        ("thickness_sd", float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))), "mm"),
-        ("thickness_q05", float(low), "mm"),
-        ("thickness_q95", float(high), "mm"),
-        ("thickness_measured_share", float(weights.sum() / areas.sum()), "1"),
-    ]
+    return {
+        "mean_thickness": mean,
+        "thickness_sd": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
+        "thickness_q05": float(low),
+        "thickness_q95": float(high),
+        "thickness_measured_share": float(weights.sum() / areas.sum()),
+    }
 
 
-def area_ratio_rows(table: Sequence[Row]) -> list[Row]:
-    """Return the row of the pial area over the cortex's volume by its mean thickness, where rows of a whole have these.
+def area_ratio(whole: Metrics) -> Metrics:
+    """Return the pial area over the area of a sheet of cortex, or nothing where cortex or thickness is not known.
 
     A cortical sheet of volume V and thickness H has the area V/H in its middle and a larger one outside: a ratio much
-    below 1 tells that sulci are shut.
+    below 1 means fused sulci.
     """
-    known = {name: value for name, value, _ in table}
-    if not {"volume_cortex", "mean_thickness"} <= set(known):
-        return []
-    sheet_cm2 = known["volume_cortex"] / ML_PER_MM3 / known["mean_thickness"] * CM2_PER_MM2
-    return [("area_ratio", known["area"] / sheet_cm2, "1")]
+    if not {"volume_cortex", "mean_thickness"} <= set(whole):
+        return {}
+    sheet_cm2 = whole["volume_cortex"] / ML_PER_MM3 / whole["mean_thickness"] * CM2_PER_MM2
+    return {"area_ratio": whole["area"] / sheet_cm2}
 
 
-def spectrum_rows(side: Hemisphere) -> list[Row]:
-    """Return the rows of a hemisphere's spectrum.
+def spectrum_metrics(side: Hemisphere) -> Metrics:
+    """Return the metrics of a hemisphere's spectrum.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
     `spectra` has all values with their flags.
@@ -199,22 +198,32 @@ def spectrum_rows(side: Hemisphere) -> list[Row]:
     bands = side.spectrum.bands
     power = bands["power"].where(bands["complete"])
     share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
-    rows: list[Row] = []
+    metrics: Metrics = {}
     for band in bands["band"]:
-        rows.append((f"spangy_B{band}_power", float(power[band]), "mm2"))
+        metrics[f"spangy_B{band}_power"] = float(power[band])
         if band > 0:
-            rows.append((f"spangy_B{band}_relative_power", float(share[band]), "1"))
-    return [
-        *rows,
-        ("spangy_modes", float(len(side.spectrum.eigenvalues)), "1"),
-        ("spangy_captured_share", side.spectrum.captured, "1"),
-        ("weyl_number", float(side.weyl), "1"),
-    ]
+            metrics[f"spangy_B{band}_relative_power"] = float(share[band])
+    return {
+        **metrics,
+        "spangy_modes": float(len(side.spectrum.eigenvalues)),
+        "spangy_captured_share": side.spectrum.captured,
+        "weyl_number": float(side.weyl),
+    }
 
 
-def _rows_of(sides: Sequence[Hemisphere]) -> list[Row]:
+def _folding_and_thickness(sides: Sequence[Hemisphere]) -> Metrics:
     areas = np.concatenate([vertex_areas(side.mesh) for side in sides])
-    return folding_rows(sides) + thickness_rows(np.concatenate([side.thickness for side in sides]), areas)
+    return folding_metrics(sides) | thickness_metrics(np.concatenate([side.thickness for side in sides]), areas)
+
+
+def _table(parts: Mapping[str, Metrics]) -> pd.DataFrame:
+    """Return metrics by hemisphere as a table with the units of their records."""
+    rows = [
+        (hemisphere, name, value, METRICS[name].unit)
+        for hemisphere, metrics in parts.items()
+        for name, value in metrics.items()
+    ]
+    return pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,14 +286,14 @@ def measure_brain(
         thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
         sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
-    of_whole = size_rows(whole, crossing_faces(whole)) + _rows_of(sides)
-    of_whole += [(metric, volume, "mL") for metric, volume in volumes.items() if volume is not None]
-    rows = [("whole", *row) for row in of_whole + area_ratio_rows(of_whole)]
+    of_whole = size_metrics(whole, crossing_faces(whole)) | _folding_and_thickness(sides)
+    of_whole |= {metric: volume for metric, volume in volumes.items() if volume is not None}
+    metrics = {"whole": of_whole | area_ratio(of_whole)}
     for side in sides:
-        of_side = size_rows(side.mesh, side.crossing) + _rows_of([side]) + spectrum_rows(side)
-        rows += [(side.name, *row) for row in of_side]
+        sizes = size_metrics(side.mesh, side.crossing)
+        metrics[side.name] = sizes | _folding_and_thickness([side]) | spectrum_metrics(side)
     return BrainMetrics(
-        table=pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"]),
+        table=_table(metrics),
         maps={side.name: side.maps() for side in sides},
         spectra=_stacked({side.name: side.spectrum.bands for side in sides}),
         coefficients=_stacked({side.name: side.spectrum.modes() for side in sides}),
@@ -309,13 +318,11 @@ def measure_white(
     """Return the metrics and the maps of the white surfaces of "left" and "right", or of the only hemisphere.
 
     They are measured as pial ones are. The table has hemisphere, metric, value and unit of their area and of
-    `OF_WHITE`, the names with `white_` in front; the maps are those of `Folds` per hemisphere.
+    `WHITE_METRICS`, the names with `white_` in front; the maps are those of `Folds` per hemisphere.
     """
     folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in sides.items()}
-    rows = []
+    metrics = {}
     for name, parts in {"whole": list(folds.values()), **{name: [part] for name, part in folds.items()}}.items():
-        size = sum(area(part.mesh) for part in parts) * CM2_PER_MM2
-        indices = [row for row in folding_rows(parts) if row[0] in OF_WHITE]
-        rows += [(name, f"white_{metric}", value, unit) for metric, value, unit in [("area", size, "cm2"), *indices]]
-    table = pd.DataFrame(rows, columns=["hemisphere", "metric", "value", "unit"])
-    return table, {name: part.maps() for name, part in folds.items()}
+        values = {"area": sum(area(part.mesh) for part in parts) * CM2_PER_MM2} | folding_metrics(parts)
+        metrics[name] = {f"white_{metric}": values[metric] for metric in WHITE_METRICS}
+    return _table(metrics), {name: part.maps() for name, part in folds.items()}

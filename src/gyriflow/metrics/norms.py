@@ -10,9 +10,10 @@ from scipy import stats
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
+from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
-from .tables import BRAIN, OF_THE_ANALYSIS
+from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
@@ -187,7 +188,8 @@ def _with_people(metrics: pd.DataFrame) -> pd.DataFrame:
 def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
     rows = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
     rows = _with_people(rows)
-    return list(rows[~rows["metric"].isin(OF_THE_ANALYSIS)].groupby(["hemisphere", "metric"], sort=False))
+    with_norm = rows["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
+    return list(rows[with_norm].groupby(["hemisphere", "metric"], sort=False))
 
 
 class _Curve(NamedTuple):

@@ -8,21 +8,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
+from ..quantities import MAPS
 from ..settings.terms import NO_REGION
 from ..units import CM2_PER_MM2
-
-MAP_UNITS = {
-    "shape_index": "1",
-    "curvedness": "1/mm",
-    "mean_curvature": "1/mm",
-    "sulcal_depth_mm": "mm",
-    "local_gyrification_index": "1",
-    "thickness_mm": "mm",
-    "distance_mm": "mm",
-    "log_area": "1",
-    "thickness_difference_mm": "mm",
-}
-"""The maps whose means are given by region, and their units."""
 
 
 def region_metrics(
@@ -34,12 +22,11 @@ def region_metrics(
     """Return area and means of maps by region of each hemisphere, weighted by area.
 
     Sides are the pial surfaces of "left" and "right", or of the only hemisphere. Per hemisphere there are maps, as
-    `measure.BrainMetrics.maps`, of which those of `MAP_UNITS` are used, and the (n,) label of each vertex, 0 for none;
-    names are those of the regions by label. NaN is left out of means, and so is what lies near a cut where `reliable`
-    is 0.
+    `measure.BrainMetrics.maps`, and the (n,) label of each vertex, 0 for none; names are those of the regions by label.
+    NaN is left out of means, and so is what lies near a cut where `reliable` is 0.
 
-    Columns hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the
-    maps' names without their unit, with mean_ in front; a region that is all NaN or near a cut has NaN. InputError for
+    Columns hemisphere, region, metric, value, unit. Metrics are area (cm2), area_share (of the hemisphere) and the mean
+    of each map that is averaged (`VertexMap.mean_name`); a region that is all NaN or near a cut has NaN. InputError for
     labels that have no name, or are not as many as vertices.
     """
     rows = []
@@ -57,10 +44,10 @@ def region_metrics(
             covered = float(areas[inside].sum())
             rows.append((side, name, "area", covered * CM2_PER_MM2, "cm2"))
             rows.append((side, name, "area_share", covered / total, "1"))
-            for key, unit in MAP_UNITS.items():
-                if key in maps[side]:
-                    values = np.asarray(maps[side][key], dtype=float)
+            for key, of_vertices in maps[side].items():
+                if MAPS[key].is_averaged:
+                    values = np.asarray(of_vertices, dtype=float)
                     used = inside & np.isfinite(values) & reliable
                     mean = float(np.average(values[used], weights=areas[used])) if areas[used].any() else np.nan
-                    rows.append((side, name, f"mean_{key.removesuffix('_mm').removeprefix('mean_')}", mean, unit))
+                    rows.append((side, name, MAPS[key].mean_name, mean, MAPS[key].unit))
     return pd.DataFrame(rows, columns=["hemisphere", "region", "metric", "value", "unit"])

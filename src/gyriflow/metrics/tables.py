@@ -12,12 +12,6 @@ from ..settings.terms import MEASURED, SIDES
 BRAIN = ["subject", "run", "week"]
 """The columns that name a brain."""
 
-OF_THE_ANALYSIS = (
-    *("crossing_faces", "curvature_radius", "curvature_wavelength", "spangy_modes", "spangy_captured_share"),
-    *("weyl_number", "thickness_measured_share", "area_ratio"),
-)
-"""Rows of the table of metrics that describe the surface's faces and the analysis rather than the folds."""
-
 
 def long_table(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """Return tables of metrics, of whole hemispheres and of regions, as one, a row per number.

@@ -20,7 +20,7 @@ from matplotlib.transforms import Transform
 
 from ..errors import InputError
 from ..settings.terms import FOLD_BANDS, MEASURED, REAL_BRAIN, SIDES
-from .labels import METRICS, value_labels, with_unit
+from .labels import metric_title, value_labels
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
@@ -62,7 +62,7 @@ def _present(metrics: pd.DataFrame, names: Sequence[str]) -> list[str]:
 
 
 def _title(axes: Axes, rows: pd.DataFrame) -> None:
-    axes.set_title(with_unit(METRICS[rows["metric"].iloc[0]], rows["unit"].iloc[0]))
+    axes.set_title(metric_title(rows["metric"].iloc[0]))
 
 
 def _lines(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:

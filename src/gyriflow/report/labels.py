@@ -1,32 +1,10 @@
-"""What quantities, units, weeks and parameters are called in figures and tables."""
+"""Titles of metrics, maps, parameters, weeks and columns in figures and tables."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
-from ..quantities import SHAPE_MEASURES
+from ..quantities import MAPS, METRICS
 
-METRICS = {
-    "volume": "volume",
-    "area": "pial area",
-    "gyrification_index": "gyrification index, hulls",
-    "gyrification_index_envelope": "gyrification index, envelopes",
-    "mean_local_gyrification_index": "local gyrification index",
-    "mean_curvedness": "mean curvedness",
-    "mean_curvature": "mean curvature",
-    "mean_shape_index": "mean shape index",
-    "mean_sulcal_depth": "mean depth below the hull",
-    "folding_index": "folding index",
-    "mean_thickness": "mean cortical thickness",
-    "thickness_sd": "cortical thickness, SD",
-    "sulcal_depth_95": "depth below the hull, 95 %",
-    "gaussian_curvature_norm": "Gaussian curvature norm",
-    "volume_tissue": "volume of tissue",
-    "volume_ventricles": "volume of ventricles",
-    "volume_cortex": "volume of cortex",
-}
-"""Metrics of the study's tables and their titles; others are called as they are."""
-MEASURES = {"shape_index": "shape index", "mean_curvature": "mean curvature"}
-"""What a simulation is compared with a real brain by, as in the names of columns, and their titles."""
 SIMPLER_WAYS = {
     "scaled": "start, scaled: no folding",
     "atlas": "the atlas' brain, scaled",
@@ -35,22 +13,6 @@ SIMPLER_WAYS = {
     "target": "what the run grows towards",
 }
 """Simpler ways to predict a brain, by the names of the study's table."""
-DISPLACEMENT = "displacement_mm"
-AREA_GROWTH = "area_growth_percent_per_gw"
-DISTANCE = "distance_mm"
-DEVIATIONS = {
-    DISTANCE: "distance, outwards (mm)",
-    "log_area": "logarithm of the area's ratio",
-    "thickness_difference_mm": "difference of thickness (mm)",
-}
-"""How a real brain deviates from the expected one."""
-MAPS = {
-    **{name: measure.label for name, measure in SHAPE_MEASURES.items()},
-    **DEVIATIONS,
-    DISPLACEMENT: "displacement since the start (mm)",
-    AREA_GROWTH: "growth of area (% per week)",
-}
-"""The quantities that are drawn as maps, with the labels of their colour bars."""
 PARAMETERS = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",
@@ -84,9 +46,19 @@ _UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": "
 
 
 def with_unit(name: str, unit: object) -> str:
-    """Return a name with a unit of the tables behind it, for example "pial area (cm²)"."""
+    """Return a name with a unit of the tables behind it, for example "time step (s)"."""
     shown = _UNITS.get(unit, unit) if isinstance(unit, str) else ""
     return f"{name} ({shown})" if shown else name
+
+
+def metric_title(name: str) -> str:
+    """Return the title of a metric with its unit, for example "pial area (cm²)"."""
+    return with_unit(METRICS[name].label, METRICS[name].unit)
+
+
+def map_title(name: str) -> str:
+    """Return the title of the colour bar of a map, for example "sulcal depth (mm)"."""
+    return with_unit(MAPS[name].label, MAPS[name].ends or MAPS[name].unit)
 
 
 def plain(name: str) -> str:

@@ -14,7 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..settings.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
-from .labels import METRICS, plain, week_label, with_unit
+from .labels import metric_title, plain, week_label
 from .tables import brain_table, html_table, predicted_table, span, standing, worth_table
 
 PATH_PLACEHOLDER = "(file)"
@@ -226,7 +226,7 @@ def brains_table(
     scored = scored[["subject", "metric"]].assign(stands=standing(scored))
     whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"stands": ""})
     cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", row.stands, "whole") for row in whole.itertuples()}
-    heads = {name: with_unit(METRICS[name], unit) for name, unit in zip(whole["metric"], whole["unit"], strict=True)}
+    heads = {name: metric_title(name) for name in whole["metric"]}
     rows = []
     for brain in brains:
         key = brain["id"]

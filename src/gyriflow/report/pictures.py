@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
-from ..quantities import SHAPE_MEASURES, VertexMeasure
+from ..quantities import MAPS, SIGNED_COLOURS
 from ..settings.terms import REAL_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2
-from .labels import AREA_GROWTH, DEVIATIONS, DISPLACEMENT, DISTANCE, MAPS, column_label, plain, value_labels
+from .labels import column_label, map_title, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
@@ -48,7 +48,6 @@ Halves = Sequence[SurfaceMaps]
 SIDE_VIEWS = ("left", "top")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
-SIGNED = "RdBu_r"
 ROUNDING = 1e-9
 LINES_MM, LONG = 4.0, 0.9
 """How far lines that show directions are apart, and the part of the vectors that they show the length of."""
@@ -110,7 +109,7 @@ def runs_by_week(
     real : {week, or another heading: surface in RAS+ mm}
         A week that one of them lacks leaves its place empty.
     deviations : {week: (surface, maps)}
-        Of which `labels.DISTANCE` is shown below.
+        Of which `distance_mm` is shown below.
     predicted : the heading of a predicted brain (blue) among the real ones
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
@@ -124,10 +123,10 @@ def runs_by_week(
     }
     bar = None
     if deviations:
-        away = {week: (mesh, maps[DISTANCE]) for week, (mesh, maps) in deviations.items()}
-        scale = scale_of(DISTANCE, np.concatenate([values for _, values in away.values()]))
+        away = {week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()}
+        scale = scale_of("distance_mm", np.concatenate([values for _, values in away.values()]))
         panels["distance"] = {view: [_map_panel(away.get(key), scale, view) for key in keys] for view in seen}
-        bar = scale, MAPS[DISTANCE]
+        bar = scale, map_title("distance_mm")
     return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
 
 
@@ -147,7 +146,7 @@ def displacement_maps(
     """
     keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in SIDE_VIEWS]
     every = np.concatenate([norms for maps in displacements.values() for _, norms in maps.values()])
-    scale = scale_of(DISPLACEMENT, every)
+    scale = scale_of("displacement_mm", every)
 
     def panel(shown: SurfaceMap | None, view: View) -> Panel | None:
         if shown is None:
@@ -172,22 +171,21 @@ def round_up(value: float) -> float:
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Return the colour scale of one of `labels.MAPS`: its own limits, or one that few vertices pass.
+    """Return the colour scale of a map of `MAPS`: its own limits, or one that few vertices pass.
 
-    It begins at zero. Of deviations, and of growth where some is below zero, it is as wide on both sides, pale at zero.
+    It begins at zero. Of signed maps, and where values are below zero, it is as wide on both sides, pale at zero.
     The end is a round value, so that no outlier sets it.
     """
-    measure = SHAPE_MEASURES.get(quantity, VertexMeasure(MAPS[quantity]))
-    if measure.limits is not None:
-        return colour_scale(measure.colours, *measure.limits)
+    record = MAPS[quantity]
+    if record.limits is not None:
+        return colour_scale(record.colours, *record.limits)
     finite = values[np.isfinite(values)]
-    # by more than rounding
-    shrinks = quantity == AREA_GROWTH and finite.min() < -ROUNDING * np.abs(finite).max()
-    signed = quantity in DEVIATIONS or shrinks
+    # below zero by more than rounding
+    signed = record.is_signed or finite.min(initial=0.0) < -ROUNDING * np.abs(finite).max(initial=0.0)
     sizes = np.abs(finite) if signed else finite
-    high = float(np.quantile(sizes, measure.quantile)) if len(sizes) else 1.0
+    high = float(np.quantile(sizes, record.quantile)) if len(sizes) else 1.0
     end = round_up(high) if high > 0 else 1.0
-    low, colours = (-end, SIGNED) if signed else (0.0, measure.colours)
+    low, colours = (-end, SIGNED_COLOURS) if signed else (0.0, record.colours)
     return colour_scale(colours, low, end, cut=bool((sizes > end).any()))
 
 
@@ -238,7 +236,7 @@ def scalar_maps(
     ----------
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
-    quantity : a name of `labels.MAPS`
+    quantity : a name of `MAPS`
     directions : {week or run: (n, 3) vectors at the vertices}
         Drawn as lines in proportion to these, but for the longest tenth, which are alike.
     """
@@ -253,7 +251,7 @@ def scalar_maps(
         for group, shown in maps.items()
     }
     legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
-    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, MAPS[quantity]), legend=legend)
+    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, map_title(quantity)), legend=legend)
 
 
 def _map_panel(
@@ -312,7 +310,7 @@ def influence_picture(
     for view in seen:
         panels = [_map_panel(shown, scale, view) for shown in maps.values()]
         rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
-    return panel_grid(list(brains), rows, colour_bar=(scale, MAPS[quantity]))
+    return panel_grid(list(brains), rows, colour_bar=(scale, map_title(quantity)))
 
 
 @styled
@@ -322,7 +320,7 @@ def small_pictures(halves: Halves, *, side: str) -> Figure:
     All brains have one scale.
     """
     mesh, maps = whole_maps(halves, ("shape_index", "sulcal_depth_mm"))
-    depth = colour_scale(SHAPE_MEASURES["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
+    depth = colour_scale(MAPS["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
     shown = {side: ("shape_index", scale_of("shape_index", np.empty(0))), "top": ("sulcal_depth_mm", depth)}
     extents = {view: half_extents(mesh, VIEWS[view]) for view in shown}
     tall = 1.05 * max(height for _, height in extents.values())

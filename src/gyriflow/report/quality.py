@@ -17,7 +17,7 @@ from ..geometry.alignment import angle_deg
 from ..geometry.deformations import voxel_index
 from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
-from ..quantities import SHAPE_MEASURES
+from ..quantities import MAPS
 from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
@@ -108,7 +108,7 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     if brain.thickness_mm is None:
         _draw_views(thickness, brain, uniform, OTHER_VIEWS)
     else:
-        scale = colour_scale(SHAPE_MEASURES["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
+        scale = colour_scale(MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
         panels = _draw_views(thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS)
         unknown = "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
         thickness.colorbar(scale, ax=panels).set_label(f"thickness (mm){unknown}", fontsize=6.5)

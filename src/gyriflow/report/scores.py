@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
+from ..quantities import COMPARED_MAPS, MAPS
 from ..settings.terms import MEASURED, SIDES
-from .labels import MEASURES, SIMPLER_WAYS, parameter_label, plain, with_unit
+from .labels import SIMPLER_WAYS, parameter_label, plain, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
@@ -53,12 +54,12 @@ def validation_chart(
     ----------
     validation
         Columns run, start_week, week, kind, gain_…, gain_low_…, gain_high_…, r_start_…, r_adjacent_… of each of
-        `labels.MEASURES`.
+        `COMPARED_MAPS`.
     ceiling : the same of the start carried by registration
     """
     colours = run_colours(validation["run"], runs)
-    figure, panels = panel_figure(len(MEASURES), per_row=2, panel_in=2.5)
-    for axes, (measure, name) in zip(panels, MEASURES.items(), strict=True):
+    figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
+    for axes, measure in zip(panels, COMPARED_MAPS, strict=True):
         for number, ((run, _), rows) in enumerate(validation.groupby(["run", "start_week"], sort=False)):
             line = rows.sort_values("week")
             shift = 0.03 * (number - (len(colours) - 1) / 2)
@@ -73,7 +74,7 @@ def validation_chart(
                 begin, end = rows["week"].iloc[0] + ONE_WEEK
                 axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-        axes.set_title(name)
+        axes.set_title(MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
     extra: list[Artist] = [star("real brain of the week before", markersize=6)]

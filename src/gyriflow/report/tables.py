@@ -9,8 +9,9 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
+from ..quantities import METRICS
 from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED, REAL_BRAIN, SIDES
-from .labels import METRICS, SIMPLER_WAYS, parameter_label, plain, week_label, with_unit
+from .labels import SIMPLER_WAYS, metric_title, parameter_label, plain, week_label
 from .style import run_colours, runs_by_name
 
 VERDICTS = ("fine", "look", "refused")
@@ -23,8 +24,6 @@ _TABLE = Environment(autoescape=True).from_string(
     "{% endfor %}</tbody></table>"
 )
 
-OF_THE_SURFACE = ("crossing_faces", "curvature_radius", "thickness_measured_share")
-"""Metrics of how a brain was measured."""
 OF_EVERY_RUN = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
     *(
@@ -56,15 +55,16 @@ OF_THE_MESH = {
     "gap_kept": "share of narrow gaps that is open",
 }
 """What is told of the quality of a mesh."""
-QUANTILE = r"_q\d\d$"
-"""How the metrics end that are told in the CSV alone."""
 
 
 def _named(rows: pd.DataFrame) -> pd.Series:
     """Return the metric of each row as in figures, with its unit."""
-    pairs = zip(rows["metric"], rows["unit"], strict=True)
-    names = [with_unit(METRICS.get(metric, plain(metric)), unit) for metric, unit in pairs]
-    return pd.Series(names, index=rows.index, dtype=object)
+    return rows["metric"].map(metric_title).astype(object)
+
+
+def _reported(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of metrics that are shown in the report."""
+    return rows[rows["metric"].map(lambda name: METRICS[name].is_reported).astype(bool)]
 
 
 def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.DataFrame:
@@ -83,8 +83,7 @@ def metrics_table(metrics: pd.DataFrame, *, measured: str = REAL_BRAIN) -> pd.Da
     -------
     DataFrame indexed by metric (with its unit); cells without a value are NaN, without a difference "–"
     """
-    left_out = metrics["metric"].isin(OF_THE_SURFACE) | metrics["metric"].str.contains(QUANTILE)
-    rows = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & ~left_out])
+    rows = runs_by_name(_reported(metrics[metrics["hemisphere"] == "whole"]))
     real = rows["run"] == MEASURED
     week = max(set(rows.loc[real, "week"]) & set(rows.loc[~real, "week"]) or set(rows["week"]))
     rows = rows[rows["week"] == week].assign(name=_named)
@@ -120,8 +119,7 @@ def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
     metrics : columns hemisphere, metric, value, unit, of this brain
     centiles : those of the study, columns subject, run, hemisphere, metric, value, expected, z, centile, flag
     """
-    rows = metrics[~metrics["metric"].isin(OF_THE_SURFACE) & ~metrics["metric"].str.contains(QUANTILE)]
-    rows = rows.assign(name=_named)
+    rows = _reported(metrics).assign(name=_named)
     wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(rows["name"].unique())
     table = wide[[part for part in ("whole", *SIDES) if part in wide]]
     own = (centiles["subject"] == metrics["subject"].iloc[0]) & (centiles["run"] == MEASURED)

@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
-from .labels import DISPLACEMENT, MAPS
+from ..quantities import MAPS
+from .labels import map_title
 from .pictures import Halves, scale_of, whole_maps
 from .style import REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
 
@@ -23,8 +24,9 @@ MOST_VERTICES = 8000
 FEWEST_VERTICES = 500
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
+_DRAWN = [name for name, record in MAPS.items() if record.colours]
 # base64 writes three bytes as four letters; a vertex has about two triangles, of three indices of two bytes
-_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(MAPS), 12
+_LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(_DRAWN), 12
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 """A week, a surface in RAS+ mm and its maps by name; NaN where a value is not known."""
@@ -59,7 +61,7 @@ def surfaces_view(
     high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
     scales = {}
-    for name in MAPS:
+    for name in _DRAWN:
         if values := [maps[name] for _, _, maps in everything if name in maps]:
             every = np.concatenate(values)
             scales[name] = scale_of(name, every[np.isfinite(every)])
@@ -78,13 +80,15 @@ def surfaces_view(
     for name, scale in scales.items():
         bottom, top = scale.get_clim()
         colours = scale.to_rgba(np.linspace(bottom, top, _VALUE_LEVELS + 1), bytes=True)[:, :3]
-        maps.append({"name": name, "label": MAPS[name], "low": bottom, "high": top, "colours": _text(colours, "u1")})
+        maps.append(
+            {"name": name, "label": map_title(name), "low": bottom, "high": top, "colours": _text(colours, "u1")}
+        )
     return {"low": low.tolist(), "size": box[1], "groups": groups, "maps": maps}
 
 
 def _timed(week: float, halves: Halves) -> Timed:
     mesh, maps = whole_maps(halves)
-    return week, mesh, {name: values for name, values in maps.items() if name in MAPS}
+    return week, mesh, {name: values for name, values in maps.items() if MAPS[name].colours}
 
 
 def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
@@ -93,7 +97,7 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
         if mesh.vertices.shape != start.shape:
             count = f"{len(mesh.vertices)} vertices at {week:g} GW"
             raise InputError("a run's surfaces differ in their vertices", found=count, expected=f"{len(start)}")
-        maps[DISPLACEMENT] = np.linalg.norm(mesh.vertices - start, axis=1)
+        maps["displacement_mm"] = np.linalg.norm(mesh.vertices - start, axis=1)
     return list(frames)
 
 

@@ -72,6 +72,9 @@ def test_bids_derivatives(tmp_path, brain):
     assert list(depth) == ["sulcal_depth_mm"]
     np.testing.assert_allclose(depth["sulcal_depth_mm"][:3], [0, 1 / 7, 2 / 7], rtol=1e-6)
     assert read_json(folder / "sulc.json")["Units"] == "mm"
+    write_vertex_maps(brain.maps["left"], {"unheard_of": depth["sulcal_depth_mm"]})
+    with pytest.raises(KeyError, match="unheard_of"):
+        export_bids(folder, [brain], TABLES, "1.2.3", {})
     _, regions = read_vertex_labels(place / "sub-case1_hemi-L_desc-regions_dseg.label.gii")
     assert regions == {1: "frontal"}
     wide = (folder / "metrics_wide.tsv").read_text()

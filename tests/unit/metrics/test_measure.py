@@ -5,13 +5,16 @@ import pytest
 from scipy.spatial import Delaunay
 from shapes import ellipsoid, octasphere, sphere
 
+from gyriflow.compare.prediction import deviation_maps
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, vertex_areas
-from gyriflow.metrics.measure import BrainMetrics, area_ratio_rows, measure_brain, thickness_rows
+from gyriflow.growth.carrying import maps_on_template
+from gyriflow.metrics.measure import BrainMetrics, area_ratio, measure_brain, measure_white, thickness_metrics
 from gyriflow.metrics.regions import region_metrics
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
+from gyriflow.quantities import MAPS, METRICS
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -72,9 +75,9 @@ def test_volumes_of_tissues_are_of_the_whole_where_labels_know_them(apart: Brain
 
 
 def test_the_pial_area_is_compared_with_that_of_a_sheet_of_the_cortex() -> None:
-    rows = [("area", 300.0, "cm2"), ("volume_cortex", 80.0, "mL"), ("mean_thickness", 2.0, "mm")]
-    assert area_ratio_rows(rows) == [("area_ratio", pytest.approx(0.75), "1")]
-    assert area_ratio_rows(rows[:2]) == []
+    sizes = {"area": 300.0, "volume_cortex": 80.0}
+    assert area_ratio(sizes | {"mean_thickness": 2.0}) == {"area_ratio": pytest.approx(0.75)}
+    assert area_ratio(sizes) == {}
 
 
 def test_neither_the_fissure_nor_a_cut_is_a_sulcus(apart: BrainMetrics, cut: BrainMetrics) -> None:
@@ -107,6 +110,27 @@ def test_maps_and_spectra(apart: BrainMetrics) -> None:
     # the shape index of a sphere is the constant 1: all its power is in B0, 1² times the area
     assert value(apart, "left", "spangy_B0_power") == pytest.approx(4 * np.pi * 20.0**2, rel=0.02)
     assert value(apart, "left", "spangy_captured_share") == pytest.approx(1.0, abs=1e-3)
+
+
+def test_each_map_and_metric_has_a_record_and_each_record_is_written(apart: BrainMetrics) -> None:
+    ball = octasphere(20.0)
+    volumes = {"tissue": 30.0, "ventricles": 1.0, "cortex": 8.0}
+    thick = measure_brain(
+        *(ball, ball, None), thickness_mm=np.full(len(ball.vertices), 2.0), label_volumes_ml=volumes, spangy_modes=60
+    )
+    deviations = {**deviation_maps(ball, ball), "thickness_difference_mm": np.zeros(len(ball.vertices))}
+    at_template = maps_on_template({}, ball, ball, [])
+    drawn_in_report = {"displacement_mm", "area_growth_percent_per_gw"}
+    assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report} == set(MAPS)
+    white, white_maps = measure_white({"left": ball})
+    assert set(white_maps["left"]) <= set(thick.maps["left"])
+    regions = region_metrics({"left": ball}, thick.maps, {"left": np.ones(len(ball.vertices))}, {1: "all"})
+    named = {f"{MAPS[name].mean_name.removeprefix('mean_')}" for name in deviations}
+    assert {*thick.table["metric"], *white["metric"], *regions["metric"], *named} == set(METRICS)
+    for records in (MAPS, METRICS):
+        assert all(record.name == name for name, record in records.items())
+        with pytest.raises(KeyError, match=r"quantities\.py"):
+            records["unheard_of"]
 
 
 def test_cut_is_left_out(cut: BrainMetrics) -> None:
@@ -196,12 +220,12 @@ def test_values_of_a_part() -> None:
 
 
 def test_thickness_metrics_leave_out_what_was_not_measured() -> None:
-    rows = {name: value for name, value, _ in thickness_rows(np.array([1.0, 2.0, np.nan]), np.array([3.0, 1.0, 4.0]))}
+    rows = thickness_metrics(np.array([1.0, 2.0, np.nan]), np.array([3.0, 1.0, 4.0]))
     assert rows["mean_thickness"] == pytest.approx(1.25)
     assert rows["thickness_sd"] == pytest.approx(np.sqrt(0.75 * 0.25**2 + 0.25 * 0.75**2))
     assert (rows["thickness_q05"], rows["thickness_q95"]) == (1.0, 2.0)
     assert rows["thickness_measured_share"] == pytest.approx(0.5)
-    assert thickness_rows(np.full(3, np.nan), np.ones(3)) == []
+    assert thickness_metrics(np.full(3, np.nan), np.ones(3)) == {}
 
 
 def test_regions_have_their_area_and_means() -> None:

@@ -6,7 +6,6 @@ from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, sphere
 
 from gyriflow.geometry.triangles import TriangleMesh, merged
-from gyriflow.report.labels import AREA_GROWTH
 from gyriflow.report.pictures import (
     LINES_MM,
     direction_lines,
@@ -138,7 +137,9 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
     # one in each cube
     assert len(np.unique(np.floor(ends.mean(axis=1) / LINES_MM), axis=0)) > 0.6 * len(ends)
     maps = {"growth": {(21.0, 22.0): (SMOOTH, np.full(len(right), 0.1))}}
-    figure = scalar_maps(maps, quantity=AREA_GROWTH, directions={(21.0, 22.0): right}, views=("right", "left"))
+    figure = scalar_maps(
+        maps, quantity="area_growth_percent_per_gw", directions={(21.0, 22.0): right}, views=("right", "left")
+    )
     dark = [(picture(figure, number) < 60).all(axis=-1).sum() for number in (0, 1)]
     assert dark[0] > 1000
     assert dark[1] == 0

@@ -9,7 +9,6 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.report.labels import DISPLACEMENT
 from gyriflow.report.view3d import surfaces_view, thin_out
 
 BALL = sphere(20.0)
@@ -63,9 +62,9 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
 
 def test_displacement_is_measured_from_the_first_week():
     data = surfaces_view({"thin": growing()}, growing(), measured="real brain")
-    assert [described["name"] for described in data["maps"]] == [DISPLACEMENT]
+    assert [described["name"] for described in data["maps"]] == ["displacement_mm"]
     simulated, real = data["groups"]
-    start, later = (b64decode(frame["values"][DISPLACEMENT]) for frame in simulated["frames"])
+    start, later = (b64decode(frame["values"]["displacement_mm"]) for frame in simulated["frames"])
     assert set(start) == {0}
     assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0]["high"] == pytest.approx(4.0, abs=0.02)
     # what was measured has not moved
