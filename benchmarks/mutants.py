@@ -47,8 +47,11 @@ BY_TESTS = {
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
     "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "HORIZON_GW = 1.5", "HORIZON_GW = 0.5")],
-    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '["run", "target"]', '["run"]')],
-    "compare/test_deviation.py": [("src/gyriflow/compare/prediction.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0")],
+    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '("run", "target")', '("run",)')],
+    "compare/test_deviation.py": [
+        ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),
+        ("src/gyriflow/compare/deviation.py", " * expected_mm / first_mm", ""),
+    ],
     "compare/test_validation.py": [
         ("src/gyriflow/compare/validation.py", 'row[f"real_{name}"] - 1', '-row[f"real_{name}"] + 1'),
     ],
@@ -74,7 +77,6 @@ BY_TESTS = {
         ("workflow/scripts/provenance.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),
         ("workflow/scripts/study_runs.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),
     ],
-    "compare/test_comparison_scripts.py": [("workflow/scripts/deviation.py", " * run / run_at_start", "")],
     "io/test_exports.py": [
         ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),
         ("src/gyriflow/io/exports.py", "_hemi-{side[0].upper()}{desc}_{kind}", "_hemi-L{desc}_{kind}"),

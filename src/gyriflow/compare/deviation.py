@@ -1,0 +1,130 @@
+"""Deviation of an observed brain from the expected one: maps, means by region, and their place among other brains."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import KDTree
+
+from ..geometry.diffusion import diffuse
+from ..geometry.matching import match_surface, values_at
+from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas, vertex_normals
+from ..metrics.norms import measured_scores
+from ..metrics.regions import region_metrics
+from ..settings.terms import MEASURED
+
+SMOOTHING_MM = 3.0
+"""Standard deviation of the Gaussian that smooths areas before they are compared."""
+
+SCORES = ["expected", "sd", "z", "centile", "brains", "flag"]
+
+type SurfaceThickness = tuple[TriangleMesh, Floats]
+"""A pial surface in mm, and the (n,) cortical thickness at its vertices in mm."""
+
+
+def deviation_maps(expected: TriangleMesh, fitted: TriangleMesh) -> dict[str, Floats]:
+    """Return distance_mm and log_area of the observed brain at the (n,) vertices of the expected surface.
+
+    distance_mm is along the normal, positive where the observed brain lies outside; log_area is the logarithm of the
+    observed over the expected area.
+
+    Parameters
+    ----------
+    expected, fitted
+        The expected surface in mm, aligned with the observed one, and the same deformed to fit that.
+    """
+    ratio = vertex_areas(fitted) / vertex_areas(expected)
+    return {
+        "distance_mm": ((fitted.vertices - expected.vertices) * vertex_normals(expected)).sum(axis=1),
+        "log_area": np.log(diffuse(expected.vertices, expected.faces, ratio, SMOOTHING_MM)),
+    }
+
+
+def thickness_difference(
+    fitted: TriangleMesh,
+    observed: SurfaceThickness,
+    start: SurfaceThickness,
+    first: SurfaceThickness,
+    expected_mm: Floats,
+) -> Floats:
+    """Return the observed minus the expected thickness in mm at the (n,) vertices of the expected surface.
+
+    The expected thickness is that of the observed start brain, multiplied by its growth in the run.
+
+    Parameters
+    ----------
+    fitted
+        The expected surface deformed to fit the observed one.
+    observed, start
+        The observed brain of the week, and the observed start brain.
+    first, expected_mm
+        The run at the start's week, and its thickness at the expected surface's vertices, which are the same.
+    """
+    first_surface, first_mm = first
+    grown = _values_on(first_surface, start) * expected_mm / first_mm
+    return _values_on(fitted, observed) - grown
+
+
+def _values_on(mesh: TriangleMesh, thickness: SurfaceThickness) -> Floats:
+    surface, values = thickness
+    return values_at(match_surface(mesh, surface), values)
+
+
+def deviation_table(
+    labels: Mapping[str, Any],
+    surface: TriangleMesh,
+    maps: Mapping[str, Floats],
+    sides: Mapping[str, TriangleMesh],
+    regions: Mapping[str, tuple[Ints, Mapping[int, str]]],
+) -> pd.DataFrame:
+    """Average maps over the whole brain, its hemispheres and their regions, by area.
+
+    Parameters
+    ----------
+    labels
+        First columns of the table.
+    surface, maps
+        The expected surface in mm, and maps at its (n,) vertices.
+    sides
+        Its hemispheres, whose vertices are among those of the whole surface.
+    regions
+        By side the labels of the hemisphere's vertices and their names; empty where there are none.
+
+    Returns
+    -------
+    DataFrame
+        The labels, hemisphere, region ("" for all of it), metric (the map, without its unit), value, unit.
+    """
+    parts = {"whole": surface, **sides}
+    places = {part: KDTree(surface.vertices).query(mesh.vertices)[1] for part, mesh in parts.items()}
+    part_maps = {part: {name: values[place] for name, values in maps.items()} for part, place in places.items()}
+    everywhere = {part: np.ones(len(place), dtype=np.int64) for part, place in places.items()}
+    tables = [region_metrics(parts, part_maps, everywhere, {1: ""})]
+    tables += [
+        region_metrics({side: sides[side]}, part_maps, {side: own}, names) for side, (own, names) in regions.items()
+    ]
+    table = pd.concat(tables, ignore_index=True)
+    means = table[table["metric"].str.startswith("mean_")]
+    table = means.assign(metric=means["metric"].str.removeprefix("mean_"), **labels)
+    return table[[*labels, "hemisphere", "region", "metric", "value", "unit"]]
+
+
+def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataFrame:
+    """Add to each deviation its z-score and centile among those of the other brains of the run.
+
+    Parameters
+    ----------
+    deviations
+        Rows of `deviation_table` with the columns run, subject and week. Rows without a value are left out.
+    individuals
+        Whether the observed brains differ as individuals do; averages have no centiles.
+    """
+    tables = []
+    for _, table in deviations.dropna(subset=["value"]).groupby("run", sort=False):
+        # scores are by hemisphere: here each region of one counts as a hemisphere of its own
+        parts = table["hemisphere"] + " " + table["region"].fillna("")
+        rows, subjects = table.assign(run=MEASURED, hemisphere=parts), list(table["subject"])
+        scores = measured_scores(rows, subjects, individuals=individuals)
+        tables.append(table.reset_index(drop=True).join(scores[SCORES]))
+    return pd.concat(tables, ignore_index=True)
