@@ -1,6 +1,5 @@
 # What all rules share: the validated configuration, names, and where results lie.
 import os
-from operator import attrgetter
 
 from gyriflow.errors import GyriflowError
 from gyriflow.settings.terms import SIDES
@@ -88,16 +87,6 @@ def brain_of(wildcards):
 def simulation_of(wildcards):
     """Return the run from a brain that the wildcards name."""
     return study.simulations[wildcards.run, wildcards.brain]
-
-
-def from_brain(attribute):
-    """Return an input function: an attribute of the brain that the wildcards name."""
-    return lambda wildcards: attrgetter(attribute)(study.brains[wildcards.brain])
-
-
-def from_simulation(attribute):
-    """Return an input function: an attribute of the run from a brain that the wildcards name."""
-    return lambda wildcards: attrgetter(attribute)(study.simulations[wildcards.run, wildcards.brain])
 
 
 def brains_with(condition):

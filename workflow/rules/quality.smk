@@ -1,7 +1,31 @@
 # Quality control before the solve: a page and a verdict for each brain.
+def quality_columns(name):
+    """Return what the table of quality says of a brain before it is looked at, also of a refused one."""
+    given = CONFIG.brain(name)
+    known = {key: getattr(given, key) for key in ("week", "population", "source")}
+    return (
+        {"subject": name}
+        | known
+        | {"sides": " ".join(given.sides), "page": f"{BRAIN}/figures/quality.png".format(brain=name)}
+    )
+
+
+def surface_logs(wildcards):
+    """Return the logs of the steps that have made a brain's surface and thickness."""
+    brain = brain_of(wildcards)
+    made_by = [rule for rule, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
+    return expand(f"{BRAIN}/logs/{{rule}}.log", brain=brain.id, rule=[*made_by, "cortical_thickness"])
+
+
 rule quality_page:
     input:
-        unpack(from_brain("quality_files")),
+        surface=PIAL["whole"],
+        report=PIAL["report"],
+        labels=lambda w: brain_of(w).labels.path if brain_of(w).labels else [],
+        image=lambda w: brain_of(w).given.image or [],
+        white=lambda w: list(brain_of(w).given.white_files.values()),
+        thickness=lambda w: brain_of(w).measured.thickness,
+        measured=lambda w: THICKNESS["report"].format(brain=w.brain) if brain_of(w).has_thickness else [],
     output:
         png=f"{BRAIN}/figures/quality.png",
         pdf=f"{BRAIN}/figures/quality.pdf",
@@ -13,11 +37,10 @@ rule quality_page:
     conda:
         ENVIRONMENT
     params:
-        white_files=from_brain("given.white_files"),
-        affine_from=from_brain("given.affine_from"),
-        labels=lambda w: study.quality_labels(w.brain),
-        scheme=from_brain("scheme"),
-        logs=from_brain("surface_logs"),
+        white_files=lambda w: brain_of(w).given.white_files,
+        labels=lambda w: brain_of(w).labels,
+        columns=lambda w: quality_columns(w.brain),
+        logs=surface_logs,
     script:
         "../scripts/quality_page.py"
 
@@ -34,7 +57,10 @@ rule quality_table:
     conda:
         ENVIRONMENT
     params:
-        refused=study.refused_rows(REFUSED),
+        refused=[
+            *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),
+            *({"subject": name, **row} for name, row in CONFIG.left_out.items()),
+        ],
         order=[*(brain.id for brain in CONFIG.brains), *CONFIG.left_out],
     script:
         "../scripts/quality_table.py"

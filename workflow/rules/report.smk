@@ -61,10 +61,25 @@ rule provenance:
     params:
         config=study.used_settings,
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
-        files=study.input_files,
+        files=[
+            (brain.id, what, path)
+            for brain in study.brains.values()
+            for what, paths in (
+                (brain.given.source, brain.given.files),
+                ("image", [brain.given.image] if brain.given.image else []),
+                ("white", list(brain.given.white_files.values())),
+            )
+            for path in paths
+        ],
         folded=study.pairs,
         growth_of=[study.growth_of(one) for one in study.folded],
-        method=study.method,
+        # of which the text of the methods speaks
+        method={
+            "brains": [brain for brain in study.described_brains if brain["id"] in study.brains],
+            "surface": CONFIG.surface.model_dump(mode="json", include={"edge_length_mm", "open_sulci"}),
+            "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
+            "metrics": CONFIG.metrics.model_dump(mode="json", include={"curvature_radius_mm"}),
+        },
     script:
         "../scripts/provenance.py"
 

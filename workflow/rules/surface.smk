@@ -1,6 +1,15 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
 from gyriflow.running.cost import surface_memory_mib
 
+# the rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have
+PIAL_RULES = {
+    "pial_from_labels": ("labels", SIDES),
+    "pial_from_hemispheres": ("hemispheres", SIDES),
+    "pial_from_surface": ("pial", SIDES),
+    "pial_from_shape": ("shape", SIDES),
+    "pial_from_left_hemisphere": ("hemisphere", ("left",)),
+    "pial_from_right_hemisphere": ("hemisphere", ("right",)),
+}
 # how unequal and how asymmetric hemispheres may be, besides what is usual
 LIMITS = (
     dict.fromkeys(("max_hemisphere_ratio", "max_asymmetry"), float("inf")) if CONFIG.surface.asymmetric else {}

@@ -6,10 +6,9 @@ from gyriflow.geometry.triangles import merged
 from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
-from gyriflow.io.volumes import read_label_volume, read_volume_map
+from gyriflow.io.volumes import read_volume_map
 from gyriflow.report.quality import Brain, quality_page, quality_row, tissue_groups
 from gyriflow.running.jobs import read_messages
-from gyriflow.settings.schemes import LabelScheme
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -17,11 +16,11 @@ with step(snakemake.log[0]):
     surface, report = read_surface(files.surface), read_json(files.report)
     pose, image, tissues, thickness = read_pose(files.report), None, None, None
     if files.image:
-        volume = read_volume_map(files.image, params.affine_from)
+        volume = read_volume_map(files.image, params.labels.affine_from)
         image = volume.values, pose.world @ volume.affine
-    if files.labels:
-        labels = read_label_volume(files.labels, affine_from=params.affine_from)
-        tissues = tissue_groups(labels.labels, LabelScheme(**params.scheme)), pose.world @ labels.affine
+    if params.labels:
+        labels = params.labels.read()
+        tissues = tissue_groups(labels.labels, params.labels.scheme), pose.world @ labels.affine
     if files.thickness:
         (thickness,) = read_vertex_maps(files.thickness).values()
     whites = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
@@ -29,7 +28,7 @@ with step(snakemake.log[0]):
     said = [message for log in params.logs for message in read_messages(log)]
     warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
     expected = expected_volume_ml(report["week"])
-    row = quality_row(params.labels, report, read_json(files.measured) if files.measured else {}, warnings, expected)
+    row = quality_row(params.columns, report, read_json(files.measured) if files.measured else {}, warnings, expected)
     brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
     write_figure(output.png, output.pdf, quality_page(brain, row, warnings))
     write_json(output.row, row)

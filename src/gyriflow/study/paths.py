@@ -60,16 +60,6 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-PIAL_RULES: dict[str, tuple[str, tuple[Side, ...]]] = {
-    "pial_from_labels": ("labels", SIDES),
-    "pial_from_hemispheres": ("hemispheres", SIDES),
-    "pial_from_surface": ("pial", SIDES),
-    "pial_from_shape": ("shape", SIDES),
-    "pial_from_left_hemisphere": ("hemisphere", ("left",)),
-    "pial_from_right_hemisphere": ("hemisphere", ("right",)),
-}
-"""The rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have."""
-
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {

@@ -111,10 +111,6 @@ class Brain:
         return self.labels or LabelSource(paths.MASK.format(brain=self.id), "auto", SCHEMES["binary"])
 
     @property
-    def scheme(self) -> dict[str, Any] | None:
-        return self.labels and self.labels.scheme.model_dump()
-
-    @property
     def pial(self) -> str:
         return paths.PIAL["whole"].format(brain=self.id)
 
@@ -140,25 +136,6 @@ class Brain:
             report=self.report,
             regions=self.regions if self.has_regions else {},
         )
-
-    @property
-    def surface_logs(self) -> list[str]:
-        """The logs of the steps that have made its surface and thickness."""
-        made_by = [rule for rule, made in paths.PIAL_RULES.items() if made == (self.given.source, self.sides)]
-        return [f"results/brains/{self.id}/logs/{rule}.log" for rule in (*made_by, "cortical_thickness")]
-
-    @property
-    def quality_files(self) -> dict[str, Any]:
-        """The files that the page of its quality shows."""
-        return {
-            "surface": self.pial,
-            "report": self.report,
-            "labels": self.given.label_volume or [],
-            "image": self.given.image or [],
-            "white": list(self.given.white_files.values()),
-            "thickness": self.measured.thickness,
-            "measured": paths.THICKNESS["report"].format(brain=self.id) if self.has_thickness else [],
-        }
 
 
 @dataclass(frozen=True)
