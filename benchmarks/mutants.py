@@ -38,7 +38,7 @@ BY_TESTS = {
         ("src/gyriflow/study/study.py", "return min(given, key", "return max(given, key"),
         ("src/gyriflow/study/records.py", " and one.sides == self.sides", ""),
         ("src/gyriflow/study/series.py", "all(brain.sides == start.sides for brain in brains)", "True"),
-        ("src/gyriflow/study/figures.py", "MOST_SERIES = 5, 4", "MOST_SERIES = 9, 4"),
+        ("src/gyriflow/study/figures.py", "MAX_SERIES = 5, 4", "MAX_SERIES = 9, 4"),
     ],
     "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],

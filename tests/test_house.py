@@ -41,7 +41,7 @@ ARROWS = {
     "anatomy": PLAIN | {"io", "shipped"},
     # the solver is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io", "code_hash"},
-    "study": PLAIN | {"io"},
+    "study": PLAIN | {"io", "shipped"},
     "running": PLAIN | {"code_hash", "study", "anatomy", "folding", "io", "shipped", "step", "version"},
     "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
 }

@@ -1,4 +1,4 @@
-# Figures and tables of the registry, `gyriflow.study.figures`: what is drawn has a rule for each kind.
+# Figures and tables of the registry, `gyriflow.study.figures`: each kind has a rule, but for those of one job.
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 
@@ -8,38 +8,38 @@ def inputs_of(figure):
     return figure.inputs_without(ended)
 
 
-for name, figures in by_rule(FIGURES).items():
-    some = next(iter(figures.values()))
-    drawn_in = some.draw.rpartition(".")[0]
+for name, jobs in by_rule(FIGURES).items():
+    kinds = [figure.kind for figure in jobs[0]]
 
-    def figure_of(wildcards, figures=figures, pattern=some.pattern):
-        return figures[pattern.format(**dict(wildcards))]
+    def drawn(wildcards, jobs={job[0].path: job for job in jobs}, pattern=kinds[0].pattern):
+        return jobs[pattern.format(**dict(wildcards))]
 
     rule:
         name:
             name
         input:
-            lambda wildcards, of=figure_of: files_in(inputs_of(of(wildcards))),
+            lambda wildcards, drawn=drawn: files_in(list(map(inputs_of, drawn(wildcards)))),
         output:
-            some.outputs,
+            [file for kind in kinds for file in kind.outputs],
         log:
-            figure_log(name, some.pattern),
+            figure_log(name, kinds[0].pattern),
         wildcard_constraints:
-            **{
-                key: one_of(dict.fromkeys(figure.names[key] for figure in figures.values()))
-                for key in some.names
-                if f"{{{key}}}" in some.pattern
-            },
+            **{key: one_of(dict.fromkeys(job[0].names[key] for job in jobs)) for key in jobs[0][0].wildcards},
         conda:
             ENVIRONMENT
         params:
-            draw=some.draw,
-            inputs=lambda wildcards, of=figure_of: inputs_of(of(wildcards)),
-            options=lambda wildcards, of=figure_of: of(wildcards).options,
+            figures=lambda wildcards, drawn=drawn: [
+                {
+                    "draw": figure.kind.draw,
+                    "inputs": inputs_of(figure),
+                    "options": figure.options,
+                    "files": figure.files,
+                }
+                for figure in drawn(wildcards)
+            ],
             code=code_hash(
                 DRAW,
-                Path(SOURCE, "gyriflow", "report", f"{drawn_in}.py"),
-                function=name,
+                *(Path(SOURCE, "gyriflow", "report", f"{kind.draw.partition(':')[0]}.py") for kind in kinds),
             ),
         script:
             "../scripts/draw.py"

@@ -89,7 +89,6 @@ OF_PAGES = dict(
     metrics=f"{STUDY}/metrics.csv",
     centiles=rules.derived_tables.output.centiles,
     warnings=rules.study_resources.output.warnings,
-    words=f"{workflow.basedir}/workflow/report/figures.yaml",
     provenance=rules.provenance.output.report,
     methods=rules.provenance.output.methods,
     page=f"{PAGE}/page.html",
@@ -99,11 +98,12 @@ PAGE_OF_BRAIN = f"{REPORT}/brains/{{brain}}.html"
 
 
 def figures_on_page(brain=None):
-    """Return rule, path and names of the figures on the page of a brain, or on that of the study."""
-    alone = [figure for figure in FIGURES if figure.target in ("quality", "brain")]
-    others = [figure for figure in FIGURES if figure.target not in ("", "small", "quality", "brain")]
-    shown = [figure for figure in alone if figure.names["brain"] == brain] if brain else others
-    return [(figure.name, figure.path, dict(figure.names)) for figure in shown]
+    """Return what the page of a brain, or that of the study, says of its figures."""
+    shown = [figure for figure in FIGURES if figure.kind.section]
+    alone = [figure for figure in shown if figure.kind.target in ("quality", "brain")]
+    if brain is None:
+        return [figure.described for figure in shown if figure not in alone]
+    return [figure.described for figure in alone if figure.names["brain"] == brain]
 
 
 rule html_report:
@@ -114,7 +114,7 @@ rule html_report:
         asked_for(FIGURES, "report"),
         expand(PAGE_OF_BRAIN, brain=study.brains),
         **OF_PAGES,
-        small=[figure.path for figure in FIGURES if figure.target == "small"],
+        small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         runs=rules.study_runs.output.csv if study.folded else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
@@ -144,7 +144,7 @@ rule html_report:
 
 rule brain_page:
     input:
-        lambda w: [path for _, path, _ in figures_on_page(w.brain)],
+        lambda w: [figure["path"] for figure in figures_on_page(w.brain)],
         **OF_PAGES,
     output:
         PAGE_OF_BRAIN,

@@ -2,9 +2,6 @@
 #
 # results/study/STUDY/ holds members (a row a run: values, resolution, outcome with its cause, time), comparison (how far
 # each is from each real brain by each measure), and nearest (which is nearest, with the paper's beside it). A run that has diverged before the week of comparison stands in `members` alone.
-PUBLISHED = f"{workflow.basedir}/workflow/published/fetalfoldsim.yaml"
-
-
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the real brains, none where it has not come there."""
     compared = study.comparisons[wildcards.study]

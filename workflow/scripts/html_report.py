@@ -10,11 +10,10 @@ PICTURE_BYTES = 9_000_000
 PARTS = ("style", "three", "notice", "controls", "viewer")
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    words = read_yaml(files.words)
-    figures = [figure for figure in params.figures if figure[0] in words]
-    pictures = [path for _, path, _ in figures if path.endswith(".png")]
+    paths = [figure["path"] for figure in params.figures]
+    pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
-    contents |= {path: read_body(path) for _, path, _ in figures if path not in contents}
+    contents |= {path: read_body(path) for path in paths if path not in contents}
     small = None if params.pictured is None else picture_addresses(files.small, PICTURE_BYTES)
     prediction = params.get("prediction")
     prediction = prediction and prediction | {"worth": read_yaml(files.worth)}
@@ -26,7 +25,7 @@ with step(snakemake.log[0]):
         provenance=read_json(files.provenance),
         methods=read_text(files.methods),
         configuration=yaml_text(hide_paths(params.config)),
-        shown=shown_figures(words, figures, contents),
+        shown=shown_figures(params.figures, contents),
         **{name: read_table(files[name]) for name in ("quality", "warnings", "metrics", "centiles")},
         **{name: read_table(path) if (path := files.get(name)) else None for name in ("runs", "validation")},
     )

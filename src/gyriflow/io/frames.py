@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from ..geometry.triangles import TriangleMesh
 from ..units import week_tag
 from .files import AnyPath, new_hdf5, write_text
 from .tetmeshes import document, grid
@@ -95,6 +97,20 @@ def read_field(path: AnyPath, week: float, field: str) -> NDArray:
         if name not in file:
             raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
         return file[name][:]
+
+
+def read_pial_frames(path: AnyPath) -> dict[float, tuple[TriangleMesh, dict[str, NDArray]]]:
+    """Return by week the outer surface of the mesh in mm, with the fields at its vertices by name."""
+    tets = read_tets(path)
+    frames: dict[float, tuple[TriangleMesh, dict[str, NDArray]]] = {}
+    with h5py.File(path) as file:
+        for week in read_weeks(path):
+            values = {name: data[:] for name, data in file[group_name(week)].items() if name != CELL_FIELDS}
+            if not frames:
+                surface, pial = boundary_surface(TetrahedralMesh(values[POSITIONS], tets))
+            fields = {name: field[pial] for name, field in values.items()}
+            frames[week] = TriangleMesh(fields.pop(POSITIONS), surface.faces), fields
+    return frames
 
 
 def read_positions(path: AnyPath, week: float) -> NDArray[np.float64]:

@@ -153,6 +153,7 @@ def norms_chart(
     norms: pd.DataFrame,
     *,
     reference: Sequence[str],
+    brains: Sequence[str],
     runs: Sequence[str] = (),
     measured: str = REAL_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
@@ -171,11 +172,13 @@ def norms_chart(
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
         Brains that the curves go through.
+    brains
+        Those with the hemispheres of these. Others, and what is simulated from them, are not drawn.
     subjects, groups : as for `metrics_chart`
 
     InputError where none of the metrics is there.
     """
-    whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
     present, colours = _present(whole, WITH_NORMS), run_colours(whole["run"], runs)
     markers, (shades, extra) = _markers(whole, subjects), _shades(groups, colours)
     figure, panels = panel_figure(len(present), panel_in=2.0, foot_in=0.6)

@@ -28,17 +28,7 @@ SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series; the one left out is the folding's."""
 MOST_PANELS = 4
 """Series whose rates have a panel each, with more they share one."""
-_MARKERS = {"FetalFoldSim": "s", "Wang et al. 2021": "^"}
-PUBLISHED = pd.DataFrame(
-    {
-        "run": np.repeat(list(_MARKERS), 4),
-        "from_week": [21.0, 22, 23, 24] * 2,
-        "to_week": [22.0, 23, 24, 25] * 2,
-        "max_mm": [2.51, 2.22, 2.37, 2.57, 1.24, 2.29, 3.65, 5.79],
-        "mean_mm": [0.42, 0.40, 0.38, 0.40, 0.45, 0.88, 1.91, 3.03],
-    }
-)
-"""Weekly displacement norms in mm: the FetalFoldSim paper's simulation (all nodes) and its quotation of real brains."""
+PUBLISHED_MARKERS = ("s", "^", "D", "v")
 
 
 @styled
@@ -152,8 +142,10 @@ def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[f
 
 
 @styled
-def displacement_chart(displacement: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw the maximal and the mean displacement norm of all nodes, as in the paper, per week.
+def displacement_chart(
+    displacement: pd.DataFrame, *, runs: Sequence[str] = (), published: Mapping[str, Any] | None = None
+) -> Figure:
+    """Draw the maximal and the mean displacement norm of all nodes per week.
 
     Norms between output weeks that lie further apart are divided by the weeks between them. Runs are lines, published
     values grey.
@@ -161,18 +153,21 @@ def displacement_chart(displacement: pd.DataFrame, *, runs: Sequence[str] = ()) 
     Parameters
     ----------
     displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
+    published
+        Its `displacement` has `from_weeks`, from each to the next, and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
-    rows = pd.concat([PUBLISHED, named[named["nodes"] == "all"]])
+    colours, others = run_colours(named["run"], runs), _published_norms(published)
+    markers = dict(zip(others["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
+    rows = pd.concat([others, named[named["nodes"] == "all"]])
     rows["middle"], span = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
-    colours = run_colours(named["run"], runs)
     figure, panels = panel_figure(2, per_row=2)
     for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
         per_week = rows.assign(per_week=rows[column] / span).sort_values("middle")
         for run, line in per_week.groupby("run", sort=False):
             look: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
-            if run in _MARKERS:
-                look |= {"marker": _MARKERS[str(run)], "linestyle": "--"}
+            if run in markers:
+                look |= {"marker": markers[run], "linestyle": "--"}
             axes.plot(line["middle"], line["per_week"], label=run, **look)
         axes.set_title(f"{label} displacement, all nodes")
         axes.set_ylabel("displacement (mm per week)")
@@ -181,7 +176,19 @@ def displacement_chart(displacement: pd.DataFrame, *, runs: Sequence[str] = ()) 
         axes.set_xlabel("gestational age (GW), middle of the interval")
     extra = [
         Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
-        for source, marker in _MARKERS.items()
+        for source, marker in markers.items()
     ]
     run_legend(figure, colours, extra=extra)
     return figure
+
+
+def _published_norms(published: Mapping[str, Any] | None) -> pd.DataFrame:
+    """Return published norms with the columns of a study's table, as those of runs with the name of their source."""
+    weeks = np.array(published["displacement"]["from_weeks"] if published else [], dtype=float)
+    rows = published["displacement"]["rows"] if published else []
+    columns = ("max_mm", "mean_mm")
+    tables = [
+        pd.DataFrame({"run": row["source"], "from_week": weeks, "to_week": weeks + 1} | {k: row[k] for k in columns})
+        for row in rows
+    ]
+    return pd.concat(tables) if tables else pd.DataFrame(columns=["run", "from_week", "to_week", *columns])

@@ -24,7 +24,7 @@ _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 DOTS_PER_INCH = 150
 """Of the page, for an inch of print: a figure as wide as a journal's page has 1080."""
 FIRST = ("predicted_figure", "weekly_figure")
-"""The rules of which the first figure stands on the first page."""
+"""The kinds of which the first figure stands on the first page."""
 OF_BRAINS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """The metrics in the row of a brain."""
 NORM_WORDS = {
@@ -40,36 +40,35 @@ DEEP_MM = 0.5
 
 
 def shown_figures(
-    words: Mapping[str, Mapping[str, Any]],
-    figures: Sequence[tuple[str, str, Mapping[str, str]]],
-    contents: Mapping[str, str | tuple[str, float]],
+    figures: Sequence[Mapping[str, Any]], contents: Mapping[str, str | tuple[str, float]]
 ) -> list[dict[str, Any]]:
-    """Return the figures and tables with the words on them: section, title, content, caption, first, technical.
+    """Return the figures and tables as the page shows them: section, title, content, caption, first, technical.
 
     Parameters
     ----------
-    words : {name of a rule: section, title, caption in reStructuredText, and whether it is technical}
-        In titles and captions the names of figures stand in braces.
-    figures : rule, path and names of each figure
+    figures : name, section, title, caption in reStructuredText, technical, path and names of each
+        In titles and captions its names stand in braces.
     contents : {path: HTML, or a picture's data address and its width in inches}
     """
-    starts = {rule: {names.get("brain") for other, _, names in figures if other == rule} for rule, _, _ in figures}
-    first = next((path for of in FIRST for rule, path, _ in figures if rule == of), None)
+    brains: dict[str, set[str | None]] = {}
+    for figure in figures:
+        brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
+    first = next((figure["path"] for name in FIRST for figure in figures if figure["name"] == name), None)
     shown = []
-    for rule, path, names in figures:
+    for figure in figures:
+        names, content = figure["names"], contents[figure["path"]]
         # the page's title names a brain that all figures of a kind are of
-        keys = ("run", "study", "brain") if len(starts[rule]) > 1 else ("run", "study")
-        title = words[rule]["title"].format(**{key: plain(name.removesuffix("_mm")) for key, name in names.items()})
+        keys = ("run", "study", "brain") if len(brains[figure["name"]]) > 1 else ("run", "study")
+        title = figure["title"].format(**{key: plain(name.removesuffix("_mm")) for key, name in names.items()})
         title = " · ".join([title, *(name for key, name in names.items() if key in keys)])
-        content = contents[path]
         shown.append(
             {
-                "section": words[rule]["section"],
+                "section": figure["section"],
                 "title": title,
                 "content": Markup(content) if isinstance(content, str) else picture(*content, title),
-                "caption": caption_html(words[rule]["caption"].format(**names)),
-                "first": path == first,
-                "technical": words[rule].get("technical", False),
+                "caption": caption_html(figure["caption"].format(**names)),
+                "first": figure["path"] == first,
+                "technical": figure["technical"],
             }
         )
     return shown

@@ -1,7 +1,7 @@
 """Pictures of surfaces: simulated beside measured brains, maps, regions and zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import cycle
+from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
 from ..quantities import MAPS, SIGNED_COLOURS
+from ..settings.folding import FoldingParameters
 from ..settings.terms import REAL_BRAIN, ZONE_NAMES
-from ..units import CM2_PER_MM2
+from ..units import CM2_PER_MM2, SECONDS_PER_GW
 from .labels import column_label, map_title, plain, value_labels
 from .panels import MOST_COLUMNS, Panel, Row, panel_grid
 from .scene import (
@@ -130,10 +131,17 @@ def runs_by_week(
     return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
 
 
+def displacements(frames: Mapping[float, SurfaceMaps]) -> dict[tuple[float, float], SurfaceMap]:
+    """Return the norm in mm of the displacement between successive weeks, on the surface at the later one."""
+    surfaces = {week: mesh for week, (mesh, _) in frames.items()}
+    return {
+        (a, b): (surfaces[b], np.linalg.norm(surfaces[b].vertices - surfaces[a].vertices, axis=1))
+        for a, b in pairwise(sorted(surfaces))
+    }
+
+
 @styled
-def displacement_maps(
-    displacements: Mapping[str, Mapping[tuple[float, float], SurfaceMap]],
-) -> Figure:
+def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
     The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
@@ -142,10 +150,11 @@ def displacement_maps(
 
     Parameters
     ----------
-    displacements : {run: {(from_week, to_week): (surface, norms in mm)}}
+    frames : {run: {week: (surface in RAS+ mm, fields)}}
     """
-    keys, seen = _ordered(*displacements.values()), [VIEWS[name] for name in SIDE_VIEWS]
-    every = np.concatenate([norms for maps in displacements.values() for _, norms in maps.values()])
+    of_runs = {run: displacements(weeks) for run, weeks in frames.items()}
+    keys, seen = _ordered(*of_runs.values()), [VIEWS[name] for name in SIDE_VIEWS]
+    every = np.concatenate([norms for maps in of_runs.values() for _, norms in maps.values()])
     scale = scale_of("displacement_mm", every)
 
     def panel(shown: SurfaceMap | None, view: View) -> Panel | None:
@@ -158,8 +167,7 @@ def displacement_maps(
         return Panel(mesh, paint(norms, scale), view, words if view == seen[0] else "", MAP, place)
 
     panels = {
-        run: {view: [panel(maps.get(key), view) for key in keys] for view in seen}
-        for run, maps in displacements.items()
+        run: {view: [panel(maps.get(key), view) for key in keys] for view in seen} for run, maps in of_runs.items()
     }
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
 
@@ -252,6 +260,31 @@ def scalar_maps(
     }
     legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, map_title(quantity)), legend=legend)
+
+
+def growth_of_area(frames: Mapping[float, SurfaceMaps], step_s: float) -> dict[tuple[float, float], SurfaceMap]:
+    """Return the growth of area in % per week between output weeks, on the surface at the later one."""
+    return {
+        (a, b): (mesh, 100 * np.expm1(2 * SECONDS_PER_GW / step_s * fields["tangential_growth_per_step"]))
+        for a, b in pairwise(sorted(frames))
+        for mesh, fields in [frames[b]]
+    }
+
+
+def growth_maps(
+    frames: Mapping[float, SurfaceMaps], params: FoldingParameters, *, views: Sequence[str] = SIDE_VIEWS
+) -> Figure:
+    """Draw the growth of area that a run towards shapes has found, with lines along the largest growth.
+
+    Parameters
+    ----------
+    frames
+        {week: (surface in RAS+ mm, fields)} with `tangential_growth_per_step` (the logarithm of the stretch in a step)
+        and `growth_direction_per_step` (n, 3).
+    """
+    growth = growth_of_area(frames, params.step_s)
+    directions = {(a, b): frames[b][1]["growth_direction_per_step"] for a, b in growth}
+    return scalar_maps({"growth": growth}, quantity="area_growth_percent_per_gw", directions=directions, views=views)
 
 
 def _map_panel(
@@ -383,14 +416,16 @@ def regions_picture(
 
 
 @styled
-def zones_picture(mesh: TriangleMesh, zones: NDArray[np.integer], *, fissure_x_mm: float) -> Figure:
+def zones_picture(regions: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]], params: FoldingParameters) -> Figure:
     """Draw the zones of the brain's boundary from several sides, with their areas.
 
     Parameters
     ----------
-    zones : (m,) zone of each face, a place in `ZONE_NAMES`
-    fissure_x_mm : where the medial views part the hemispheres
+    regions : the boundary in RAS+ mm, and tags (m,) of its faces, of which `zone` is a place in `ZONE_NAMES`
+    params : `fissure_x_mm` is where the medial views part the hemispheres
     """
+    (mesh, tags), fissure_x_mm = regions, params.fissure_x_mm
+    zones = tags["zone"]
     colours = [ZONE_COLOURS[name] for name in ZONE_NAMES]
     areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(colours)) * CM2_PER_MM2
     shown = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]

@@ -1,6 +1,6 @@
 """Charts of what simulations are worth beside real brains: gain, horizon, onset of sulci, studies, calibrations."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -177,7 +177,13 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
 
 @styled
 def nearest_chart(
-    comparison: pd.DataFrame, nearest: pd.DataFrame, *, varied: str, subject: str, real: Sequence[str]
+    comparison: pd.DataFrame,
+    *,
+    varied: str,
+    subject: str,
+    real: Sequence[str],
+    week: float,
+    published: Mapping[str, Any] | None = None,
 ) -> Figure:
     """Draw by each measure how far the members of a study are from the measured brain, over the varied parameter.
 
@@ -188,10 +194,11 @@ def nearest_chart(
     comparison
         Columns subject, real, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
         parameter. Where the flag or the resolution is not "ok", a distance is not to be trusted: its mark is open.
-    nearest : columns measure, paper
-        The value that the publication found nearest by a measure is drawn as a dashed line.
     varied : name of the column with the parameter's values
     subject, real : the start brain, and the measured brains that it is compared with
+    week : of the comparison
+    published
+        Its rows `nearest` have parameter, week, measure, and the value found nearest, which is drawn as a dashed line.
 
     Raises
     ------
@@ -202,7 +209,11 @@ def nearest_chart(
     if rows.empty:
         raise InputError("no distance to a measured brain is known", found=f"{len(comparison)} rows")
     rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))
-    published = nearest.dropna(subset=["paper"]).drop_duplicates("measure").set_index("measure")["paper"]
+    lines = {
+        row["measure"]: row["value"]
+        for row in (published or {"nearest": []})["nearest"]
+        if (row["parameter"], row["week"]) == (varied, week)
+    }
     measures = list(dict.fromkeys(rows["measure"]))
     figure, panels = panel_figure(len(measures), panel_in=2.1)
     drawn: set[str] = set()
@@ -213,8 +224,9 @@ def nearest_chart(
         for side in sides:
             _nearest_line(axes, here[here["hemisphere"] == side].sort_values("at"), *SIDE_LOOKS[side])
         axes.margins(y=0.25)
-        if measure in published:
-            axes.axvline(published[measure], color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
+        # bands cut at Weyl's number are the same measure
+        if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
+            axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
         # distances of sizes are parts of the real brain's
         unit = "share of the real" if measure in _SIZES else here["unit"].iloc[0]
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
@@ -231,7 +243,7 @@ def nearest_chart(
     if not rows["trusted"].all():
         label = "cut off, or not resolved"
         handles.append(Line2D([], [], markersize=4.5, markerfacecolor="white", label=label, **ring))
-    if len(published):
+    if lines:
         handles.append(Line2D([], [], color=MUTED_COLOUR, linestyle="--", label="nearest in the publication"))
     run_legend(figure, {}, extra=handles)
     return figure

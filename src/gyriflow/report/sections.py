@@ -9,7 +9,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..geometry.triangles import TriangleMesh
+from ..geometry.alignment import fit_onto
+from ..geometry.triangles import TriangleMesh, transformed
 from ..settings.terms import REAL_BRAIN
 from .labels import week_label
 from .style import (
@@ -53,10 +54,15 @@ def outlines_chart(
 
     Parameters
     ----------
-    runs : {run: {week: surface in RAS+ mm, aligned with the measured one}}
+    runs : {run: {week: surface in RAS+ mm}}
+        Each is moved rigidly onto the measured brain of its week.
     real : {week: measured surface in RAS+ mm}
     """
     weeks, colours = sorted(real)[-MOST_WEEKS:], run_colours(runs)
+    runs = {
+        run: {week: transformed(mesh, fit_onto(mesh, real[week])) for week, mesh in brains.items() if week in weeks}
+        for run, brains in runs.items()
+    }
     drawn = [brains[week] for brains in (real, *runs.values()) for week in weeks if week in brains]
     low = np.min([mesh.vertices.min(axis=0) for mesh in drawn], axis=0) - 1
     high = np.max([mesh.vertices.max(axis=0) for mesh in drawn], axis=0) + 1

@@ -1,276 +1,390 @@
-"""The figures and tables of a study, and what each is made from; `workflow/report/figures.yaml` says what they show."""
+"""The figures and tables of a study: of each kind what draws it and what it shows, beside what it is made from."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from typing import Any
 
-from ..settings.terms import MAX_COLOURS, REAL_BRAIN, run_names
-from .paths import BRAIN, CALIBRATION, DEVIATION, FOLDING, GROWTH, MESH, PARAMETERS, REGIONS, RUN, STUDY
-from .records import Brain, Comparison, Measured, Simulation
+from ..settings.terms import MAX_COLOURS, run_names
+from .comparison_figures import comparison_figures
+from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, RUN, STUDY
+from .records import Brain, Simulation
+from .registry import (
+    AROUND,
+    THREE_SIDES,
+    Figure,
+    Kind,
+    halves_of,
+    measured_by_week,
+    measured_name,
+    regions_of,
+    surfaces_by_week,
+)
 from .study import Study
 
-OF_STUDY, OF_RUN, OF_COMPARISON = f"{STUDY}/figures", f"{RUN}/figures", f"{STUDY}/{{study}}/figures"
-AROUND = ["left", "right", "top", "bottom"]
-THREE_SIDES = ["left", "top", "bottom"]
+BRAIN_FIGURES, RUN_FIGURES, STUDY_FIGURES = f"{BRAIN}/figures", f"{RUN}/figures", f"{STUDY}/figures"
 ZONES = {"contact", "no_growth", "support"}
 """Settings of a run that decide its zones: runs alike in them have one figure of these."""
-FEWEST_FOR_NORMS, MOST_SERIES = 5, 4
+MIN_NORM_SUBJECTS, MAX_SERIES = 5, 4
 
 Given = dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Figure:
-    """A figure or a table of a study.
-
-    Attributes
-    ----------
-    name : of the rule, which all figures of a kind share
-    pattern : the file, a PNG, an HTML page or JSON, with wildcards; a PDF stands beside each PNG
-    draw
-        The function that draws it, as `module.function` of `gyriflow.report`; empty for what another rule makes.
-    inputs : the files that the function takes, by its parameters: a file, or lists and dictionaries of files
-    options : what else it takes
-    names : its wildcards, and what else its caption names
-    target : the target that asks for it; "" for one of the paper alone, which is not in the report
-    paper : whether the target `paper` asks for it, too
-    may_end
-        Run, start and week of simulations that may have ended before: `inputs["members"]` has none of theirs then.
-    """
-
-    name: str
-    pattern: str
-    draw: str = ""
-    inputs: Mapping[str, Any] = field(default_factory=dict)
-    options: Mapping[str, Any] = field(default_factory=dict)
-    names: Mapping[str, str] = field(default_factory=dict)
-    target: str = "figures"
-    paper: bool = False
-    may_end: tuple[tuple[str, str, float], ...] = ()
-
-    @property
-    def path(self) -> str:
-        return self.pattern.format(**self.names)
-
-    @property
-    def outputs(self) -> list[str]:
-        """The files that are written, with wildcards."""
-        stem, dot, _ = self.pattern.rpartition(".png")
-        return [self.pattern, f"{stem}.pdf"] if dot else [self.pattern]
-
-    def inputs_without(self, runs: Iterable[str]) -> Mapping[str, Any]:
-        """Return the inputs, None for those of members that have ended."""
-        if "members" not in self.inputs:
-            return self.inputs
-        ended = set(runs)
-        members = {run: None if run in ended else files for run, files in self.inputs["members"].items()}
-        return {**self.inputs, "members": members}
-
-
-def files_in(inputs: Any) -> list[str]:
-    """Return the files in lists and dictionaries, each once."""
-    if isinstance(inputs, str):
-        return [inputs]
-    if not isinstance(inputs, Mapping | list):
-        return []
-    items = inputs.values() if isinstance(inputs, Mapping) else inputs
-    return list(dict.fromkeys(file for item in items for file in files_in(item)))
-
-
-def asked_for(figures: Iterable[Figure], *targets: str) -> list[str]:
-    """Return the files that targets ask for, those of the paper for "paper"."""
-    return [
-        file.format(**figure.names)
-        for figure in figures
-        if figure.target in targets or (figure.paper and "paper" in targets)
-        for file in figure.outputs
-    ]
-
-
-def by_rule(figures: Iterable[Figure]) -> dict[str, dict[str, Figure]]:
-    """Return what is drawn, by rule and path."""
-    rules: dict[str, dict[str, Figure]] = {}
-    for figure in figures:
-        if figure.draw:
-            rules.setdefault(figure.name, {})[figure.path] = figure
-    return rules
 
 
 def figures_of(study: Study) -> list[Figure]:
     """Return the figures and tables of a study, in the order of the report."""
     return [
-        *_of_brains(study),
-        *_of_growth(study),
-        *_of_folding(study),
-        *_of_metrics(study),
-        *_of_validation(study),
-        *(figure for comparison in study.comparisons.values() for figure in _of_comparison(study, comparison)),
-        *_of_the_rest(study),
+        *_brain_figures(study),
+        *_growth_figures(study),
+        *_folding_figures(study),
+        *_metric_figures(study),
+        *_region_figures(study),
+        *comparison_figures(study),
+        view_surfaces(study),
+        Figure(RESOURCES),
     ]
 
 
-def measured_name(brains: Iterable[Brain]) -> str:
-    """Return the name of measured brains in figures and tables: their populations if known.
-
-    Several populations are listed with their weeks. Real brains of unknown population are called "real brain"; shapes
-    are called by their kind if they share one.
-    """
-    populations: dict[str, set[float]] = {}
-    kinds = set()
-    for brain in brains:
-        if brain.given.shape is not None:
-            kinds.add(brain.given.shape.kind)
-        else:
-            populations.setdefault(brain.given.population or REAL_BRAIN, set()).add(brain.week)
-    names = list(populations)
-    if len(names) > 1:
-        spans = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
-        names = [f"{name} ({span} GW)" for name, span in zip(names, spans, strict=True)]
-    if kinds:
-        names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
-    return " or ".join(names) or REAL_BRAIN
+# brains
 
 
-def _halves(row: Measured) -> list[list[str]]:
-    """Return the hemispheres of what is measured, each with its maps."""
-    return [[row.parts[side], f"{row.folder}/{side}.shape.gii"] for side in row.sides]
-
-
-def _regions(row: Measured) -> list[list[str]]:
-    """Return the hemispheres of what is measured, each with its regions."""
-    return [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
-
-
-def _whole(one: Simulation) -> dict[float, str]:
-    """Return the surfaces of the simulated brains by week."""
-    return {row.week: row.parts["whole"] for row in one.measured}
-
-
-def _measured_by_week(*runs: Simulation) -> dict[float, Brain]:
-    """Return the measured brains that runs are shown beside, by week."""
-    return {week: brain for one in runs for week, brain in one.measured_by_week.items()}
-
-
-def _of_brains(study: Study) -> Iterator[Figure]:
+def _brain_figures(study: Study) -> Iterator[Figure]:
     for brain in study.brains.values():
-        yield from _of_brain(brain)
+        names = {"brain": brain.id}
+        yield Figure(QUALITY, names=names)
+        yield small_pictures(brain)
+        yield brain_maps(brain)
+        if brain.has_regions:
+            yield Figure(BRAIN_REGIONS, {"brains": {brain.id: regions_of(brain.measured)}}, names=names)
+    yield inputs_figure(study)
+    if study.starts:
+        yield mesh_quality(study)
+
+
+QUALITY = Kind(
+    "quality_page",
+    f"{BRAIN_FIGURES}/quality.png",
+    section="Inputs",
+    title="Quality of the brain",
+    caption=(
+        "Quality of *{brain}*: (a) outlines of the pial surface and of the inner border of the cortex on the image or "
+        "the labels, (b) the surface from several sides, (c) cortical thickness, or more views where it is unknown, "
+        "and the warnings."
+    ),
+    target="quality",
+)
+BRAIN_REGIONS = Kind(
+    "brain_regions",
+    f"{BRAIN_FIGURES}/regions.png",
+    "pictures:regions_picture",
+    section="Metrics",
+    title="Regions of the cortex",
+    caption=(
+        "Regions of the cortex, given on this brain or carried to it by registration. Metrics by region are in "
+        "``results/study/regions.csv``."
+    ),
+    target="brain",
+)
+
+SMALL = Kind("small_pictures", f"{BRAIN_FIGURES}/small.png", "pictures:small_pictures", target="small")
+
+
+def small_pictures(brain: Brain) -> Figure:
+    """Return the pictures in the row of a brain in the report."""
+    row = brain.measured
+    return Figure(SMALL, {"halves": halves_of(row)}, {"side": row.sides[0]}, {"brain": brain.id})
+
+
+BRAIN_MAPS = Kind(
+    "brain_maps",
+    f"{BRAIN_FIGURES}/shape_index.png",
+    "pictures:shape_maps",
+    section="Metrics",
+    title="Shape index",
+    caption="Shape index: −½ is a valley (sulci, blue), +½ a ridge (gyri, red), −1 a cup, +1 a cap.",
+    target="brain",
+)
+
+
+def brain_maps(brain: Brain) -> Figure:
+    inputs: Given = {"brains": {"": {brain.week: halves_of(brain.measured)}}}
+    return Figure(BRAIN_MAPS, inputs, {"quantity": "shape_index", "views": AROUND}, {"brain": brain.id})
+
+
+INPUTS = Kind("inputs_figure", f"{STUDY_FIGURES}/inputs.png", "pictures:runs_by_week", target="", paper=True)
+
+
+def inputs_figure(study: Study) -> Figure:
+    """Return the picture of the first and the last brain of a study."""
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
     inputs: Given = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
-    options: Given = {"views": THREE_SIDES, "measured": ""}
-    path = f"{OF_STUDY}/inputs.png"
-    yield Figure("inputs_figure", path, "pictures.runs_by_week", inputs, options, target="", paper=True)
-    if not study.starts:
-        return
+    return Figure(INPUTS, inputs, {"views": THREE_SIDES, "measured": ""})
+
+
+MESH_QUALITY = Kind(
+    "mesh_quality",
+    f"{STUDY}/mesh_quality.html",
+    "tables:mesh_quality_table",
+    section="Inputs",
+    title="Mesh quality",
+    caption=(
+        "Radius ratio (3 × inscribed / circumscribed radius, 1 for a regular element), dihedral angles and volume of "
+        "the tetrahedra, the distance of the mesh from the pial surface, and how much of gaps narrower than 3 mm, such "
+        "as the fissure, is open, with the limits of the configuration."
+    ),
+    technical=True,
+)
+
+
+def mesh_quality(study: Study) -> Figure:
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}
     limits = study.config.mesh.model_dump()
     gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
-    path = f"{STUDY}/mesh_quality.html"
-    yield Figure("mesh_quality", path, "tables.mesh_quality_table", {"quality": quality}, {"gates": gates})
+    return Figure(MESH_QUALITY, {"quality": quality}, {"gates": gates})
 
 
-def _of_brain(brain: Brain) -> Iterator[Figure]:
-    """Yield what the page of a measured brain has, and the pictures of its row in the report."""
-    names, row, folder = {"brain": brain.id}, brain.measured, f"{BRAIN}/figures"
-    yield Figure("quality_page", f"{folder}/quality.png", names=names, target="quality")
-    inputs: Given = {"halves": _halves(row)}
-    options: Given = {"side": row.sides[0]}
-    yield Figure("small_pictures", f"{folder}/small.png", "pictures.small_pictures", inputs, options, names, "small")
-    inputs = {"brains": {"": {row.week: _halves(row)}}}
-    options = {"quantity": "shape_index", "views": AROUND}
-    yield Figure("brain_maps", f"{folder}/shape_index.png", "pictures.shape_maps", inputs, options, names, "brain")
-    if brain.has_regions:
-        inputs = {"brains": {brain.id: _regions(row)}}
-        path = f"{folder}/regions.png"
-        yield Figure("brain_regions", path, "pictures.regions_picture", inputs, names=names, target="brain")
+# growth
 
 
-def _of_growth(study: Study) -> Iterator[Figure]:
+def _growth_figures(study: Study) -> Iterator[Figure]:
     # of many subjects that are not folded, charts of metrics and change.csv tell growth; here each would have a panel
-    if not study.growing or (len(study.series.brains) > MOST_SERIES and not study.folded):
-        return
+    if study.growing and (len(study.series.brains) <= MAX_SERIES or study.folded):
+        yield growth_figure(study)
+
+
+GROWTH_RATES = Kind(
+    "growth_figure",
+    f"{STUDY}/growth/growth.png",
+    "growth:growth_chart",
+    section="Growth",
+    title="Cortical growth rates",
+    caption=(
+        "Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the measured brains, "
+        "and the tangential growth rate between successive weeks of each series, α = (√θ − 1)/Δt, where θ is the ratio "
+        "of the areas. Dashed: the growth rate that was given to simulations."
+    ),
+    target="growth",
+    paper=True,
+)
+
+
+def growth_figure(study: Study) -> Figure:
     # runs that follow sizes or shapes have no rate of their own
-    grown = [one.settings for one in study.simulations.values() if one.settings.growth.model == "rates"]
+    settings = [simulation.settings for simulation in study.simulations.values()]
+    grown = [run for run in settings if run.growth.model == "rates"]
     rate: Any = grown[0].growth_rate_per_s if grown else None
-    if any(settings.growth_rate_per_s != rate for settings in grown):
+    if any(run.growth_rate_per_s != rate for run in grown):
         rate = None
     elif grown and not isinstance(rate, float):
         rate = dict(rate.weeks or {}) if rate.map is None else None
     options = {"measured": measured_name(brain for _, brain in study.growing), "folding_rate_per_s": rate}
-    path = f"{STUDY}/growth/growth.png"
-    yield Figure("growth_figure", path, "growth.growth_chart", GROWTH, options, target="growth", paper=True)
+    return Figure(GROWTH_RATES, GROWTH, options)
 
 
-def _of_prediction(one: Simulation, beside: Brain) -> Figure:
-    predicted = f"predicted\n{one.weeks[-1]:g} GW"
-    brains = {f"start\n{one.start.week:g} GW": one.start.pial, predicted: one.measured[-1].parts["whole"]}
-    brains[f"atlas' own brain\n{beside.week:g} GW"] = beside.pial
-    options: Given = {"views": THREE_SIDES, "measured": "", "predicted": predicted}
-    inputs: Given = {"runs": {}, "real": brains}
-    return Figure("predicted_figure", f"{OF_RUN}/predicted.png", "pictures.runs_by_week", inputs, options, one.names)
+# folding
 
 
-def _of_folding(study: Study) -> Iterator[Figure]:
+def _folding_figures(study: Study) -> Iterator[Figure]:
     if study.prediction is not None:
-        yield _of_prediction(study.prediction, study.atlas_brain(study.prediction))
+        yield predicted_figure(study.prediction, study.atlas_brain(study.prediction))
     for start in study.starts:
-        runs = [one for one in study.folded if one.start is start]
-        names, real = {"brain": start.id}, _measured_by_week(*runs)
-        options = {"measured": measured_name(real.values())}
-        surfaces = {week: brain.pial for week, brain in real.items()}
-        inputs: Given = {"runs": {one.run: _whole(one) for one in runs}, "real": surfaces}
-        path = f"{OF_STUDY}/weekly.{{brain}}.png"
-        yield Figure("weekly_figure", path, "pictures.runs_by_week", inputs, options, names, paper=True)
-        simulated = {one.run: {week: _whole(one)[week] for week in _measured_by_week(one)} for one in runs}
-        inputs = {"runs": simulated, "real": surfaces}
-        path = f"{OF_STUDY}/outlines.{{brain}}.png"
-        yield Figure("outlines_figure", path, "sections.outlines_chart", inputs, options, names, paper=True)
-        inputs = {"frames": {one.run: one.file(FOLDING["frames"]) for one in runs}}
-        path = f"{OF_STUDY}/displacement_maps.{{brain}}.png"
-        yield Figure("displacement_maps", path, "pictures.displacement_maps", inputs, names=names, paper=True)
-        brains = {one.run: {row.week: _halves(row) for row in one.measured} for one in runs}
-        brains[measured_name(real.values())] = {week: _halves(brain.measured) for week, brain in real.items()}
-        path, quantity = f"{OF_STUDY}/shape_index.{{brain}}.png", {"quantity": "shape_index"}
-        yield Figure("shape_maps", path, "pictures.shape_maps", {"brains": brains}, quantity, names)
+        simulations = [simulation for simulation in study.folded if simulation.start is start]
+        yield weekly_figure(start, simulations)
+        yield outlines_figure(start, simulations)
+        yield displacement_maps(start, simulations)
+        yield shape_maps(start, simulations)
     zones = set()
-    for one in study.folded:
-        if one.shapes and "growth" in one.settings.fields:
-            inputs = {"frames": one.file(FOLDING["frames"]), "params": one.file(PARAMETERS)}
-            growth: Given = {"quantity": "area_growth_percent_per_gw", "views": THREE_SIDES}
-            path = f"{OF_RUN}/growth_found.png"
-            yield Figure("growth_found_figure", path, "pictures.scalar_maps", inputs, growth, one.names)
-        if (zoned := repr((one.start.id, one.settings.model_dump(include=ZONES)))) not in zones:
+    for simulation in study.folded:
+        if simulation.shapes and "growth" in simulation.settings.fields:
+            yield growth_found_figure(simulation)
+        if (zoned := repr((simulation.start.id, simulation.settings.model_dump(include=ZONES)))) not in zones:
             zones.add(zoned)
-            inputs = {name: one.file(file) for name, file in {**REGIONS, "params": PARAMETERS}.items()}
-            path = f"{OF_RUN}/zones.png"
-            yield Figure("zones_figure", path, "pictures.zones_picture", inputs, names=one.names, target="", paper=True)
-    if not study.folded:
-        return
-    yield Figure("study_runs", f"{STUDY}/runs.html", target="metrics")
-    table, named = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
-    path = f"{OF_STUDY}/displacement.png"
-    yield Figure("displacement_figure", path, "growth.displacement_chart", table, named, paper=True)
-
-
-def _of_metrics(study: Study) -> Iterator[Figure]:
-    metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
-    # those of a group have its colour and name
-    everything, groups = study.brains.values(), _groups(study)
-    others = [brain for brain in everything if brain.id not in groups]
-    options: Given = {"runs": run_names(study.pairs), "measured": measured_name(others or everything)}
-    subjects = {brain.id: brain.subject for brain in study.brains.values() if brain.given.subject is not None}
-    options |= {"subjects": subjects, "groups": groups}
-    yield Figure("metrics_figure", f"{OF_STUDY}/metrics.png", "charts.metrics_chart", metrics, options)
+            inputs = {"regions": simulation.file(REGIONS["data"]), "params": simulation.file(PARAMETERS)}
+            yield Figure(ZONES_OF_RUN, inputs, names=simulation.names)
     if study.folded:
-        measured = {"measured": measured_name(everything)}
-        yield Figure("metrics_table", f"{STUDY}/metrics_table.html", "tables.metrics_table", metrics, measured)
-    yield Figure("spectra_figure", f"{OF_STUDY}/spectra.png", "charts.spectra_weeks_chart", spectra, options)
-    reference = list(study.norm_reference)
-    if len({study.brains[brain].subject for brain in reference}) >= FEWEST_FOR_NORMS:
-        inputs = {**metrics, "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
-        name = measured_name(study.brains[brain] for brain in reference)
-        options = {**options, "measured": name, "reference": reference}
-        yield Figure("norms_figure", f"{OF_STUDY}/norms.png", "charts.norms_chart", inputs, options)
-    yield from _of_regions(study)
+        yield Figure(RUNS)
+        table, runs = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
+        yield Figure(DISPLACEMENT, table, runs)
+        yield Figure(PAPER_DISPLACEMENT, {**table, "published": PUBLISHED}, runs)
+
+
+PREDICTED = Kind(
+    "predicted_figure",
+    f"{RUN_FIGURES}/predicted.png",
+    "pictures:runs_by_week",
+    section="Folding",
+    title="Start, prediction and atlas",
+    caption=(
+        "The start brain as scanned, the brain that run *{run}* predicts (blue), and the own brain of the atlas whose "
+        "growth it uses, at one scale."
+    ),
+)
+
+
+def predicted_figure(simulation: Simulation, atlas_brain: Brain) -> Figure:
+    start, predicted = simulation.start, f"predicted\n{simulation.weeks[-1]:g} GW"
+    brains = {f"start\n{start.week:g} GW": start.pial, predicted: simulation.measured[-1].parts["whole"]}
+    brains[f"atlas' own brain\n{atlas_brain.week:g} GW"] = atlas_brain.pial
+    options: Given = {"views": THREE_SIDES, "measured": "", "predicted": predicted}
+    return Figure(PREDICTED, {"runs": {}, "real": brains}, options, simulation.names)
+
+
+WEEKLY = Kind(
+    "weekly_figure",
+    f"{STUDY_FIGURES}/weekly.{{brain}}.png",
+    "pictures:runs_by_week",
+    section="Folding",
+    title="Simulated beside measured brains",
+    caption=(
+        "Runs from *{brain}* (blue) above the measured brains of the same weeks (beige), from the left and from above, "
+        "at one scale. The first week is the start brain as it was meshed. Differences between the runs are in "
+        "``results/study/runs.csv``."
+    ),
+    paper=True,
+)
+
+
+def weekly_figure(start: Brain, simulations: list[Simulation]) -> Figure:
+    real = measured_by_week(*simulations)
+    inputs: Given = {
+        "runs": {simulation.run: surfaces_by_week(simulation) for simulation in simulations},
+        "real": {week: brain.pial for week, brain in real.items()},
+    }
+    return Figure(WEEKLY, inputs, {"measured": measured_name(real.values())}, {"brain": start.id})
+
+
+OUTLINES = Kind(
+    "outlines_figure",
+    f"{STUDY_FIGURES}/outlines.{{brain}}.png",
+    "sections:outlines_chart",
+    section="Folding",
+    title="Outlines of simulated and measured brains",
+    caption=(
+        "Outlines of the simulated brains and of the measured brain of the same week (black), rigidly aligned: coronal "
+        "(a) and axial sections (b) through the middle, sagittal sections (c) through the right hemisphere."
+    ),
+    paper=True,
+)
+
+
+def outlines_figure(start: Brain, simulations: list[Simulation]) -> Figure:
+    real = measured_by_week(*simulations)
+    inputs: Given = {"real": {week: brain.pial for week, brain in real.items()}, "runs": {}}
+    for simulation in simulations:
+        surfaces = surfaces_by_week(simulation)
+        inputs["runs"][simulation.run] = {week: surfaces[week] for week in measured_by_week(simulation)}
+    return Figure(OUTLINES, inputs, {"measured": measured_name(real.values())}, {"brain": start.id})
+
+
+DISPLACEMENT_MAPS = Kind(
+    "displacement_maps",
+    f"{STUDY_FIGURES}/displacement_maps.{{brain}}.png",
+    "pictures:displacement_maps",
+    section="Folding",
+    title="Displacement maps",
+    caption=(
+        "Magnitude of the displacement between output weeks on the pial surface, on one scale for all runs; 0.5 % of "
+        "the vertices are above the scale. Ring: the largest displacement, dotted if it is on the far side, and its "
+        "position in RAS+ mm. The mean is over the vertices."
+    ),
+    paper=True,
+)
+
+
+def displacement_maps(start: Brain, simulations: list[Simulation]) -> Figure:
+    frames = {simulation.run: simulation.file(FOLDING["frames"]) for simulation in simulations}
+    return Figure(DISPLACEMENT_MAPS, {"frames": frames}, names={"brain": start.id})
+
+
+SHAPE_MAPS = Kind(
+    "shape_maps",
+    f"{STUDY_FIGURES}/shape_index.{{brain}}.png",
+    "pictures:shape_maps",
+    section="Metrics",
+    title="Maps of the shape index",
+    caption=(
+        "Shape index on the pial surfaces of the runs and of the measured brains of the same weeks: −½ is a valley "
+        "(sulci, blue), +½ a ridge (gyri, red), −1 a cup, +1 a cap."
+    ),
+)
+
+
+def shape_maps(start: Brain, simulations: list[Simulation]) -> Figure:
+    real = measured_by_week(*simulations)
+    brains = {simulation.run: {row.week: halves_of(row) for row in simulation.measured} for simulation in simulations}
+    brains[measured_name(real.values())] = {week: halves_of(brain.measured) for week, brain in real.items()}
+    return Figure(SHAPE_MAPS, {"brains": brains}, {"quantity": "shape_index"}, {"brain": start.id})
+
+
+GROWTH_FOUND = Kind(
+    "growth_found_figure",
+    f"{RUN_FIGURES}/growth_found.png",
+    "pictures:growth_maps",
+    section="Folding",
+    title="Growth towards the target shapes",
+    caption=(
+        "Growth in area along the pial surface by which run *{run}* approaches its target shapes from week to week, on "
+        "the surface at the end of the interval. Lines: direction of largest growth along the surface, longer where it "
+        "exceeds the growth across it by more."
+    ),
+)
+
+
+def growth_found_figure(simulation: Simulation) -> Figure:
+    inputs = {"frames": simulation.file(FOLDING["frames"]), "params": simulation.file(PARAMETERS)}
+    return Figure(GROWTH_FOUND, inputs, {"views": THREE_SIDES}, simulation.names)
+
+
+ZONES_OF_RUN = Kind("zones_figure", f"{RUN_FIGURES}/zones.png", "pictures:zones_picture", target="", paper=True)
+RUNS = Kind(
+    "study_runs",
+    f"{STUDY}/runs.html",
+    section="Folding",
+    title="Parameters of the runs",
+    caption=(
+        "Parameters that differ between the runs come first, then those that all share. All parameters are in "
+        "``results/study/runs.csv``."
+    ),
+    technical=True,
+    target="metrics",
+)
+DISPLACEMENT = Kind(
+    "displacement_figure",
+    f"{STUDY_FIGURES}/displacement.png",
+    "growth:displacement_chart",
+    section="Folding",
+    title="Displacement per week",
+    caption="Largest (a) and mean (b) displacement between output weeks over all nodes, per week.",
+)
+PAPER_DISPLACEMENT = Kind(
+    "paper_displacement_figure",
+    f"{STUDY_FIGURES}/displacement_paper.png",
+    "growth:displacement_chart",
+    target="",
+    paper=True,
+)
+
+# metrics
+
+
+def _metric_figures(study: Study) -> Iterator[Figure]:
+    metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
+    options = _chart_options(study)
+    yield Figure(METRICS, metrics, options)
+    if study.folded:
+        yield Figure(METRICS_TABLE, metrics, {"measured": measured_name(study.brains.values())})
+    yield Figure(SPECTRA, spectra, options)
+    reference = study.norm_reference
+    if len({study.brains[brain].subject for brain in reference}) >= MIN_NORM_SUBJECTS:
+        yield norms_figure(study, options)
+
+
+def _chart_options(study: Study) -> Given:
+    """Return names and groups of the brains in charts over the weeks; those of a group have its colour and name."""
+    brains, groups = study.brains.values(), _groups(study)
+    return {
+        "runs": run_names(study.pairs),
+        "measured": measured_name([brain for brain in brains if brain.id not in groups] or brains),
+        "subjects": {brain.id: brain.subject for brain in brains if brain.given.subject is not None},
+        "groups": groups,
+    }
 
 
 def _groups(study: Study) -> dict[str, str]:
@@ -284,110 +398,132 @@ def _groups(study: Study) -> dict[str, str]:
     return {}
 
 
-def _of_regions(study: Study) -> Iterator[Figure]:
+METRICS = Kind(
+    "metrics_figure",
+    f"{STUDY_FIGURES}/metrics.png",
+    "charts:metrics_chart",
+    section="Metrics",
+    title="Metrics over the weeks",
+    caption=(
+        "Lines are runs, marks are measured brains; scans of one subject are joined. The gyrification index is the "
+        "pial area over that of the convex hulls of the hemispheres, or of tighter envelopes. The cut at the midline "
+        "is left out of both areas, so a smooth brain may have an index a few per cent below 1. Shape index: −1 is a "
+        "cup, −½ a valley, +½ a ridge, +1 a cap."
+    ),
+)
+METRICS_TABLE = Kind(
+    "metrics_table",
+    f"{STUDY}/metrics_table.html",
+    "tables:metrics_table",
+    section="Metrics",
+    title="Metrics, table",
+    caption=(
+        "The measured brain, each run, and the run's difference from the measured brain. Curvature of folds shorter "
+        "than the curvature wavelength is flattened, and with it the mean curvature norm. All weeks, and the "
+        "hemispheres, are in ``results/study/metrics.csv``."
+    ),
+)
+SPECTRA = Kind(
+    "spectra_figure",
+    f"{STUDY_FIGURES}/spectra.png",
+    "charts:spectra_weeks_chart",
+    section="Metrics",
+    title="SpAnGy bands of folds over the weeks",
+    caption=(
+        "Relative power in the bands B4, B5 and B6 (primary, secondary and tertiary folds), as far as the spectra "
+        "reach, per hemisphere (SpAnGy, Germanaud et al. 2012). Open marks: the band is cut off, or finer than the "
+        "surface resolves."
+    ),
+)
+NORMS = Kind(
+    "norms_figure",
+    f"{STUDY_FIGURES}/norms.png",
+    "charts:norms_chart",
+    section="Metrics",
+    title="Norms over the weeks",
+    caption=(
+        "Metrics of whole brains over the weeks, and the norm: a quadratic of the week, a grey band that should hold "
+        "90 % of further brains (Student's distribution), and the 5, 50 and 95 % quantiles of weeks with at least five "
+        "brains (bars). If the norm has one average brain a week, the spread of individuals is unknown: there is no "
+        "band, and brains have a difference from the curve in % instead of a centile and z. Brains with other "
+        "hemispheres than the norm's are not compared with it, and not drawn."
+    ),
+)
+
+
+def norms_figure(study: Study, options: Given) -> Figure:
+    reference = [study.brains[brain] for brain in study.norm_reference]
+    tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
+    comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]
+    shown = {"measured": measured_name(reference), "reference": study.norm_reference, "brains": comparable}
+    return Figure(NORMS, tables, options | shown)
+
+
+def _region_figures(study: Study) -> Iterator[Figure]:
     brains = [brain for brain in study.brains.values() if brain.has_regions]
     if not brains:
         return
     tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
-    options = {"measured": measured_name(brains)}
-    yield Figure("regions_chart", f"{OF_STUDY}/regions_metrics.png", "charts.regions_chart", tables, options)
-    rows = {
-        f"{name}, {one.weeks[-1]:g} GW": one.measured[-1]
-        for one, name in zip(study.folded, run_names(study.pairs), strict=True)
-        if one.has_regions
+    yield Figure(REGIONS_CHART, tables, {"measured": measured_name(brains)})
+    simulated = {
+        f"{name}, {simulation.weeks[-1]:g} GW": simulation.measured[-1]
+        for simulation, name in zip(study.folded, run_names(study.pairs), strict=True)
+        if simulation.has_regions
     }
-    if rows:
-        rows = {brain.id: brain.measured for brain in brains} | rows
-        sides = {heading: _regions(row) for heading, row in rows.items()}
-        yield Figure("regions_figure", f"{OF_STUDY}/regions.png", "pictures.regions_picture", {"brains": sides})
+    if simulated:
+        rows = {brain.id: brain.measured for brain in brains} | simulated
+        yield Figure(REGIONS_FIGURE, {"brains": {heading: regions_of(row) for heading, row in rows.items()}})
 
 
-def _of_validation(study: Study) -> Iterator[Figure]:
-    options, target = {"runs": list(study.config.runs)}, "validate"
-    if study.validated:
-        ceiling = f"{STUDY}/registration_ceiling.csv" if study.carried else None
-        inputs: Given = {"validation": f"{STUDY}/validation.csv", "ceiling": ceiling}
-        path = f"{OF_STUDY}/validation.png"
-        yield Figure("validation_figure", path, "scores.validation_chart", inputs, options, target=target)
-    if study.predictions:
-        inputs = {"prediction": f"{STUDY}/prediction.csv"}
-        path = f"{OF_STUDY}/prediction.png"
-        yield Figure("prediction_figure", path, "scores.prediction_chart", inputs, options, target=target)
-        path = f"{STUDY}/prediction.html"
-        yield Figure("prediction_table", path, "tables.prediction_table", inputs, target=target)
-    for one in study.expected:
-        yield from _of_expected(one)
-    if study.validated_carried:
-        inputs = {"onset": f"{STUDY}/onset.csv"}
-        yield Figure("onset_figure", f"{OF_STUDY}/onset.png", "scores.onset_chart", inputs, options, target=target)
+REGIONS_CAPTION = (
+    "Regions of the cortex, given on a brain (named sulci: on one of the spina bifida atlas), carried to other "
+    "measured brains by registration, and to simulated ones with the tissue. Metrics by region: areas are sums of both "
+    r"sides, other values means by area; the asymmetry index is 2 (left − right)/(\|left\| + \|right\|)."
+)
+REGIONS_CHART = Kind(
+    "regions_chart",
+    f"{STUDY_FIGURES}/regions_metrics.png",
+    "charts:regions_chart",
+    section="Metrics",
+    title="Metrics by region",
+    caption=REGIONS_CAPTION,
+)
+REGIONS_FIGURE = Kind(
+    "regions_figure",
+    f"{STUDY_FIGURES}/regions.png",
+    "pictures:regions_picture",
+    section="Metrics",
+    title="Regions of the cortex",
+    caption=REGIONS_CAPTION,
+)
+
+# the report
+
+VIEW = Kind("view_surfaces", "results/report/surfaces.json", "view3d:surfaces_view", target="view")
 
 
-def _of_expected(one: Simulation) -> Iterator[Figure]:
-    simulated, real = _whole(one), _measured_by_week(one)
-    away = {week: [simulated[week], one.file(DEVIATION["maps"], week=week)] for week in one.real}
-    # the last week and others, four at most
-    weeks = sorted(away, reverse=True)[:: -(-len(away) // 4)]
-    shown = {min(simulated), *weeks}
-    inputs: Given = {
-        "runs": {"expected": {week: surface for week, surface in simulated.items() if week in shown}},
-        "real": {week: brain.pial for week, brain in real.items() if week in shown},
-        "deviations": {week: away[week] for week in weeks},
-    }
-    options: Given = {"measured": measured_name(real.values())}
-    path = f"{OF_RUN}/expected.png"
-    yield Figure("expected_figure", path, "pictures.runs_by_week", inputs, options, one.names, target="validate")
-    for quantity in ("log_area", "thickness_difference_mm"):
-        if quantity == "log_area" or one.start.has_thickness:
-            inputs = {"brains": {"real less expected": {week: [files] for week, files in away.items()}}}
-            options, names = {"quantity": quantity, "views": AROUND}, {**one.names, "quantity": quantity}
-            path = f"{OF_RUN}/deviation_{{quantity}}.png"
-            yield Figure("deviation_figure", path, "pictures.shape_maps", inputs, options, names, target="validate")
-
-
-def _of_comparison(study: Study, comparison: Comparison) -> Iterator[Figure]:
-    start, week = comparison.members[0][0].start, comparison.week
-    values = {one.run: dict(values) for one, values in comparison.members if one.start is start}
-    rows = {one.run: one.at(week) for one, _ in comparison.members if one.start is start}
-    real = comparison.real[start.id][:1]
-    measured = measured_name(real)
-    shared: Given = {"target": "influence_figures", "paper": True}
-    shared["names"] = {"study": comparison.name, "week": f"{week:g}"}
-    may_end = tuple((run, start.id, week) for run in rows)
-    inputs: Given = {
-        "members": {run: _halves(row) for run, row in rows.items()},
-        "real": _halves(real[0].measured) if real else None,
-    }
-    options: Given = {"values": values, "measured": measured}
-    path = f"{OF_COMPARISON}/influence.png"
-    yield Figure("influence_figure", path, "pictures.influence_picture", inputs, options, may_end=may_end, **shared)
-    inputs = {
-        "members": {run: f"{row.folder}/spectra.csv" for run, row in rows.items()},
-        "real": [f"{brain.measured.folder}/spectra.csv" for brain in real],
-    }
-    options = {**options, "week": week}
-    path = f"{OF_COMPARISON}/spectra.png"
-    yield Figure("influence_spectra", path, "charts.influence_spectra", inputs, options, may_end=may_end, **shared)
-    vary = study.config.studies[comparison.name].vary
-    if len(vary) == 1 and real and all(isinstance(value, int | float) for value in next(iter(vary.values()))):
-        inputs = {table: f"{STUDY}/{comparison.name}/{table}.csv" for table in ("comparison", "nearest")}
-        options = {"varied": next(iter(vary)), "subject": start.id, "real": [brain.id for brain in real]}
-        path = f"{OF_COMPARISON}/nearest.png"
-        yield Figure("nearest_figure", path, "scores.nearest_chart", inputs, options, **shared)
-
-
-def _of_the_rest(study: Study) -> Iterator[Figure]:
-    if study.calibration and (calibrate := study.config.calibrate):
-        tables = {name: f"{CALIBRATION}/{name}.csv" for name in ("runs", "optimum")}
-        path, options = f"{CALIBRATION}/calibration.png", {"score": list(calibrate.score)}
-        yield Figure("calibration_figure", path, "scores.calibration_chart", tables, options, target="calibrate")
+def view_surfaces(study: Study) -> Figure:
+    """Return the surfaces of the report's 3D view: of all runs, and of measured brains of the start's population."""
     populations = [start.given.population for start in study.starts[:1]]
     # a view of measured brains alone is none over the weeks of one brain
     real = [brain for brain in study.brains.values() if populations and brain.given.population in populations]
     runs = zip(run_names(study.pairs), study.folded, strict=True)
     inputs = {
-        "runs": {name: [[row.week, _halves(row)] for row in one.measured] for name, one in runs},
-        "real": [[brain.week, _halves(brain.measured)] for brain in sorted(real, key=lambda brain: brain.week)],
+        "runs": {name: [[row.week, halves_of(row)] for row in simulation.measured] for name, simulation in runs},
+        "real": [[brain.week, halves_of(brain.measured)] for brain in sorted(real, key=lambda brain: brain.week)],
     }
-    view = {"measured": measured_name(real)}
-    yield Figure("view_surfaces", "results/report/surfaces.json", "view3d.surfaces_view", inputs, view, target="view")
-    yield Figure("study_resources", f"{STUDY}/resources.html", target="report")
+    return Figure(VIEW, inputs, {"measured": measured_name(real)})
+
+
+RESOURCES = Kind(
+    "study_resources",
+    f"{STUDY}/resources.html",
+    section="Resources",
+    title="Time, memory, energy and emissions",
+    caption=(
+        "What the jobs of this study needed. Energy is estimated as core hours × 12 W, emissions as energy × 475 "
+        "g/kWh. The numbers are in ``results/study/resources.csv``."
+    ),
+    technical=True,
+    target="report",
+)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable
 
 from ..settings.terms import SIDES, Side
+from ..shipped import SHIPPED
 from ..units import week_tag
 
 BRAIN = "results/brains/{brain}"
@@ -15,6 +16,8 @@ CALIBRATION = f"{STUDY}/calibration"
 WEEK = "week-{week}"
 PLACE = "results/{where}"
 """The metrics of a brain, measured or simulated."""
+PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
+"""What the paper reports."""
 
 
 def file_of(pattern: str, **names: str | float) -> str:

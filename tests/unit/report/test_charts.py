@@ -170,7 +170,11 @@ def metrics_with_norms() -> pd.DataFrame:
 
 def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
     curves = norm_curves(metrics_with_norms, REFERENCE)
-    figure = norms_chart(metrics_with_norms, curves, measured_norms(metrics_with_norms, REFERENCE), reference=REFERENCE)
+    norms = measured_norms(metrics_with_norms, REFERENCE)
+    # half a brain, which is not compared with whole ones
+    half = metrics_with_norms[:1].assign(subject="half", value=5.0)
+    brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
+    figure = norms_chart(pd.concat([metrics_with_norms, half]), curves, norms, **brains)
     axes = figure.axes[0]
     stars = {
         (float(x), float(y)): line.get_color()
@@ -205,7 +209,8 @@ def test_the_band_holds_ninety_per_cent_of_further_brains():
 def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
     curves = norm_curves(metrics_with_norms, REFERENCE, individuals=False)
     norms = measured_norms(metrics_with_norms, REFERENCE)
-    figure = norms_chart(metrics_with_norms, curves, norms, reference=REFERENCE, groups={"case": "sex: F"})
+    brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
+    figure = norms_chart(metrics_with_norms, curves, norms, **brains, groups={"case": "sex: F"})
     curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) > 20)
     assert curve.get_ydata()[[0, -1]] == pytest.approx([210, 300], abs=1)
     (band,) = (part.get_paths() for part in figure.axes[0].collections[:1])
@@ -283,14 +288,18 @@ def test_displacement_is_that_of_all_nodes_per_week_at_the_middle_of_the_interva
     norms = pd.DataFrame({"run": "thin", "subject": "s", **weeks, "max_mm": 3.0, "mean_mm": [0.57, 0.8, 0.5]})
     largest, mean = displacement_chart(norms).axes
     lines = {line.get_label(): line.get_xydata().tolist() for line in mean.lines}
-    assert lines["thin"] == [[21.5, 0.57], [26.0, 0.25]]
-    assert [mean for _, mean in lines["FetalFoldSim"]] == [0.42, 0.40, 0.38, 0.40]
-    assert [mean for _, mean in lines["Wang et al. 2021"]] == [0.45, 0.88, 1.91, 3.03]
+    assert lines == {"thin": [[21.5, 0.57], [26.0, 0.25]]}
     assert "per week" in largest.get_ylabel()
+    published = {"source": "a paper", "max_mm": [2.5, 2.2], "mean_mm": [0.5, 0.4]}
+    figure = displacement_chart(norms, published={"displacement": {"from_weeks": [21, 22], "rows": [published]}})
+    for axes, values in zip(figure.axes, ([2.5, 2.2], [0.5, 0.4]), strict=True):
+        lines = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
+        assert lines.pop("a paper") == [[21.5, values[0]], [22.5, values[1]]]
+        assert list(lines) == ["thin"]
+    assert {"thin", "a paper"} <= words(figure)
 
 
-NOTHING_PUBLISHED = pd.DataFrame({"measure": [], "paper": []})
-OF_THE_STUDY = {"varied": "thickness_mm", "subject": "s", "real": ["r"]}
+OF_THE_STUDY = {"varied": "thickness_mm", "subject": "s", "real": ["r"], "week": 28.0}
 TRIED = {"thickness_mm": [1.0, 2.0, 3.0, 2.2], "growth_rate_per_s": [1e-7, 2e-7, 3e-7, 2.2e-7]}
 RUNS = pd.DataFrame(TRIED | {"round": [0, 0, 0, 1], "score": [0.5, 0.2, np.nan, 0.1]})
 OPTIMUM = pd.DataFrame({"parameter": ["thickness_mm", "growth_rate_per_s"], "value": [2.1, 2.1e-7]})
@@ -386,7 +395,7 @@ def distances(values: dict[float, float], flag: str = "ok", **labels: str) -> pd
 def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     good = distances({0.8: 3.0, 1.5: 2.0, 2.25: 1.0})
     bad = distances({6.0: 0.1}, flag="not resolved by the mesh")
-    figure = nearest_chart(pd.concat([good, bad]), NOTHING_PUBLISHED, **OF_THE_STUDY)
+    figure = nearest_chart(pd.concat([good, bad]), **OF_THE_STUDY)
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.texts] == ["2.25"]
     assert axes.get_xlabel() == "cortical thickness (mm)"
@@ -394,3 +403,14 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
     marks = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 4.5]
     shown = {line.get_markerfacecolor() == "white": line.get_xdata().tolist() for line in marks}
     assert shown == {False: [0.8, 1.5, 2.25], True: [6.0]}
+
+
+def test_what_a_publication_found_nearest_is_a_line_in_the_panel_of_its_measure_and_week():
+    rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in ("area", "relative_power_B4_weyl")]
+    found = {"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 1.3}
+    others = [found | {"week": 29, "value": 1.4}, found | {"parameter": "step_s", "value": 1.5}]
+    figure = nearest_chart(pd.concat(rows), **OF_THE_STUDY, published={"nearest": [found, *others]})
+    dashed = [[line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"] for axes in figure.axes]
+    assert dashed == [[], [1.3]]
+    assert "nearest in the publication" in words(figure)
+    assert "nearest in the publication" not in words(nearest_chart(pd.concat(rows), **OF_THE_STUDY))

@@ -80,12 +80,12 @@ PROVENANCE = {
 
 def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains", content: str = "") -> list[dict]:
     """Return figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
-    words = {
-        rule: {"section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
-        for rule in rules
-    }
-    figures = [(rule, f"{rule}{number}.png", {"brain": "a"}) for number, rule in enumerate(rules)]
-    return shown_figures(words, figures, {path: content for _, path, _ in figures})
+    figures = [
+        {"name": rule, "section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
+        | {"path": f"{rule}{number}.png", "names": {"brain": "a"}}
+        for number, rule in enumerate(rules)
+    ]
+    return shown_figures(figures, {figure["path"]: content for figure in figures})
 
 
 def page(figures: list[dict], view: dict | None = None, **others) -> str:

@@ -19,6 +19,7 @@ from gyriflow.report.pictures import (
 )
 from gyriflow.report.scene import VIEWS, render, uniform_colours
 from gyriflow.report.sections import outlines_chart
+from gyriflow.settings.folding import parameters_from
 
 BRAIN = box((20, 30, 20))
 SMOOTH = ellipsoid((20.0, 26.0, 18.0))
@@ -79,8 +80,9 @@ def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
 
 
 def test_displacement_maps_share_their_colour_scale():
-    maps = {"slow": {(21.0, 22.0): (BRAIN, np.full(8, 1.0))}, "fast": {(22.0, 23.0): (BRAIN, np.full(8, 4.0))}}
-    figure = displacement_maps(maps)
+    before = {norm: TriangleMesh(BRAIN.vertices - [0.0, 0, norm], BRAIN.faces) for norm in (1, 4)}
+    frames = {"slow": {21.0: (before[1], {}), 22.0: (BRAIN, {})}, "fast": {22.0: (before[4], {}), 23.0: (BRAIN, {})}}
+    figure = displacement_maps(frames)
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim() == pytest.approx((0.0, 4.0))
     assert "(mm)" in bar.get_xlabel()
@@ -93,11 +95,12 @@ def test_displacement_maps_share_their_colour_scale():
 
 
 def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed():
-    norms = np.ones(len(SMOOTH.vertices))
+    moves = np.tile([0.0, 0, 1], (len(SMOOTH.vertices), 1))
     # on the right, not seen from the left
     top = int((SMOOTH.vertices @ [0.3, 0, 1]).argmax())
-    norms[top] = 50.0
-    figure = displacement_maps({"run": {(21.0, 22.0): (SMOOTH, norms)}})
+    moves[top] *= 50
+    before = TriangleMesh(SMOOTH.vertices - moves, SMOOTH.faces)
+    figure = displacement_maps({"run": {21.0: (before, {}), 22.0: (SMOOTH, {})}})
     bar = colour_bar(figure, "displacement")
     assert bar.get_xlim()[1] == pytest.approx(1.0)
     rings = [ring for axes in pictures(figure) for ring in axes.patches if ring.get_edgecolor()[:3] == (0, 0, 0)]
@@ -119,7 +122,8 @@ def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
 def test_zones_have_their_areas_and_the_medial_view_shows_one_hemisphere():
     brain = merged(box((10, 30, 20), (-6, 0, 0)), box((10, 30, 20), (6, 0, 0)))
     zones = np.repeat([1, 3], 12)
-    figure = zones_picture(brain, zones, fissure_x_mm=0.0)
+    run = {"start_week": 21, "end_week": 22, "output_weeks": [21, 22], "fissure_x_mm": 0.0}
+    figure = zones_picture((brain, {"zone": zones}), parameters_from(run))
     # a box of 10 × 30 × 20 mm has 22 cm²
     assert {"clamped 22.0 cm²", "right contact 22.0 cm²"} <= words(figure)
     assert not any("free" in text for text in words(figure))
@@ -174,12 +178,13 @@ def test_regions_are_seen_in_their_colours_where_they_are():
         assert min(away, key=away.__getitem__) == name
 
 
-def test_outlines_are_those_of_both_brains_at_one_scale():
-    bigger = TriangleMesh(1.1 * SMOOTH.vertices, SMOOTH.faces)
-    figure = outlines_chart({"thin": {21.0: SMOOTH, 22.0: SMOOTH}}, {21.0: SMOOTH, 22.0: bigger})
+def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
+    bigger, moved = (TriangleMesh(mesh, SMOOTH.faces) for mesh in (1.1 * SMOOTH.vertices, SMOOTH.vertices + [5, -3, 2]))
+    figure = outlines_chart({"thin": {21.0: SMOOTH, 22.0: moved}}, {21.0: SMOOTH, 22.0: bigger})
     first, second = figure.axes[2:4]
     assert np.ptp(first.get_xlim()) == np.ptp(second.get_xlim())
     real, simulated = (np.concatenate(lines.get_segments()) for lines in second.collections)
     assert np.ptp(real[:, 0]) == pytest.approx(44.0, rel=0.01)
     assert np.ptp(simulated[:, 0]) == pytest.approx(40.0, rel=0.01)
+    assert simulated.mean(axis=0) == pytest.approx(real.mean(axis=0), abs=0.5)
     assert {"thin", "real brain", "21 GW", "22 GW"} <= words(figure)

@@ -1,57 +1,105 @@
-"""The registry of figures: what each is drawn by takes what it gives, and what the workflow works out for it."""
+"""The registry of figures: what each is drawn by takes what it gives, and the report has words on it."""
 
 import inspect
 from importlib import import_module
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from matplotlib.figure import Figure as Drawing
-from scripts import SCRIPTS, run_script
-from shapes import box
+from scripts import run_script
 
-from gyriflow.io.files import write_json
-from gyriflow.study import resolve
-from gyriflow.study.figures import asked_for, by_rule, figures_of
+from gyriflow.io.files import write_json, write_table
+from gyriflow.io.frames import read_pial_frames
+from gyriflow.report.page import caption_html
+from gyriflow.report.pictures import displacements, growth_of_area
+from gyriflow.shipped import DEMO, SHIPPED
+from gyriflow.study import comparison_figures, figures, resolve
+from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
+from gyriflow.study.registry import Kind, asked_for, by_rule, files_in
 from gyriflow.units import SECONDS_PER_GW
 
-WORDS = yaml.safe_load((SCRIPTS.parent / "report" / "figures.yaml").read_text())
+KINDS = [kind for module in (figures, comparison_figures) for kind in vars(module).values() if isinstance(kind, Kind)]
 SHAPE = {"semi_axes_mm": [20, 26, 18]}
 BRAINS = [{"id": name, "week": week, "shape": SHAPE} for name, week in (("a", 21), ("b", 22), ("c", 23))]
 STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
 STUDY |= {"studies": {"rate": {"base": "thin", "vary": {"growth_rate_per_s": [1e-7, 2e-7]}, "compare_week": 22}}}
 
 
-def registry():
-    return figures_of(resolve(load(STUDY)))
+LABELS = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+OWN, OTHERS = (
+    [
+        {"id": f"{name}{week}", "week": week, "population": name, "labels": str(LABELS), "scheme": "spina-bifida-atlas"}
+        for week in weeks
+    ]
+    for name, weeks in (("own", (22, 23)), ("atlas", (21, 22, 23, 24)))
+)
+ALONE = {"brains": [*OWN[:1], *OTHERS], "start": "own22", "folding": {"end_week": 23, "preset": "expected"}}
+PREDICTION = ALONE | {"brains": [*OWN, *OTHERS], "runs": {"expected": {}, "plain": {"preset": "fetalfoldsim"}}}
+PREDICTION |= {"metrics": {"regions": {"own22": {"volume": str(LABELS), "names": {5: "cortex"}}}}}
+EXAMPLES = SHIPPED / "config" / "examples"
 
 
-def rows_of(rule):
-    return list(by_rule(registry())[rule].values())
+def registry(study=STUDY):
+    return figures_of(resolve(load(study)))
 
 
-@pytest.mark.parametrize("rule", by_rule(registry()))
-def test_a_figure_gives_its_function_what_that_takes(rule):
-    (row, *_) = rows_of(rule)
-    given = {**row.inputs, **row.options}
-    code = (SCRIPTS / "draw.py").read_text()
-    if f"\ndef {rule}(" in code:
-        names = code.partition(f"\ndef {rule}(")[2].partition(")")[0].split(", ")
-        assert {name for name in names if not name.startswith("**")} <= set(given)
-    else:
-        module, _, function = row.draw.rpartition(".")
-        inspect.signature(getattr(import_module(f"gyriflow.report.{module}"), function)).bind(**given)
+def examples():
+    """Return the figures of studies that together have all kinds."""
+    shipped = (EXAMPLES / f"{name}.yaml" for name in ("spina-bifida-atlas", "calibration", "paper"))
+    studies = (resolve(load(yaml.safe_load(path.read_text()), EXAMPLES)) for path in (DEMO, *shipped))
+    return [*map(figures_of, studies), *map(registry, (STUDY, ALONE, PREDICTION))]
 
 
-def test_all_files_are_drawn_once_and_the_report_has_words_on_them():
-    figures = registry()
-    assert len({figure.path for figure in figures}) == len(figures)
-    assert {figure.name for figure in figures if figure.target} - set(WORDS) == {"view_surfaces", "small_pictures"}
-    for figure in figures:
-        words = WORDS.get(figure.name, {"title": "", "caption": ""})
-        assert "{" not in (words["title"] + words["caption"]).format(**figure.names)
+def jobs_of(rule):
+    return by_rule(registry())[rule]
+
+
+def drawing_function(kind):
+    module, _, function = kind.draw.partition(":")
+    return getattr(import_module(f"gyriflow.report.{module}"), function)
+
+
+def test_kinds_have_names_and_files_of_their_own():
+    assert len({kind.name for kind in KINDS}) == len({kind.pattern for kind in KINDS}) == len(KINDS) > 30
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_kind_is_drawn_by_a_function_of_the_report_and_has_all_words_or_none(kind):
+    assert not kind.draw or callable(drawing_function(kind))
+    assert len({bool(words) for words in (kind.section, kind.title, kind.caption)}) == 1
+    assert "system-message" not in caption_html(kind.caption)
+    # what the target `paper` alone asks for is not in the report
+    assert kind.target or (kind.paper and not kind.section)
+
+
+def test_figures_give_their_function_what_it_takes_and_have_names_for_their_words_and_files():
+    found = [figure for study in examples() for figure in study]
+    assert {figure.kind.name for figure in found} == {kind.name for kind in KINDS}
+    for figure in found:
+        if figure.kind.draw:
+            inspect.signature(drawing_function(figure.kind)).bind(**figure.inputs, **figure.options)
+        assert "{" not in "".join((figure.kind.title + figure.kind.caption).format(**figure.names))
+        assert "{" not in "".join(figure.files)
+
+
+def test_all_files_are_drawn_once_and_jobs_of_a_rule_alike():
+    for study in examples():
+        files = [file for figure in study for file in figure.files]
+        assert len(set(files)) == len(files)
+        for jobs in by_rule(study).values():
+            assert len({tuple(figure.kind for figure in job) for job in jobs}) == 1
+
+
+def test_the_paper_stands_in_its_own_figures_alone():
+    published = {figure.path for figure in registry() if any("published" in file for file in files_in(figure.inputs))}
+    assert published == {"results/study/figures/displacement_paper.png", "results/study/rate/figures/nearest_paper.png"}
+    asked = asked_for(registry(), "figures", "growth", "validate", "influence_figures", "report", "brain", "quality")
+    assert not published & set(asked)
+    assert published < set(asked_for(registry(), "paper"))
 
 
 def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_alone_asks_for():
@@ -63,19 +111,19 @@ def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_al
 
 def test_simulated_and_measured_brains_are_not_exchanged():
     for rule in ("weekly_figure", "outlines_figure"):
-        (row,) = rows_of(rule)
+        ((row,),) = jobs_of(rule)
         real = {21.0: "results/brains/a/surface", 22.0: "results/brains/b/surface"}
         assert row.inputs["real"] == {week: f"{folder}/pial.surf.gii" for week, folder in real.items()}
         for run, surfaces in row.inputs["runs"].items():
             assert surfaces == {w: f"results/runs/{run}/a/surfaces/week-{w:.2f}/pial.surf.gii" for w in (21.0, 22.0)}
-    (row,) = rows_of("shape_maps")
+    ((row,),) = jobs_of("shape_maps")
     for group, weeks in row.inputs["brains"].items():
         folder = "results/brains/" if group == "ellipsoid" else f"results/runs/{group}/a/"
         assert all(maps.startswith(folder) for halves in weeks.values() for _, maps in halves)
 
 
 def test_members_of_a_study_that_ended_before_have_no_files():
-    (row,) = rows_of("influence_figure")
+    ((row,),) = jobs_of("influence_figure")
     ended = row.may_end[1]
     assert ended[1:] == ("a", 22)
     members = row.inputs_without([ended[0]])["members"]
@@ -83,9 +131,9 @@ def test_members_of_a_study_that_ended_before_have_no_files():
     assert row.inputs_without([]) == row.inputs
 
 
-def drawn(monkeypatch, tmp_path, rule, draw, inputs, **options):
-    """Run the script of figures for a rule and return what it has the report's function draw."""
-    module, _, function = draw.rpartition(".")
+def drawn(monkeypatch, tmp_path, draw, inputs, **options):
+    """Run the script of figures and return what it has the report's function draw."""
+    module, _, function = draw.partition(":")
     given = {}
 
     def noted(**content):
@@ -93,60 +141,59 @@ def drawn(monkeypatch, tmp_path, rule, draw, inputs, **options):
         return Drawing()
 
     monkeypatch.setattr(import_module(f"gyriflow.report.{module}"), function, noted)
-    params = {"draw": draw, "inputs": inputs, "options": options}
-    run_script("draw.py", tmp_path, {}, {0: "a.png", 1: "a.pdf"}, params, rule=rule)
+    files = [str(tmp_path / name) for name in ("a.png", "a.pdf")]
+    figure = {"draw": draw, "inputs": inputs, "options": options, "files": files}
+    run_script("draw.py", tmp_path, {}, {}, {"figures": [figure]})
+    assert all((tmp_path / name).is_file() for name in ("a.png", "a.pdf"))
     return given
 
 
 RUN = {"start_week": 21, "end_week": 22, "output_weeks": [21, 22], "fissure_x_mm": 0.0}
 CORNERS = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]])
+INSIDE = np.array([[2.0, 2, 2]])
 
 
 @pytest.fixture
 def frames(tmp_path):
-    """A tetrahedron that grows by a fifth from 21 to 22 GW."""
+    """A tetrahedron of four, with a node inside, that grows by a fifth from 21 to 22 GW."""
     path = tmp_path / "frames.h5"
     with h5py.File(path, "w") as file:
-        file["tets"] = [[0, 1, 2, 3]]
+        file["tets"] = [[0, 1, 2, 4], [0, 1, 4, 3], [0, 4, 2, 3], [4, 1, 2, 3]]
         for week, size in ((21, 1.0), (22, 1.2)):
             group = file.create_group(f"week_{week}.00")
-            group["positions"] = size * CORNERS
-            group["tangential_growth_per_step"] = np.full(4, 0.01)
-            group["growth_direction_per_step"] = np.eye(4, 3)
+            group["positions"] = size * np.concatenate([CORNERS, INSIDE])
+            group["tangential_growth_per_step"] = [0.01] * 4 + [9.0]
+            group["growth_direction_per_step"] = np.eye(5, 3)
+            group["cell_fields/J"] = np.ones(4)
     return str(path)
 
 
-def test_displacement_is_between_the_weeks_on_the_later_surface(monkeypatch, tmp_path, frames):
-    maps = drawn(monkeypatch, tmp_path, "displacement_maps", "pictures.displacement_maps", {"frames": {"thin": frames}})
-    ((interval, (surface, norms)),) = maps["displacements"]["thin"].items()
+def test_displacement_is_between_the_weeks_on_the_later_surface(frames):
+    ((interval, (surface, norms)),) = displacements(read_pial_frames(frames)).items()
     assert interval == (21.0, 22.0)
+    # without the node inside
     assert sorted(norms) == pytest.approx([0, 2, 2, 2])
     assert surface.vertices.max() == pytest.approx(12)
 
 
-def test_growth_of_area_is_shown_on_the_later_surface(monkeypatch, tmp_path, frames):
-    settings = tmp_path / "params.yaml"
-    settings.write_text(yaml.safe_dump(RUN | {"step_s": SECONDS_PER_GW / 4}))
-    inputs = {"frames": frames, "params": str(settings)}
-    growth = drawn(monkeypatch, tmp_path, "growth_found_figure", "pictures.scalar_maps", inputs)
-    ((interval, (surface, values)),) = growth["maps"]["growth"].items()
+def test_growth_of_area_is_shown_on_the_later_surface(frames):
+    ((interval, (surface, values)),) = growth_of_area(read_pial_frames(frames), SECONDS_PER_GW / 4).items()
     assert (interval, surface.vertices.max()) == ((21.0, 22.0), pytest.approx(12))
     # four steps a week, in both directions of the surface
-    assert values == pytest.approx(100 * np.expm1(2 * 4 * 0.01))
-    assert growth["directions"][interval].shape == (4, 3)
+    assert values == pytest.approx(np.full(4, 100 * np.expm1(2 * 4 * 0.01)))
 
 
-def test_outlines_are_laid_onto_the_real_brain(monkeypatch, tmp_path):
-    real = box((20.0, 30.0, 10.0))
-    moved = type(real)(real.vertices + [5.0, -3, 2], real.faces)
-    brains = {"runs": {"thin": {22.0: moved}}, "real": {22.0: real}}
-    aligned = drawn(monkeypatch, tmp_path, "outlines_figure", "sections.outlines_chart", brains, measured="real brain")
-    assert aligned["runs"]["thin"][22.0].vertices == pytest.approx(real.vertices, abs=1e-3)
-    assert aligned["measured"] == "real brain"
-
-
-def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path):
+def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path, frames):
     write_json(tmp_path / "quality.json", {"tets": 7})
-    inputs = {"quality": {"a": str(tmp_path / "quality.json")}, "ceiling": None}
-    given = drawn(monkeypatch, tmp_path, "mesh_quality", "tables.mesh_quality_table", inputs, gates={})
-    assert given == {"quality": {"a": {"tets": 7}}, "ceiling": None, "gates": {}}
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(RUN))
+    (tmp_path / "published.yaml").write_text("nearest: []")
+    write_table(tmp_path / "spectra.csv", pd.DataFrame({"week": [21.0]}))
+    at = {name: str(tmp_path / name) for name in ("quality.json", "params.yaml", "published.yaml", "spectra.csv")}
+    inputs = {"quality": {"a": at["quality.json"]}, "ceiling": None, "tables": [at["spectra.csv"]]}
+    inputs |= {"frames": {"thin": frames}, "params": at["params.yaml"], "published": at["published.yaml"]}
+    given = drawn(monkeypatch, tmp_path, "tables:mesh_quality_table", inputs, gates={})
+    assert (given["quality"], given["ceiling"], given["gates"]) == ({"a": {"tets": 7}}, None, {})
+    assert given["params"].end_week == 22
+    assert given["published"] == {"nearest": []}
+    assert given["tables"][0]["week"].tolist() == [21.0]
+    assert list(given["frames"]["thin"]) == [21.0, 22.0]

@@ -19,6 +19,7 @@ COLOURS = {"young": (200, 30, 30), "old": (30, 30, 200), "overview": (30, 160, 3
 FOLDED = [("thin", "young"), ("thick", "old")]
 GROWTH = ["own", "population P"]
 PARTS = {"page": "page.html", "style": "style.css", "three": "three.min.js", "notice": "three.LICENSE.txt"}
+FIGURE = {"section": "Surfaces", "title": "Seen", "caption": "a picture", "technical": False, "names": {}}
 PARTS |= {"controls": "OrbitControls.js", "viewer": "viewer.js"}
 
 
@@ -39,8 +40,6 @@ def folder(tmp_path, monkeypatch):
         write_table(f"{name}.csv", table)
     files = [{"brain": name, "what": "labels", "sha256": f"hash of {name}"} for name in ("young", "old")]
     write_json("provenance.json", PROVENANCE | {"files": files})
-    words = {"section": "Surfaces", "title": "Seen", "caption": "a picture"}
-    write_yaml("words.yaml", {"quality_figure": words, "weekly_figure": words})
     write_text("methods.rst", "Two were *processed*.\n")
     for number, (run, brain) in enumerate(FOLDED):
         at = f"results/runs/{run}/{brain}"
@@ -77,7 +76,7 @@ def colours(text):
 
 def html_report(folder, inputs, params):
     inputs = inputs | {name: f"{name}.csv" for name in ("quality", "warnings", "metrics", "centiles")}
-    inputs |= {"provenance": "provenance.json", "methods": "methods.rst", "words": "words.yaml"}
+    inputs |= {"provenance": "provenance.json", "methods": "methods.rst"}
     inputs |= {name: PAGE / file for name, file in PARTS.items()}
     params = {"config": {"labels": "/data/Smith/young.nii.gz"}, "norm": "N", **params}
     run_script("html_report.py", folder, inputs, {0: "page.html"}, params)
@@ -86,7 +85,7 @@ def html_report(folder, inputs, params):
 
 def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder):
     inputs = {"small": ["young.png", "old.png"], "runs": "runs.csv", "validation": "validation.csv"}
-    figures = [("weekly_figure", str(folder / "overview.png"), {}), ("without_words", "none.png", {})]
+    figures = [FIGURE | {"name": "weekly_figure", "path": str(folder / "overview.png")}]
     pictured = {"pictured": ["young", "old"], "prediction": None}
     text = html_report(folder, inputs, pictured | {"brains": BRAINS, "figures": figures})
     rows = [row_with(text, f'href="brains/{name}.html"') for name in ("young", "old")]
@@ -99,7 +98,7 @@ def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder
 
 
 def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
-    figures = [("quality_figure", str(folder / "young.png"), {})]
+    figures = [FIGURE | {"name": "quality_figure", "path": str(folder / "young.png")}]
     text = html_report(folder, {}, {"brains": BRAINS[:1], "pictured": None, "figures": figures})
     assert ("young</h1>" in text, colours(text), "46.2" in text) == (True, ["young"], True)
     assert [words for words in ("M1", "M2", "hash of young", "hash of old") if words in text] == ["M1", "hash of young"]

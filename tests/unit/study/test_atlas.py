@@ -12,8 +12,8 @@ from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.atlas import ATLASES, Atlas, shipped_atlases
 from gyriflow.study import resolve
 from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
-from gyriflow.study.figures import measured_name
 from gyriflow.study.loading import load
+from gyriflow.study.registry import measured_name
 
 UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
 HERE = {"folder": "."}

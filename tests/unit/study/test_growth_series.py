@@ -175,7 +175,7 @@ def test_charts_are_coloured_by_a_covariate_that_groups_subjects(volume):
     coloured = {}
     for wanted in (None, "mother"):
         found = resolve(load({"brains": brains, "metrics": {"colour_by": wanted}}))
-        coloured[wanted] = next(one for one in figures_of(found) if one.name == "metrics_figure").options["groups"]
+        coloured[wanted] = next(one for one in figures_of(found) if one.kind.name == "metrics_figure").options["groups"]
     assert coloured[None] == {"b0": "sex: F", "b1": "sex: M", "b2": "sex: F"}
     assert coloured["mother"]["b2"] == "mother: 2"
     with pytest.raises(InputError, check=Facts("metrics.colour_by:", 1, "site", 2, 6)):

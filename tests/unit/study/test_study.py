@@ -170,7 +170,7 @@ def test_a_week_of_days_is_one_number_everywhere(labels):
     # the rows of tables that figures look for by their week
     rows = [found.brains["late"].measured, one.measured[-1], *(member.at(24.29) for member, _ in comparison.members)]
     assert {row.week for row in rows} == {24.29}
-    spectra = next(figure for figure in figures_of(found) if figure.name == "influence_spectra")
+    spectra = next(figure for figure in figures_of(found) if figure.kind.name == "influence_spectra")
     assert spectra.options["week"] == 24.29
     assert one.measured[-1].where.endswith("/week-24.29")
 
@@ -359,7 +359,7 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
         **{"growth_of": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
-    (drawn,) = (figure for figure in figures_of(found) if figure.name == "predicted_figure")
+    (drawn,) = (figure for figure in figures_of(found) if figure.kind.name == "predicted_figure")
     shown = {22.4: surface("own22.4"), 23.9: f"{at}/pial.surf.gii", 24: surface("b24")}
     assert list(drawn.inputs["real"].items()) == [(Facts(week, "GW"), path) for week, path in shown.items()]
     assert drawn.options["predicted"] == list(drawn.inputs["real"])[1]

@@ -113,7 +113,7 @@ def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start():
 def test_norms_are_drawn_of_five_subjects_however_often_each_was_scanned(subjects, drawn):
     brains = [brain(f"s{n}w{week}", week, subject=f"s{n}") for n in range(subjects) for week in (21, 22)]
     found = resolved(brains, start="s0w21", runs={"reference": {"end_week": 22}})
-    assert ("norms_figure" in {figure.name for figure in figures_of(found)}) == drawn
+    assert ("norms_figure" in {figure.kind.name for figure in figures_of(found)}) == drawn
 
 
 def test_a_chain_goes_from_its_own_start_to_the_first_brain_past_its_own_end():

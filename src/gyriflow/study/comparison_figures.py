@@ -1,0 +1,269 @@
+"""The figures and tables of a study that compare runs with real brains and with each other."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from .paths import CALIBRATION, DEVIATION, PUBLISHED, RUN, STUDY
+from .records import Brain, Comparison, Measured, Simulation
+from .registry import AROUND, Figure, Kind, halves_of, measured_by_week, measured_name, surfaces_by_week
+from .study import Study
+
+RUN_FIGURES, STUDY_FIGURES, SWEEP_FIGURES = f"{RUN}/figures", f"{STUDY}/figures", f"{STUDY}/{{study}}/figures"
+MAX_DEVIATIONS = 4
+"""Weeks whose deviations from the expected brain are shown."""
+
+Given = dict[str, Any]
+
+
+def comparison_figures(study: Study) -> Iterator[Figure]:
+    """Yield the figures of a study's validation, sweeps and calibration."""
+    yield from _validation_figures(study)
+    for sweep in study.comparisons.values():
+        yield from _sweep_figures(study, sweep)
+    if study.calibration and (calibrate := study.config.calibrate):
+        tables = {name: f"{CALIBRATION}/{name}.csv" for name in ("runs", "optimum")}
+        yield Figure(CALIBRATION_FIGURE, tables, {"score": list(calibrate.score)})
+
+
+CALIBRATION_FIGURE = Kind(
+    "calibration_figure", f"{CALIBRATION}/calibration.png", "scores:calibration_chart", target="calibrate"
+)
+
+
+def _validation_figures(study: Study) -> Iterator[Figure]:
+    runs = {"runs": list(study.config.runs)}
+    if study.validated:
+        ceiling = f"{STUDY}/registration_ceiling.csv" if study.carried else None
+        yield Figure(VALIDATION, {"validation": f"{STUDY}/validation.csv", "ceiling": ceiling}, runs)
+    if study.predictions:
+        table = {"prediction": f"{STUDY}/prediction.csv"}
+        yield Figure(PREDICTION, table, runs)
+        yield Figure(PREDICTION_TABLE, table)
+    for simulation in study.expected:
+        yield expected_figure(simulation)
+        yield deviation_figure(simulation, "log_area")
+        if simulation.start.has_thickness:
+            yield deviation_figure(simulation, "thickness_difference_mm")
+    if study.validated_carried:
+        yield Figure(ONSET, {"onset": f"{STUDY}/onset.csv"}, runs)
+
+
+VALIDATION = Kind(
+    "validation_figure",
+    f"{STUDY_FIGURES}/validation.png",
+    "scores:validation_chart",
+    section="Validation",
+    title="Gain over no folding, by week",
+    caption=(
+        "Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the real brain, "
+        "less the r of the scaled start brain. Above 0, the simulation places folds better than the scaled start. "
+        "Bars: 95 % intervals of a bootstrap over patches of the surface. Filled marks: explained weeks, whose real "
+        "brains gave the growth; open marks: predicted weeks. Dotted: the start carried to the real brain by "
+        "registration."
+    ),
+    target="validate",
+)
+PREDICTION = Kind(
+    "prediction_figure",
+    f"{STUDY_FIGURES}/prediction.png",
+    "scores:prediction_chart",
+    section="Validation",
+    title="Predicted brains beside the real ones",
+    caption=(
+        "Brains predicted with the growth of another population, by weeks after the start: correlation of their shape "
+        "index with that of the real brain, at one size, and mean distance between the surfaces, unscaled and rigidly "
+        "aligned. Dashed: simpler predictions, without mechanics, and the target shape of the run."
+    ),
+    target="validate",
+)
+PREDICTION_TABLE = Kind(
+    "prediction_table",
+    f"{STUDY}/prediction.html",
+    "tables:prediction_table",
+    section="Validation",
+    title="Predicted brains, table",
+    caption=(
+        "The same in numbers, unscaled except for r. Skill is 1 − distance / distance of the best simpler prediction "
+        "of the week; roughness is relative to the real surface. All columns are in ``results/study/prediction.csv``."
+    ),
+    target="validate",
+)
+EXPECTED = Kind(
+    "expected_figure",
+    f"{RUN_FIGURES}/expected.png",
+    "pictures:runs_by_week",
+    section="Validation",
+    title="Start, expected and real brains",
+    caption=(
+        "The start and the expected brains (blue) beside the real ones (beige), from the left and from above, at one "
+        "scale. Below, on the expected surface: how far the real one lies outside (red) or inside it (blue) after "
+        "rigid alignment."
+    ),
+    target="validate",
+)
+
+
+def _deviations(simulation: Simulation) -> dict[float, list[str]]:
+    """Return the expected surface and the maps of the real brain's deviation from it, by week."""
+    surfaces = surfaces_by_week(simulation)
+    return {week: [surfaces[week], simulation.file(DEVIATION["maps"], week=week)] for week in simulation.real}
+
+
+def expected_figure(simulation: Simulation) -> Figure:
+    surfaces, real, deviations = surfaces_by_week(simulation), measured_by_week(simulation), _deviations(simulation)
+    # the last week, and others at equal steps
+    weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
+    shown = {min(surfaces), *weeks}
+    inputs: Given = {
+        "runs": {"expected": {week: surface for week, surface in surfaces.items() if week in shown}},
+        "real": {week: brain.pial for week, brain in real.items() if week in shown},
+        "deviations": {week: deviations[week] for week in weeks},
+    }
+    return Figure(EXPECTED, inputs, {"measured": measured_name(real.values())}, simulation.names)
+
+
+DEVIATION_MAPS = Kind(
+    "deviation_figure",
+    f"{RUN_FIGURES}/deviation_{{quantity}}.png",
+    "pictures:shape_maps",
+    section="Validation",
+    title="Deviation from the expected: {quantity}",
+    caption=(
+        "How real brains deviate from what run *{run}* expects, on the expected surface: logarithm of the real over "
+        "the expected area, or the real less the expected thickness. Values by region, with z among the study's other "
+        "brains, are in ``results/study/deviation_centiles.csv``."
+    ),
+    target="validate",
+)
+
+
+def deviation_figure(simulation: Simulation, quantity: str) -> Figure:
+    maps = {week: [files] for week, files in _deviations(simulation).items()}
+    options: Given = {"quantity": quantity, "views": AROUND}
+    inputs: Given = {"brains": {"real less expected": maps}}
+    return Figure(DEVIATION_MAPS, inputs, options, {**simulation.names, "quantity": quantity})
+
+
+ONSET = Kind(
+    "onset_figure",
+    f"{STUDY_FIGURES}/onset.png",
+    "scores:onset_chart",
+    section="Validation",
+    title="Onset of sulci",
+    caption=(
+        "Weeks in which the sulci of the last real brain that are absent at the start become 2 mm deep, from the "
+        "neighbouring crowns. Marks at the right edge: not within the simulated or measured weeks."
+    ),
+    target="validate",
+)
+
+# sweeps, which the configuration calls studies
+
+
+def _sweep_figures(study: Study, sweep: Comparison) -> Iterator[Figure]:
+    yield influence_figure(sweep)
+    yield influence_spectra(sweep)
+    vary = study.config.studies[sweep.name].vary
+    if len(vary) == 1 and sweep.real[_start(sweep).id]:
+        (values,) = vary.values()
+        if all(isinstance(value, int | float) for value in values):
+            yield nearest_figure(NEAREST, sweep)
+            yield nearest_figure(PAPER_NEAREST, sweep, published=PUBLISHED)
+
+
+def _start(sweep: Comparison) -> Brain:
+    """Return the start of the first run, whose runs figures show."""
+    return sweep.members[0][0].start
+
+
+def _members(sweep: Comparison) -> dict[str, Measured]:
+    """Return the simulated brains from this start at the week of comparison, by run."""
+    start = _start(sweep)
+    return {simulation.run: simulation.at(sweep.week) for simulation, _ in sweep.members if simulation.start is start}
+
+
+def _sweep_figure(kind: Kind, sweep: Comparison, inputs: Given, **options: Any) -> Figure:
+    """Return a figure of the members of a sweep, some of which may have ended before the week of comparison."""
+    start = _start(sweep)
+    values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
+    may_end = tuple((run, start.id, sweep.week) for run in inputs["members"])
+    shown = {"values": values, "measured": measured_name(sweep.real[start.id][:1]), **options}
+    return Figure(kind, inputs, shown, _sweep_names(sweep), may_end)
+
+
+def _sweep_names(sweep: Comparison) -> dict[str, str]:
+    return {"study": sweep.name, "week": f"{sweep.week:g}"}
+
+
+INFLUENCE = Kind(
+    "influence_figure",
+    f"{SWEEP_FIGURES}/influence.png",
+    "pictures:influence_picture",
+    section="Studies",
+    title="Influence on the folds",
+    caption=(
+        "Runs of the study *{study}* at {week} GW, with the real brain last, from the left (a, c) and from above (b, "
+        "d): surfaces, and the shape index, about −½ in sulci (blue) and +½ on gyri (red)."
+    ),
+    target="influence_figures",
+    paper=True,
+)
+
+
+def influence_figure(sweep: Comparison) -> Figure:
+    real = sweep.real[_start(sweep).id]
+    inputs: Given = {
+        "members": {run: halves_of(row) for run, row in _members(sweep).items()},
+        "real": halves_of(real[0].measured) if real else None,
+    }
+    return _sweep_figure(INFLUENCE, sweep, inputs)
+
+
+INFLUENCE_SPECTRA = Kind(
+    "influence_spectra",
+    f"{SWEEP_FIGURES}/spectra.png",
+    "charts:influence_spectra",
+    section="Studies",
+    title="Influence on the spectrum of the folds",
+    caption=(
+        "Relative power in the bands B4 to B6 (primary to tertiary folds) of the left (a) and the right hemisphere (b) "
+        "in the study *{study}* at {week} GW: runs from pale to dark in their order, the real brain as stars. Hatched "
+        "bars and open stars: the band is cut off or finer than the surface."
+    ),
+    target="influence_figures",
+    paper=True,
+)
+
+
+def influence_spectra(sweep: Comparison) -> Figure:
+    inputs: Given = {
+        "members": {run: f"{row.folder}/spectra.csv" for run, row in _members(sweep).items()},
+        "real": [f"{brain.measured.folder}/spectra.csv" for brain in sweep.real[_start(sweep).id][:1]],
+    }
+    return _sweep_figure(INFLUENCE_SPECTRA, sweep, inputs, week=sweep.week)
+
+
+NEAREST = Kind(
+    "nearest_figure",
+    f"{SWEEP_FIGURES}/nearest.png",
+    "scores:nearest_chart",
+    section="Studies",
+    title="Distance from the real brain",
+    caption=(
+        "Distance of the runs of the study *{study}* from the real brain at {week} GW by each measure, over the varied "
+        "parameter. Ring and number: the nearest run whose mesh resolves the cortex. Open marks: the mesh does not "
+        "resolve the cortex, or the band is cut off."
+    ),
+    target="influence_figures",
+)
+PAPER_NEAREST = Kind(
+    "paper_nearest_figure", f"{SWEEP_FIGURES}/nearest_paper.png", "scores:nearest_chart", target="", paper=True
+)
+
+
+def nearest_figure(kind: Kind, sweep: Comparison, **inputs: str) -> Figure:
+    start, (varied,) = _start(sweep), sweep.members[0][1]
+    real = [brain.id for brain in sweep.real[start.id][:1]]
+    options = {"varied": varied, "subject": start.id, "real": real, "week": sweep.week}
+    inputs["comparison"] = f"{STUDY}/{sweep.name}/comparison.csv"
+    return Figure(kind, inputs, options, _sweep_names(sweep))
