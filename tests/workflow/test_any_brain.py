@@ -127,8 +127,8 @@ GOOD = {
 }
 MINE = {"cerebrum": [1, 2, 5, 6, 8], "cortex": [5], "known": {3: "cerebellum", 4: "CSF", 7: "brainstem"}}
 BAD = {
-    "small_half": (labelled(odd_brains.small_hemisphere), "the volume seems to hold one hemisphere only"),
-    "whole_as_half": (alone("right", lambda labels, affine: labels), "this is no single hemisphere"),
+    "small_half": (labelled(odd_brains.small_hemisphere), "the volume one hemisphere only"),
+    "whole_as_half": (alone("right", lambda labels, affine: labels), "not a single hemisphere"),
     "pial_half": (whole(LEFT), "the surface seems to be one hemisphere only"),
     "swapped": (both_sides(RIGHT, LEFT), "the left hemisphere lies to the right of the right one"),
 }

@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 Labels = NDArray[np.integer[Any]]
 
 # brains of the example atlas have cortex at 86 % of their surface and more, read by wrong schemes at 48 % and less
-LEAST_CORTEX_OUTSIDE = 0.5
+MIN_CORTEX_OUTSIDE = 0.5
 # pairs of voxels of both hemispheres lie side by side as their labels say in nearly all brains
 LEAST_PARTED = 0.9
 # cortex at less than this fraction of the cerebrum's surface is reported
@@ -165,7 +165,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
 
 
 def require_cortex_outside(
-    labels: Labels, scheme: LabelScheme, least: float = LEAST_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
+    labels: Labels, scheme: LabelScheme, least: float = MIN_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
 ) -> float:
     """Return how much of the cerebrum's surface has cortex at it, from 0 to 1; of it and its `unlabelled` ventricles.
 

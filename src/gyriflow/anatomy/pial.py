@@ -48,18 +48,18 @@ from .fissure import (
     upright,
 )
 from .hindbrain import pose_of_labels
-from .labels import LEAST_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
-from .layout import doubts_of_scheme, layout_of
+from .labels import MIN_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
+from .layout import layout_of, scheme_contradictions
 from .plausible import (
     DOUBTFUL_RATIO,
-    doubts_of_proportions,
+    proportion_warnings,
     require_common_pose,
-    require_one,
     require_pair,
     require_plausible_size,
+    require_single_hemisphere,
     require_whole,
 )
-from .pose import doubts_of_hemispheres, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
+from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
 from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
 from .sulci import open_shut_sulci
 
@@ -127,7 +127,7 @@ def from_labels(
     whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
     """
     # the wall of a hemisphere towards the side that is not there may have no cortex
-    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else LEAST_CORTEX_OUTSIDE)
+    cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
     mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
     warnings = logged(cerebrum.warnings)
     pose = Pose() if side else pose_of_labels(labels, affine, scheme)
@@ -139,7 +139,7 @@ def from_labels(
         warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
     field = smooth_mask(mask)
     if not side:
-        warnings += logged(doubts_of_scheme(layout_of(labels), scheme))
+        warnings += logged(scheme_contradictions(layout_of(labels), scheme))
         warnings += logged(_require_both(cerebrum, scheme, field))
     if pose is None:
         pose = _pose_by_shape(field, cerebrum.affine, scheme)
@@ -152,7 +152,7 @@ def from_labels(
             warnings += logged(_fused_sulci_warning(report))
         taken = taken_ml / ML_PER_MM3
         even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, shut=shut)
-        require_one(even.mesh)
+        require_single_hemisphere(even.mesh)
         pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
         report = {"source": "hemisphere", "side": side, **report, **even.report}
         warnings += logged([*even.warnings, *pose.warnings])
@@ -225,7 +225,7 @@ def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelSche
     every = max(int(OF_SHAPE_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
     coarse = unambiguous(field[::every, ::every, ::every])
     rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
-    return pose_of_volume_by_shape(rough, sided=bool(scheme.left and scheme.right))
+    return pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
 
 
 def _fissure_of_labels(
@@ -282,7 +282,7 @@ def from_hemispheres(
     length = float(np.ptp(merged(left, right).vertices, axis=0).max())
     warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
-        warnings += logged(doubts_of_hemispheres(left, right, coordinates))
+        warnings += logged(hemisphere_warnings(left, right, coordinates))
     even = [make_sound(mesh, edge_length_mm) for mesh in (left, right)]
     warnings += logged(warning for side in even for warning in side.warnings)
     left, right = (side.mesh for side in even)
@@ -325,7 +325,7 @@ def from_surface(
     warnings = logged(clean.warnings)
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
-        require_one(clean.mesh)
+        require_single_hemisphere(clean.mesh)
     even = make_sound(clean.mesh, edge_length_mm)
     warnings += logged(even.warnings)
     if side:
@@ -412,7 +412,7 @@ def _upright(
         doubts.append("no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
     if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
         doubts.append(f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
-    doubts += doubts_of_proportions(np.ptp(whole.vertices, axis=0))
+    doubts += proportion_warnings(np.ptp(whole.vertices, axis=0))
     areas = sorted((area(left), area(right)))
     if areas[1] > MOST_UNEQUAL * areas[0]:
         raise InputError(

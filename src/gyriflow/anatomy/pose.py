@@ -1,6 +1,6 @@
-"""Poses of surfaces by their shape: of the hemispheres of a brain, of one that is alone, and of whole brains.
+"""Estimate the pose of a surface from its shape: two hemispheres, a single hemisphere, or a whole brain.
 
-Files that are well posed keep their pose. Left hemispheres are mirrored here, so that all are right ones.
+Files that are well posed keep their pose. Left hemispheres are mirrored here and treated as right ones.
 """
 
 from collections.abc import Sequence
@@ -26,32 +26,32 @@ from .template import (
     shape_of,
 )
 
-# the next best pose has to fit worse by this factor: 1.01 in ellipsoids, 1.3 and more in hemispheres of atlases of 21
-# to 38 GW, 1.1 in their whole brains; and the best one this well, in sizes
-LEAST_CONFIDENCE, WORST_RESIDUAL = 1.07, 0.13
-# how many times worse a shape fits mirrored where it shows its side: 1.16 and more in atlases of 21 to 38 GW
-LEAST_SIDED = 1.07
-# beside the shape, poses near these axes of files are likely
+# a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
+# atlases of 21 to 38 GW, 1.1 in their whole brains), and its own residual is at most this, in sizes
+MIN_CONFIDENCE, MAX_RESIDUAL = 1.07, 0.13
+# the side is clear if the mirrored shape fits worse by this factor: 1.16 and more in atlases of 21 to 38 GW
+MIN_SIDE_RATIO = 1.07
+# poses within this angle of the axes of files (RAS, LPS) are likely a priori
 CONVENTION_DEG = 35.0
-# the shape agrees with the axes of files: tilt of the plane between the hemispheres, and pitch
-SAME_TILT_DEG, SAME_PITCH_DEG = 10.0, 15.0
-# files of one brain share their coordinates where their poses differ by less; distances are in sizes
+# tolerances in which the shape agrees with the axes of the file: tilt of the mid-plane, and pitch
+TILT_TOL_DEG, PITCH_TOL_DEG = 10.0, 15.0
+# two files share their coordinates if their poses differ by less; distances are in sizes
 COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 5.0, 0.08, 0.15
-# those that name one coordinate system do where they are turned by less than this
+# the same for files that name one coordinate system
 DECLARED_TURN_DEG = 30.0
-# the medial walls' distance from the mid-sagittal plane where the files do not say it
-BESIDE_MM = 0.5
-# decimals of what is reported: a rounded rotation moves no place of a brain by a micrometre
+# distance of the medial walls from the mid-sagittal plane if it does not follow from the files
+WALL_DISTANCE_MM = 0.5
+# decimals of reported values: rounding a rotation moves no point of a brain by a micrometre
 DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Hemisphere:
-    """A right hemisphere, or a mirrored left one, with what its shape says about its pose.
+    """A right hemisphere, or a mirrored left one, with the pose estimated from its shape.
 
     `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
-    is the distance from the template relative to the size, `confidence` how many times worse the next best pose fits,
-    `sided` how many times worse its mirror image does.
+    is the distance from the template relative to the size. `confidence` is the residual of the next best pose divided
+    by this residual, `side_ratio` that of the mirrored shape.
     """
 
     shape: Shape
@@ -59,44 +59,48 @@ class Hemisphere:
     wall_mm: float
     residual: float
     confidence: float
-    sided: float
+    side_ratio: float
 
     @property
     def is_clear(self) -> bool:
-        return self.confidence >= LEAST_CONFIDENCE and self.residual <= WORST_RESIDUAL
+        return self.confidence >= MIN_CONFIDENCE and self.residual <= MAX_RESIDUAL
 
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
-    """Return the pose of a right hemisphere (or a mirrored left one) that its shape says, however doubtful."""
+    """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape, even if it is not clear."""
     shape = shape_of(mesh)
     fit, confidence = register_from_all_sides(shape, hemispheres())
     mirrored, _ = register_from_all_sides(shape.mirrored(), hemispheres())
     normal, offset = medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
-    sided = mirrored.residual / fit.residual
-    return Hemisphere(shape, turn.as_matrix() @ fit.rotation, -offset * shape.size_mm, fit.residual, confidence, sided)
+    side_ratio = mirrored.residual / fit.residual
+    rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
+    return Hemisphere(shape, rotation, wall_mm, fit.residual, confidence, side_ratio)
 
 
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
-    """Return the pose of a brain from two closed, outward surfaces, each in any rigid pose.
+    """Return the pose of a brain from two closed, outward hemispheres, each in any rigid pose.
 
-    Each is registered with the template, and the mirrored left one with the right one. Where both share coordinates
-    near RAS or LPS, they keep the file's pose; where they share others, one motion poses both; else each has its own,
-    with the medial walls beside x = 0. `declared` is whether the files name one and the same coordinate system.
+    Each is registered to the template, and the mirrored left one to the right one. If both share coordinates close to
+    RAS or LPS, the file's pose is kept. If they share other coordinates, one rigid motion poses both. Otherwise each
+    gets its own, with the medial walls next to x = 0. `declared` is whether both files name the same coordinate system.
 
-    Where a shape fits several poses, both are taken as RAS+ with a warning. InputError where it is not near that
-    either, and where the two seem to be swapped or of one side.
+    If a shape fits several poses, both are taken as RAS+ with a warning. InputError if it does not fit RAS+ either, and
+    if the two seem to be swapped or of one side.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
-    if not all(one.is_clear for one in shapes):
-        kept = [_kept_as_ras(one, hemispheres(), f"{side} hemisphere") for one, side in zip(shapes, SIDES, strict=True)]
-        return kept[0]
-    one, other = shapes
-    fit = register(one.shape, [other.shape], other.rotation.T @ one.rotation)
-    # half-way between what the right one says of itself, and what the left one says of it
-    middle = Rotation.from_matrix([other.rotation, one.rotation @ fit.rotation.T]).mean().as_matrix()
-    pair = replace(one, rotation=middle @ fit.rotation), replace(other, rotation=middle)
+    if not all(hemisphere.is_clear for hemisphere in shapes):
+        poses = [
+            _pose_as_ras(hemisphere, hemispheres(), f"{side} hemisphere")
+            for hemisphere, side in zip(shapes, SIDES, strict=True)
+        ]
+        return poses[0]
+    mirrored_left, own_right = shapes
+    fit = register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
+    # mean of the right one's own estimate and of that from the left one
+    middle = Rotation.from_matrix([own_right.rotation, mirrored_left.rotation @ fit.rotation.T]).mean().as_matrix()
+    pair = replace(mirrored_left, rotation=middle @ fit.rotation), replace(own_right, rotation=middle)
     motions = _motions(*pair, fit)
     together = _share_coordinates(*motions, *pair, declared)
     if together:
@@ -109,12 +113,12 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     evidence = {
         "coordinates": frame,
         **{
-            name: {side: round(getattr(one, name), DIGITS) for side, one in zip(SIDES, shapes, strict=True)}
-            for name in ("residual", "confidence", "sided")
+            name: {side: round(getattr(shape, name), DIGITS) for side, shape in zip(SIDES, shapes, strict=True)}
+            for name in ("residual", "confidence", "side_ratio")
         },
         "mirror_residual": round(fit.residual, DIGITS),
     }
-    unclear = "left and right are taken from the configuration: the shapes do not show whether the files are swapped"
+    unclear = "left and right are those of the configuration: the shapes do not show whether the files are swapped"
     # volumes of the brain are in RAS+
     return Pose(
         np.eye(4) if frame else whole,
@@ -122,53 +126,54 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         "file" if frame else "shape",
         together,
         evidence,
-        (unclear,) if _sided(shapes) < LEAST_SIDED else (),
+        (unclear,) if _mean_side_ratio(shapes) < MIN_SIDE_RATIO else (),
     )
 
 
-def _sided(shapes: list[Hemisphere]) -> float:
-    return float(np.exp(np.mean(np.log([one.sided for one in shapes]))))
+def _mean_side_ratio(shapes: list[Hemisphere]) -> float:
+    return float(np.exp(np.mean(np.log([shape.side_ratio for shape in shapes]))))
 
 
 def _require_sides(shapes: list[Hemisphere]) -> None:
-    sided = [one.sided for one in shapes]
-    fits = f"{sided[0]:.2f} (left) and {sided[1]:.2f} (right) times as far from the other side's template"
-    if min(sided) < 1 / LEAST_SIDED and max(sided) > LEAST_SIDED:
-        raise InputError("both hemispheres seem to be of one side", found=fits, expected="more than 1 for both")
-    if _sided(shapes) < 1 / LEAST_SIDED:
+    ratios = [shape.side_ratio for shape in shapes]
+    found = f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from the other side's template"
+    if min(ratios) < 1 / MIN_SIDE_RATIO and max(ratios) > MIN_SIDE_RATIO:
+        raise InputError("both hemispheres seem to be of one side", found=found, expected="more than 1 for both")
+    if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
         raise InputError(
             "the hemispheres seem to be swapped",
-            found=fits,
+            found=found,
             expected="more than 1",
             remedy="Swap `left` and `right`; or, if they are right, pose the files yourself and set coordinates: ras.",
         )
 
 
-def _kept_as_ras(one: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
-    """Return the file's pose for a shape that fits others as well; InputError where it fits worse near RAS+.
+def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
+    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+.
 
-    Few random poses are so near to it: this is evidence where the shape leaves a choice.
+    Few random poses are this close to RAS+, so this is evidence if the shape is ambiguous.
     """
-    fit = register(one.shape, targets, np.eye(3))
-    nearly = fit.residual < LEAST_CONFIDENCE * one.residual and fit.residual <= WORST_RESIDUAL
-    if not nearly or angle_deg(fit.rotation) >= CONVENTION_DEG:
+    fit = register(hemisphere.shape, targets, np.eye(3))
+    fits_ras = fit.residual < MIN_CONFIDENCE * hemisphere.residual and fit.residual <= MAX_RESIDUAL
+    if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
+        next_best = f"the next best pose has {hemisphere.confidence:.2f} times as much"
         raise InputError(
             f"the pose of the {what} cannot be determined from its shape",
-            found=f"a residual of {one.residual:.3f}, the next best pose {one.confidence:.2f} times worse",
-            expected=f"at most {WORST_RESIDUAL}, at least {LEAST_CONFIDENCE} times; or a pose near RAS",
+            found=f"a residual of {hemisphere.residual:.3f}; {next_best}",
+            expected=f"at most {MAX_RESIDUAL}, and at least {MIN_CONFIDENCE} times; or a pose near RAS",
             remedy="Is it the closed pial surface of a cerebrum? If so, pose it and set coordinates: ras or lps.",
         )
-    doubt = "the shape fits other poses as well as RAS+, in which the coordinates were taken: set coordinates"
+    doubt = "the coordinates are taken as RAS+, but the shape fits other poses as well: set coordinates"
     return Pose(by="default", warnings=(doubt,))
 
 
 def _motions(left: Hemisphere, right: Hemisphere, fit: Fit) -> tuple[Floats, Floats]:
-    # the left centre of volume less the right one, mirrored, once both are posed
+    # offset between the centres of volume of both posed hemispheres, the left one mirrored
     offset = right.rotation @ fit.shift * right.shape.size_mm
     posed = []
-    for one, part in ((left, 0.5), (right, -0.5)):
-        target = np.array([BESIDE_MM - one.wall_mm, *(part * offset[1:])])
-        posed.append(motion(one.rotation, target - one.rotation @ one.shape.centre))
+    for side, share in ((left, 0.5), (right, -0.5)):
+        target = np.array([WALL_DISTANCE_MM - side.wall_mm, *(share * offset[1:])])
+        posed.append(motion(side.rotation, target - side.rotation @ side.shape.centre))
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
@@ -177,123 +182,126 @@ def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, righ
     if declared and angle < DECLARED_TURN_DEG:
         return True
     centre = MIRROR[:3, :3] @ left.shape.centre
-    apart = to_right - to_left
-    away = np.abs(apart[:3, :3] @ centre + apart[:3, 3]) / right.shape.size_mm
-    return bool(angle < COMMON_DEG and away[0] < COMMON_DISTANCE and np.hypot(*away[1:]) < COMMON_OFFSET)
+    difference = to_right - to_left
+    shift = np.abs(difference[:3, :3] @ centre + difference[:3, 3]) / right.shape.size_mm
+    return bool(angle < COMMON_DEG and shift[0] < COMMON_DISTANCE and np.hypot(*shift[1:]) < COMMON_OFFSET)
 
 
 def _mean_motion(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere) -> Floats:
     centre = 0.5 * (MIRROR[:3, :3] @ left.shape.centre + right.shape.centre)
     rotation = Rotation.from_matrix([to_left[:3, :3], to_right[:3, :3]]).mean().as_matrix()
-    there = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right))
-    return motion(rotation, there - rotation @ centre)
+    moved = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right))
+    return motion(rotation, moved - rotation @ centre)
 
 
 def _frame(to_ras: Floats) -> str | None:
     for name, axes in CONVENTIONS.items():
         turn = to_ras[:3, :3] @ axes[:3, :3].T
         tilt = np.degrees(np.arccos(np.clip(turn[0, 0], -1.0, 1.0)))
-        if tilt < SAME_TILT_DEG and abs(pitch_deg(turn)) < SAME_PITCH_DEG:
+        if tilt < TILT_TOL_DEG and abs(pitch_deg(turn)) < PITCH_TOL_DEG:
             return name
     return None
 
 
 def pitch_deg(rotation: Floats) -> float:
-    """Return the angle in degrees of the rotation about x that is nearest to a (3, 3) rotation."""
+    """Return the angle in degrees of the rotation about x that is closest to a (3, 3) rotation."""
     block = rotation[1:, 1:]
     return float(np.degrees(np.arctan2(block[1, 0] - block[0, 1], block[0, 0] + block[1, 1])))
 
 
-def doubts_of_hemispheres(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
-    """Return what the shapes of two hemispheres say against their sides and the coordinates, "ras" or "lps".
+def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
+    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps".
 
-    The surfaces are in RAS+ already, if these are right. Files of the wrong side in the wrong one of the two still
-    lie side by side, but their mirror images fit better.
+    If sides and coordinates are correct, the surfaces are in RAS+. If both are wrong, the hemispheres still lie side by
+    side, but their mirror images fit better.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
-    if _sided(shapes) < 1 / LEAST_SIDED:
+    if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
         named = coordinates.upper()
         swapped = f"are left and right swapped, and the coordinates not {named}? Check both, or set coordinates: auto"
         return [f"the shapes fit the other sides better: {swapped}"]
-    turns = [angle_deg(one.rotation) for one in shapes]
-    if all(one.is_clear for one in shapes) and min(turns) > MIN_TURN_DEG:
-        return [_against(coordinates, "hemispheres are", float(np.mean(turns)))]
+    turns = [angle_deg(shape.rotation) for shape in shapes]
+    if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
+        return [_contradiction(coordinates, "hemispheres are", float(np.mean(turns)))]
     return []
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
-    """Return the pose of a whole brain's surface, in coordinates that the user names or leaves to "auto".
+    """Return the pose of a whole brain's surface in coordinates "ras", "lps" or "auto".
 
-    Named coordinates are kept, with a warning where the shape clearly contradicts them. InputError where the pose
-    must come from the shape and is ambiguous.
+    Named coordinates are kept, with a warning if the shape clearly contradicts them. InputError with "auto" if the
+    shape is ambiguous.
     """
     shape = shape_of(mesh, deepest=DEEPEST)
     fit, confidence = register_from_all_sides(shape, brains())
-    one = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
-    return _judged(one, one.rotation, coordinates, "brain", brains())
+    brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
+    return _choose_pose(brain, brain.rotation, coordinates, "brain", brains())
 
 
-def pose_of_volume_by_shape(mesh: TriangleMesh, sided: bool) -> Pose:
+def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
     """Return the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
 
-    The file's is kept where the shape is within 60° of it or says none, with a warning. `sided` is whether labels say
-    which side is which.
+    The file's pose is kept, with a warning, if the shape is within 60° of it or ambiguous. `has_sides` is whether left
+    and right are labelled.
     """
-    unchecked = Pose(warnings=("neither labels nor shape say how the brain lies: its pose is the file's, unchecked",))
+    unchecked = Pose(warnings=("neither labels nor shape determine the pose: it is the file's, unchecked",))
     try:
         pose = pose_of_surface(mesh, "auto")
     except InputError:
         return unchecked
-    return unchecked if pose.by == "default" else pose_from_rotation(pose.of_file()[:3, :3], "the shape", sided)
+    return unchecked if pose.by == "default" else pose_from_rotation(pose.of_file()[:3, :3], "the shape", has_sides)
 
 
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
-    """Return the pose of a clean hemisphere that is alone, in coordinates "ras", "lps" or "auto".
+    """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or "auto".
 
-    With "auto", the axes of the file are kept where its shape says that they are RAS or LPS within 35°, and its medial
-    wall is then turned upright; else the shape's pose is taken. With `of_volume` it is the surface of a label volume,
-    whose mistakes other volumes of the brain are taken to share. InputError where the pose is ambiguous, or the shape
-    is that of the other side.
+    With "auto", the axes of the file are kept if its shape fits RAS or LPS within 35°, and the medial wall is then set
+    upright. Otherwise the pose of the shape is taken. `of_volume`: the surface comes from a label volume, and other
+    volumes of the brain are assumed to have the same axes. InputError if the pose is ambiguous or the shape is the
+    other hemisphere's.
     """
     mirror = MIRROR if side == "left" else np.eye(4)
-    one = hemisphere_by_shape(transformed(mesh, mirror))
-    rotation = mirror[:3, :3] @ one.rotation @ mirror[:3, :3]
-    if coordinates == "auto" and one.is_clear and one.sided < 1 / LEAST_SIDED:
+    hemisphere = hemisphere_by_shape(transformed(mesh, mirror))
+    rotation = mirror[:3, :3] @ hemisphere.rotation @ mirror[:3, :3]
+    side_ratio = hemisphere.side_ratio
+    if coordinates == "auto" and hemisphere.is_clear and side_ratio < 1 / MIN_SIDE_RATIO:
         raise InputError(
             f"the hemisphere seems to be the {'right' if side == 'left' else 'left'} one",
-            found=f"{one.sided:.2f} times as far from the other side's template",
+            found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
         )
-    pose = _judged(one, rotation, coordinates, "hemisphere", hemispheres(), of_volume=of_volume)
-    if one.sided < LEAST_SIDED:
-        doubt = f"the side, {side}, is taken from the configuration: it cannot be determined from the shape"
+    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", hemispheres(), of_volume=of_volume)
+    if side_ratio < MIN_SIDE_RATIO:
+        doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
         pose = replace(pose, warnings=(doubt, *pose.warnings))
-    return replace(pose, evidence={"confidence": one.confidence, "sided": one.sided})
+    return replace(pose, evidence={"confidence": hemisphere.confidence, "side_ratio": side_ratio})
 
 
-def _judged(
-    one: Hemisphere, rotation: Floats, coordinates: str, what: str, targets: Sequence[Shape], of_volume: bool = False
+def _choose_pose(
+    shape: Hemisphere, rotation: Floats, coordinates: str, what: str, targets: Sequence[Shape], of_volume: bool = False
 ) -> Pose:
-    """Return the pose that is named, or else what a brain's or a hemisphere's `rotation` to RAS+ (3, 3) says of it."""
+    """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3) leads to RAS+."""
     angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
     if coordinates != "auto":
-        doubtful = one.is_clear and angles[coordinates] > MIN_TURN_DEG
-        doubts = [_against(coordinates, f"{what} is", angles[coordinates])] if doubtful else []
+        is_doubtful = shape.is_clear and angles[coordinates] > MIN_TURN_DEG
+        doubts = [_contradiction(coordinates, f"{what} is", angles[coordinates])] if is_doubtful else []
         return turned(CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts)
-    if not one.is_clear:
-        return _kept_as_ras(one, targets, what)
+    if not shape.is_clear:
+        return _pose_as_ras(shape, targets, what)
     nearest = min(angles, key=lambda name: angles[name])
     if angles[nearest] >= CONVENTION_DEG:
-        return turned(rotation, "shape", "ras", f"the {what} was turned by {angles['ras']:.0f}°, as its shape says")
+        return turned(
+            rotation, "shape", "ras", f"the {what} was rotated by {angles['ras']:.0f}° according to its shape"
+        )
     axes = CONVENTIONS[nearest][:3, :3]
-    said = [] if nearest == "ras" else [f"the shape says that the coordinates are {nearest.upper()}"]
+    notes = [] if nearest == "ras" else [f"the coordinates are {nearest.upper()} according to the shape"]
     if what == "brain":
-        return turned(axes, "shape", nearest, *said)
-    # the smallest turn that sets the medial wall upright
+        return turned(axes, "shape", nearest, *notes)
+    # the smallest rotation that sets the medial wall upright
     upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
-    return turned(upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *said)
+    return turned(upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *notes)
 
 
-def _against(coordinates: str, what: str, angle: float) -> str:
+def _contradiction(coordinates: str, what: str, angle: float) -> str:
     check = "check them, or set coordinates: auto"
-    return f"the shape says that the {what} turned by {angle:.0f}° against the coordinates {coordinates}: {check}"
+    return f"according to the shape the {what} rotated by {angle:.0f}° from the coordinates {coordinates}: {check}"

@@ -12,8 +12,8 @@ from pathlib import Path
 from textwrap import fill
 from typing import NamedTuple
 
-from ..anatomy.labels import LEAST_CORTEX_OUTSIDE, read_cerebrum
-from ..anatomy.layout import doubts_of_scheme, layout_of
+from ..anatomy.labels import MIN_CORTEX_OUTSIDE, read_cerebrum
+from ..anatomy.layout import layout_of, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
@@ -193,9 +193,9 @@ def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[st
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
     whole = brain.hemisphere is None
-    cerebrum = read_cerebrum(read.labels, read.affine, scheme, LEAST_CORTEX_OUTSIDE if whole else 0.0)
+    cerebrum = read_cerebrum(read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
-    if whole and (doubts := list(doubts_of_scheme(layout_of(read.labels), scheme))):
+    if whole and (doubts := list(scheme_contradictions(layout_of(read.labels), scheme))):
         fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
         if fitting:
             problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme.name}"

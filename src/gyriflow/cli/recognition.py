@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..anatomy.labels import cerebrum_mask
-from ..anatomy.layout import doubts_of_scheme, layout_of
+from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume
@@ -89,7 +89,7 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
         if numbers and numbers <= set(scheme.labels):
             try:
                 cerebrum_mask(labels, scheme)
-                causes[name] = next(doubts_of_scheme(layout, scheme), "")
+                causes[name] = next(scheme_contradictions(layout, scheme), "")
             except InputError as error:
                 causes[name] = str(error).partition(";")[0]
     return causes

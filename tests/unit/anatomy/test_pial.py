@@ -13,7 +13,7 @@ from shapes import LPS, rigid, scaling, sphere
 
 from gyriflow.anatomy.fissure import smallest_gap, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
-from gyriflow.anatomy.plausible import doubts_of_proportions, expected_volume_ml, require_plausible_size
+from gyriflow.anatomy.plausible import expected_volume_ml, proportion_warnings, require_plausible_size
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import self_intersecting_faces
@@ -123,9 +123,9 @@ def test_a_volume_far_from_that_of_the_week_is_doubted(share, doubted):
 def test_a_wrong_edge_of_the_voxels_is_told_by_the_brains_proportions(axis):
     # the spina bifida atlas at 31 GW
     extents = np.array([75.0, 92.0, 66.0])
-    assert doubts_of_proportions(extents) == []
+    assert proportion_warnings(extents) == []
     extents[axis] *= 1.3
-    assert "is the scale of each axis right?" in doubts_of_proportions(extents)[0]
+    assert "is the scale of each axis" in proportion_warnings(extents)[0]
 
 
 @pytest.mark.fault(4)
@@ -180,9 +180,9 @@ def test_maps_on_surfaces_in_lps_and_volumes_beside_them_lie_on_the_brain():
 
 @pytest.mark.fault(9)
 def test_swapped_hemispheres_are_refused(halves):
-    with pytest.raises(InputError, match=r"in coordinates ras.*both together"):
+    with pytest.raises(InputError, match=r"in coordinates ras.*not both"):
         from_hemispheres(*reversed(halves), week=24.0)
-    with pytest.raises(InputError, match=r"in coordinates lps.*both together"):
+    with pytest.raises(InputError, match=r"in coordinates lps.*not both"):
         from_hemispheres(*halves, week=24.0, coordinates="lps")
 
 

@@ -18,8 +18,8 @@ from gyriflow.anatomy.fissure import smallest_gap
 from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.pial import from_hemispheres
 from gyriflow.anatomy.pose import (
-    doubts_of_hemispheres,
     hemisphere_by_shape,
+    hemisphere_warnings,
     pose_of_pair,
     pose_of_surface,
     pose_of_volume_by_shape,
@@ -64,7 +64,7 @@ def test_separately_moved_hemispheres_are_posed(halves):
     require_upright(pose, moved, pitch=5.0)
     assert not pose.together
     assert min(pose.evidence["confidence"].values()) > 1.5
-    assert min(pose.evidence["sided"].values()) > 1.1
+    assert min(pose.evidence["side_ratio"].values()) > 1.1
     # side by side as they were, but for the gap
     left, right = (
         transformed(half, pose.of_file(side) @ there).vertices.mean(axis=0) - half.vertices.mean(axis=0)
@@ -177,8 +177,8 @@ def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
 def test_the_mirror_image_of_a_hemisphere_fits_worse(halves):
     right = halves[1]
     one, other = hemisphere_by_shape(right), hemisphere_by_shape(transformed(right, MIRROR))
-    assert one.sided > 1.1
-    assert other.sided == pytest.approx(1 / one.sided, rel=0.1)
+    assert one.side_ratio > 1.1
+    assert other.side_ratio == pytest.approx(1 / one.side_ratio, rel=0.1)
     assert angle_deg(one.rotation) < 8.0
 
 
@@ -240,7 +240,7 @@ def test_sides_and_half_a_hindbrain_tell_a_mirrored_brain_from_a_turned_one(brai
 @pytest.mark.parametrize("degrees", [(0, 0, 0), (0, 0, 180), (90, 0, 0), (0, 180, 0)])
 def test_volumes_without_a_hindbrain_are_posed_by_their_shape(degrees):
     mesh = transformed(atlas_brain(), rigid(*degrees))
-    pose = pose_of_volume_by_shape(mesh, sided=False)
+    pose = pose_of_volume_by_shape(mesh, has_sides=False)
     np.testing.assert_allclose(pose.world[:3, :3] @ rigid(*degrees)[:3, :3], np.eye(3), atol=1e-9)
     assert ["left and right are wrong now" in warning for warning in pose.warnings] == [True] * any(degrees)
 
@@ -250,7 +250,7 @@ def test_a_volume_whose_shape_says_no_pose_keeps_its_own_and_is_told():
     mesh = transformed(ellipsoid((24, 33, 22)), rigid(50, 40, 30))
     with pytest.raises(InputError, match="cannot be determined from its shape"):
         pose_of_surface(mesh, "auto")
-    pose = pose_of_volume_by_shape(mesh, sided=False)
+    pose = pose_of_volume_by_shape(mesh, has_sides=False)
     assert np.array_equal(pose.world, np.eye(4))
     assert "unchecked" in pose.warnings[0]
 
@@ -279,7 +279,7 @@ def test_the_shape_of_a_surface_tells_its_pose(turn, most_deg, said):
 def test_coordinates_that_are_named_are_kept_and_doubted():
     pose = pose_of_surface(transformed(atlas_brain(), rigid(180, 0, 0)), "ras")
     assert np.array_equal(pose.world[:3, :3], np.eye(3))
-    assert "turned by 1" in pose.warnings[0]
+    assert "rotated by 1" in pose.warnings[0]
     assert pose_of_surface(atlas_brain(), "ras").warnings == ()
 
 
@@ -294,10 +294,10 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
 @pytest.mark.fault(9, 10)
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
     left, right = atlas_halves()
-    assert doubts_of_hemispheres(left, right, "ras") == []
+    assert hemisphere_warnings(left, right, "ras") == []
     # files that are swapped, and in the other one of RAS and LPS: back to front
     about = [transformed(side, LPS) for side in (right, left)]
-    (doubt,) = doubts_of_hemispheres(*about, "lps")
+    (doubt,) = hemisphere_warnings(*about, "lps")
     assert "are left and right swapped, and the coordinates not LPS?" in doubt
-    (doubt,) = doubts_of_hemispheres(*(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras")
-    assert "turned by 1" in doubt
+    (doubt,) = hemisphere_warnings(*(transformed(side, rigid(180, 0, 0)) for side in (left, right)), "ras")
+    assert "rotated by 1" in doubt
