@@ -1,135 +1,206 @@
-"""In which week a sulcus appears that is not there at the start."""
+"""Onset of sulci: the week in which each sulcus of the last observed brain appears."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, face_components, submesh, vertex_areas
+from ..geometry.matching import labels_at, match_surface
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    convex_hull,
+    face_areas,
+    face_components,
+    submesh,
+    vertex_areas,
+)
+from ..metrics.curvature import curvature
+from ..metrics.gyrification import sulcal_depth
 
-DEEP_MM = 2.0
-"""A sulcus is there when it is so much below its neighbouring crowns."""
+MIN_DEPTH_MM = 2.0
+"""Depth below the neighbouring crowns from which a sulcus counts as present."""
 
-NEIGHBOURHOOD_MM = 10.0
-"""Round a region, where its crowns are."""
+CROWN_DISTANCE_MM = 10.0
+"""Distance from a sulcus within which its crowns are looked for."""
 
-LEAST_REGION_MM2 = 40.0
-"""Smaller places are no sulci that are looked for."""
+MIN_AREA_MM2 = 40.0
+"""Valleys with less area are not counted as sulci."""
 
-BOTTOM, CROWN = 0.9, 0.1
-"""Quantiles of depth by area that stand for the bottom of a region and for the crowns beside it."""
+BOTTOM_QUANTILE, CROWN_QUANTILE = 0.9, 0.1
+"""Quantiles of depth by area that stand for the bottom of a sulcus and for the crowns around it."""
 
 
-def sulcal_regions(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
+def find_named_sulci(
+    mesh: TriangleMesh, side: str, labels: NDArray[np.integer] | None, names: Mapping[int, str], *, radius_mm: float
+) -> tuple[Ints, dict[int, str]]:
+    """Find the sulci of a hemisphere and name them by the regions that they lie in.
+
+    Returns the (n,) number of the sulcus at each vertex, 0 outside, and the names of the numbers: see `find_sulci` and
+    `name_sulci`. `labels` (n,) are the regions with `names`, None if the brain has none; `radius_mm` is that of the
+    fitted curvature.
+    """
+    depth_mm = sulcal_depth(mesh, convex_hull(mesh))
+    sulci = find_sulci(mesh, depth_mm, curvature(mesh, radius_mm=radius_mm).mean)
+    return name_sulci(mesh, sulci, np.zeros_like(sulci) if labels is None else labels, names, side)
+
+
+def find_sulci(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
     """Number the sulci of a hemisphere at its (n,) vertices, 1 for the largest, 0 outside of sulci.
 
-    A sulcus is a connected valley (mean curvature below 0, positive on gyri) deeper than `DEEP_MM` below the hull, of
-    `LEAST_REGION_MM2` or more. Valleys of the medial wall and the Sylvian fissure are among them.
+    A sulcus is a connected valley (negative mean curvature) deeper than `MIN_DEPTH_MM` below the hull, with an area of
+    at least `MIN_AREA_MM2`. Valleys of the medial wall and the Sylvian fissure are included.
     """
-    regions = np.zeros(len(mesh.vertices), dtype=np.int64)
-    valley = (depth_mm >= DEEP_MM) & (mean_curvature < 0)
+    sulci = np.zeros(len(mesh.vertices), dtype=np.int64)
+    valley = (depth_mm >= MIN_DEPTH_MM) & (mean_curvature < 0)
     deep = np.asarray(valley[mesh.faces].all(axis=1))
     if not deep.any():
-        return regions
+        return sulci
     part, used = submesh(mesh, deep)
     component = face_components(part)
     sizes = np.bincount(component, face_areas(part))
-    largest = [number for number in np.argsort(-sizes, kind="stable") if sizes[number] >= LEAST_REGION_MM2]
-    for name, number in enumerate(largest, start=1):
-        regions[used[np.unique(part.faces[component == number])]] = name
-    return regions
+    largest = [number for number in np.argsort(-sizes, kind="stable") if sizes[number] >= MIN_AREA_MM2]
+    for number, valley_number in enumerate(largest, start=1):
+        sulci[used[np.unique(part.faces[component == valley_number])]] = number
+    return sulci
 
 
-def relief(
-    mesh: TriangleMesh, depth_mm: Floats, regions: NDArray[np.integer], names: Mapping[int, str]
+def name_sulci(
+    mesh: TriangleMesh,
+    sulci: NDArray[np.integer],
+    labels: NDArray[np.integer],
+    names: Mapping[int, str],
+    side: str,
+) -> tuple[Ints, dict[int, str]]:
+    """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
+
+    Names are like "left central", with a number from the second part in a region on, by size. Parts outside of all
+    regions are named by the number of their valley, like "left 4".
+
+    Parameters
+    ----------
+    sulci
+        (n,) numbers of `find_sulci`.
+    labels, names
+        (n,) labels of the vertices, and the names of those that are regions; without any, sulci are "left 1" and so on.
+
+    Returns
+    -------
+    tuple
+        (n,) numbers of the parts, 1 for the largest, 0 outside of sulci, and their names.
+    """
+    areas = vertex_areas(mesh)
+    named_labels = np.where(np.isin(labels, list(names)), labels, 0)
+    parts = [
+        (number, label, inside)
+        for number in range(1, int(sulci.max()) + 1)
+        for label, inside in _parts_by_region(sulci == number, named_labels, areas)
+    ]
+    parts.sort(key=lambda part: -areas[part[2]].sum())
+    numbers, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
+    part_names: dict[int, str] = {}
+    for place, (number, label, inside) in enumerate(parts, start=1):
+        numbers[inside] = place
+        count[label] += 1
+        suffix = f" {count[label]}" if count[label] > 1 else ""
+        name = f"{side} {names[label]}{suffix}" if label in names else f"{side} {number}"
+        # the name of a region may be a number
+        part_names[place] = f"{name} ({place})" if name in part_names.values() else name
+    return numbers, part_names
+
+
+def _parts_by_region(
+    inside: NDArray[np.bool_], labels: NDArray[np.integer], areas: Floats
+) -> list[tuple[int, NDArray[np.bool_]]]:
+    """Divide a sulcus among the regions with `MIN_AREA_MM2` or more of it; the rest goes to the largest part.
+
+    What lies outside of all regions goes to the largest part too, unless it is more than half of the sulcus.
+    """
+    sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
+    large = [int(label) for label in np.flatnonzero(sizes >= MIN_AREA_MM2)]
+    # the rim of a sulcus is often in no region
+    if sizes[0] <= sizes.sum() / 2:
+        large = [label for label in large if label > 0]
+    large = large or [int(np.argmax(sizes))]
+    largest = max(large, key=lambda label: sizes[label])
+    part = np.where(np.isin(labels, large), labels, largest)
+    return [(label, inside & (part == label)) for label in large]
+
+
+def onset_table(
+    surfaces: Mapping[float, TriangleMesh],
+    carried: Sequence[TriangleMesh],
+    last: TriangleMesh,
+    sulci: NDArray[np.integer],
+    names: Mapping[int, str],
 ) -> pd.DataFrame:
-    """Tell how deep regions are below their neighbouring crowns: columns region, bottom_mm, crown_mm, relief_mm.
+    """Find the week in which each sulcus of the last observed brain appears in a series of surfaces.
 
-    The (n,) depth of the vertices is below the hull or envelope; their (n,) region labels are each the place of a
-    sulcus, carried along from an atlas. Labels with names count; a region without vertices has NaN.
+    Parameters
+    ----------
+    surfaces
+        A hemisphere by week, in mm.
+    carried
+        For each week the same hemisphere with its vertices carried onto the last observed brain.
+    last, sulci, names
+        Hemisphere of the last observed brain, and the result of `find_named_sulci` on it.
+
+    Returns
+    -------
+    DataFrame
+        As `find_onset`.
+    """
+    reliefs = {}
+    for (week, mesh), on_last in zip(surfaces.items(), carried, strict=True):
+        labels = labels_at(match_surface(on_last, last), sulci)
+        reliefs[week] = measure_relief(mesh, sulcal_depth(mesh, convex_hull(mesh)), labels, names)
+    return find_onset(reliefs)
+
+
+def measure_relief(
+    mesh: TriangleMesh, depth_mm: Floats, sulci: NDArray[np.integer], names: Mapping[int, str]
+) -> pd.DataFrame:
+    """Measure how deep each sulcus is below its neighbouring crowns.
+
+    The (n,) depth of the vertices is below the hull or envelope. Columns region, bottom_mm, crown_mm, relief_mm
+    (bottom − crown), NaN for sulci without vertices.
     """
     areas = vertex_areas(mesh)
     rows = []
-    for label, name in names.items():
-        inside = regions == label
+    for number, name in names.items():
+        inside = sulci == number
         if not inside.any():
             rows.append((name, np.nan, np.nan, np.nan))
             continue
-        away, _ = cKDTree(mesh.vertices[inside]).query(mesh.vertices, distance_upper_bound=NEIGHBOURHOOD_MM)
-        near = np.isfinite(away)
+        tree = cKDTree(mesh.vertices[inside])
+        distances, _ = tree.query(mesh.vertices, distance_upper_bound=CROWN_DISTANCE_MM)
         bottom, crown = (
             float(np.quantile(depth_mm[part], share, weights=areas[part], method="inverted_cdf"))
-            for part, share in ((inside, BOTTOM), (near, CROWN))
+            for part, share in ((inside, BOTTOM_QUANTILE), (np.isfinite(distances), CROWN_QUANTILE))
         )
         rows.append((name, bottom, crown, bottom - crown))
     return pd.DataFrame(rows, columns=["region", "bottom_mm", "crown_mm", "relief_mm"])
 
 
-def onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
-    """Find the week in which each region's sulcus appears, from tables of `relief` by week.
+def find_onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
+    """Find the week in which each sulcus appears, from tables of `measure_relief` by week.
 
-    The first time that the relief reaches 2 mm, linear between weeks. Columns region, there_at_start, onset_week (NaN
-    where it was there at the start or never comes), first_relief_mm, last_relief_mm.
+    It is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly between weeks; if the relief of the week
+    before is unknown, the week itself. Columns region, there_at_start, onset_week (NaN if the sulcus was present at the
+    start or never appears), first_relief_mm, last_relief_mm.
     """
     weeks, rows = sorted(reliefs), []
     for name, table in pd.concat([reliefs[week] for week in weeks]).groupby("region", sort=False):
         depths = table["relief_mm"].to_numpy(dtype=float)
-        reached = np.flatnonzero(depths >= DEEP_MM)
+        reached = np.flatnonzero(depths >= MIN_DEPTH_MM)
         week = np.nan
         if len(reached) and reached[0] > 0:
             before, after = reached[0] - 1, reached[0]
-            part = (DEEP_MM - depths[before]) / (depths[after] - depths[before])
-            # where the depth of the week before is not known, the week itself
-            week = weeks[before] + part * (weeks[after] - weeks[before]) if np.isfinite(part) else weeks[after]
-        rows.append((name, bool(depths[0] >= DEEP_MM), week, depths[0], depths[-1]))
+            share = (MIN_DEPTH_MM - depths[before]) / (depths[after] - depths[before])
+            week = weeks[before] + share * (weeks[after] - weeks[before]) if np.isfinite(share) else weeks[after]
+        rows.append((name, bool(depths[0] >= MIN_DEPTH_MM), week, depths[0], depths[-1]))
     return pd.DataFrame(rows, columns=["region", "there_at_start", "onset_week", "first_relief_mm", "last_relief_mm"])
-
-
-def named(
-    mesh: TriangleMesh,
-    sulci: NDArray[np.integer],
-    regions: NDArray[np.integer],
-    names: Mapping[int, str],
-    side: str,
-) -> tuple[Ints, dict[int, str]]:
-    """Part the sulci of a hemisphere by the regions of the cortex that they lie in, and their names.
-
-    A connected valley that reaches through several regions is parted between those that have `LEAST_REGION_MM2` or
-    more of it; what is left of it goes to the largest part, and so does what is in no region, unless that is more
-    than half. Names are as "left central", with a number from the second one of a region on, by size; parts outside
-    of all regions are called by the number of their valley, as "left 4".
-
-    Parameters
-    ----------
-    sulci
-        (n,) numbers of `sulcal_regions`.
-    regions, names
-        (n,) labels of the vertices, and the names of those that are regions; without any, sulci are "left 1" and so on.
-    """
-    areas, parts = vertex_areas(mesh), []
-    labels = np.where(np.isin(regions, list(names)), regions, 0)
-    for number in range(1, int(sulci.max()) + 1):
-        inside = sulci == number
-        sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
-        kept = [int(label) for label in np.flatnonzero(sizes >= LEAST_REGION_MM2)]
-        # the rim of a sulcus is often in no region
-        if sizes[0] <= sizes.sum() / 2:
-            kept = [label for label in kept if label > 0]
-        kept = kept or [int(np.argmax(sizes))]
-        largest = max(kept, key=lambda label: sizes[label])
-        part = np.where(np.isin(labels, kept), labels, largest)
-        parts += [(number, label, inside & (part == label)) for label in kept]
-    parts.sort(key=lambda part: -areas[part[2]].sum())
-    numbers, count = np.zeros(len(sulci), dtype=np.int64), Counter[int]()
-    named: dict[int, str] = {}
-    for place, (number, label, vertices) in enumerate(parts, start=1):
-        numbers[vertices] = place
-        count[label] += 1
-        again = f" {count[label]}" if count[label] > 1 else ""
-        name = f"{side} {names[label]}{again}" if label in names else f"{side} {number}"
-        # a region may be called by a number too
-        named[place] = f"{name} ({place})" if name in named.values() else name
-    return numbers, named

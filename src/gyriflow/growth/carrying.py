@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, transform_points
 from ..geometry.matching import labels_at, match_points, values_at
+from ..geometry.poses import Pose
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
+from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed, vertex_normals
 from .matched_surfaces import follow_inside, follow_surfaces
 
 OUTSIDE = 0.001
@@ -50,6 +51,15 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
     if matched:
         return np.asarray(follow_surfaces(mesh, matched)[-1])
     return np.asarray(carry_over_weeks(mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)])[-1])
+
+
+def carry_to_pose(mesh: TriangleMesh, pose: Pose, between: Sequence[Correspondence], later_pose: Pose) -> TriangleMesh:
+    """Carry a brain's posed surface to a later brain, into the pose of that one's surface.
+
+    Brains correspond in the worlds of their files.
+    """
+    world = transformed(mesh, pose.inverse)
+    return transformed(TriangleMesh(carry_surface(world, between), mesh.faces), later_pose.world)
 
 
 def carry_regions(

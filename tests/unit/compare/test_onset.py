@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from shapes import sphere
 
-from gyriflow.compare.onset import named, onset, relief, sulcal_regions
+from gyriflow.compare.onset import find_named_sulci, find_onset, find_sulci, measure_relief, name_sulci, onset_table
 from gyriflow.geometry.triangles import TriangleMesh
 
 BALL = sphere(20.0)
@@ -25,17 +25,17 @@ NAMES = {1: "central", 2: "calcarine", 3: "nowhere"}
 
 def test_relief_is_bottom_below_crowns_not_depth_below_the_hull():
     mesh, depths = groove(3.0)
-    table = relief(mesh, depths, REGIONS, NAMES).set_index("region")
+    table = measure_relief(mesh, depths, REGIONS, NAMES).set_index("region")
     assert table.loc["central", "relief_mm"] == pytest.approx(3.0, abs=0.35)
     assert table.loc["calcarine", "relief_mm"] == pytest.approx(0.0, abs=1e-9)
     assert np.isnan(table.loc["nowhere", "relief_mm"])
     # a wide place that lies deep, as the insula does, is no sulcus
-    sunken = relief(mesh, np.where(POINTS[:, 0] > 0, 6.0, 0.0), REGIONS, NAMES)
+    sunken = measure_relief(mesh, np.where(POINTS[:, 0] > 0, 6.0, 0.0), REGIONS, NAMES)
     assert sunken["relief_mm"].iloc[0] == 0
 
 
 def reliefs_of(depths):
-    """Return tables of `relief` by week, with what is known of two regions beside the ball."""
+    """Return tables of `measure_relief` by week, with what is known of two regions beside the ball."""
     return {
         week: pd.DataFrame({"region": ["central", "calcarine"], "relief_mm": [d, 0.1]}) for week, d in depths.items()
     }
@@ -44,7 +44,7 @@ def reliefs_of(depths):
 def test_onset_is_when_two_millimetres_are_reached_whatever_the_order_of_weeks():
     depths = {25.5: 3.5, 21.0: 0.0, 24.0: 2.8, 22.0: 1.0}
     for order in (list(depths), sorted(depths), sorted(depths, reverse=True)):
-        table = onset(reliefs_of({week: depths[week] for week in order})).set_index("region")
+        table = find_onset(reliefs_of({week: depths[week] for week in order})).set_index("region")
         # from 1.0 mm at 22 to 2.8 mm at 24 GW
         assert table.loc["central", "onset_week"] == pytest.approx(22 + 2 * 1.0 / 1.8)
         assert tuple(table.loc["central", ["first_relief_mm", "last_relief_mm"]]) == (0.0, 3.5)
@@ -53,22 +53,22 @@ def test_onset_is_when_two_millimetres_are_reached_whatever_the_order_of_weeks()
 
 
 def test_what_is_there_at_the_start_has_no_onset_and_an_unknown_week_is_skipped():
-    late = onset(reliefs_of({24.0: 2.8, 25.0: 3.5})).set_index("region")
+    late = find_onset(reliefs_of({24.0: 2.8, 25.0: 3.5})).set_index("region")
     assert late.loc["central", "there_at_start"]
     assert np.isnan(late.loc["central", "onset_week"])
-    unknown = onset(reliefs_of({22.0: np.nan, 24.0: 2.8})).set_index("region")
+    unknown = find_onset(reliefs_of({22.0: np.nan, 24.0: 2.8})).set_index("region")
     assert unknown.loc["central", "onset_week"] == 24.0
 
 
 def test_sulci_are_valleys_found_by_their_depth():
     mesh, depths = groove(4.0)
     bend = np.where(depths > 1.0, -0.2, 0.05)
-    regions = sulcal_regions(mesh, depths, bend)
+    regions = find_sulci(mesh, depths, bend)
     assert set(regions) == {0, 1}
     inside = regions == 1
     assert depths[inside].min() >= 2.0 > depths[~inside].min()
-    assert not sulcal_regions(mesh, depths, np.abs(bend)).any()
-    assert not sulcal_regions(*groove(1.0), bend).any()
+    assert not find_sulci(mesh, depths, np.abs(bend)).any()
+    assert not find_sulci(*groove(1.0), bend).any()
 
 
 def test_sulci_are_named_by_the_regions_that_they_lie_in():
@@ -80,7 +80,7 @@ def test_sulci_are_named_by_the_regions_that_they_lie_in():
     )
     regions = np.select([POINTS[:, 2] < -10, longitude < -57, longitude < 0], [0, 9, 4], 7)
     mesh = TriangleMesh(POINTS, FACES)
-    found, names = named(mesh, sulci, regions, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
+    found, names = name_sulci(mesh, sulci, regions, {4: "central", 7: "calcarine", 9: "cingulate"}, "left")
     assert sorted(names.values()) == ["left 3", "left calcarine", "left calcarine 2", "left central"]
     of = {name: found == number for number, name in names.items()}
     assert np.array_equal(of["left calcarine"], (sulci == 1) & (regions == 7))
@@ -90,6 +90,40 @@ def test_sulci_are_named_by_the_regions_that_they_lie_in():
     assert np.array_equal(of["left 3"], sulci == 3)
     assert np.array_equal(found > 0, sulci > 0)
     # without names all is as it was
-    same, numbers = named(mesh, sulci, regions, {}, "left")
+    same, numbers = name_sulci(mesh, sulci, regions, {}, "left")
     assert sorted(numbers.values()) == ["left 1", "left 2", "left 3"]
     assert {numbers[int(number)] for number in np.unique(same[sulci == 2])} == {"left 2"}
+
+
+FINE = sphere(20.0, 5)
+
+
+def carved(depth: float, size: float = 1.0) -> TriangleMesh:
+    """Return a sphere with a wide groove of a depth in mm along the equator's front."""
+    across, along = FINE.vertices[:, 2], np.abs(np.arctan2(FINE.vertices[:, 1], FINE.vertices[:, 0])) * 20
+    depths = depth * np.exp(-((across / 3) ** 2)) * (along < 28)
+    return TriangleMesh(size * FINE.vertices * (1 - depths / 20)[:, None], FINE.faces)
+
+
+def test_a_sulcus_of_the_last_brain_appears_when_its_relief_is_reached():
+    last = carved(4.0)
+    labels = np.where(FINE.vertices[:, 0] > 0, 5, 6)
+    sulci, names = find_named_sulci(last, "left", labels, {5: "front", 6: "back"}, radius_mm=3.0)
+    assert names == {1: "left front"}
+    bottom = np.linalg.norm(last.vertices, axis=1) < 17
+    assert (sulci[bottom] == 1).all()
+    # smaller brains with shallower grooves, their vertices carried onto the last one; the hull lies below the ball
+    surfaces = {21.0: carved(1.5, 0.9), 23.0: carved(2.2), 25.0: carved(4.0)}
+    (row,) = onset_table(surfaces, [last] * 3, last, sulci, names).to_dict("records")
+    assert row["region"] == "left front"
+    assert row["first_relief_mm"] == pytest.approx(0.9 * 0.9, abs=0.2)
+    assert row["last_relief_mm"] == pytest.approx(3.2, abs=0.2)
+    assert row["onset_week"] == pytest.approx(23.5, abs=0.3)
+    # a sulcus that no vertex is carried into is not known
+    elsewhere = TriangleMesh(last.vertices * [-1, -1, 1], last.faces)
+    assert np.isnan(onset_table({25.0: last}, [elsewhere], last, sulci, names)["first_relief_mm"].item())
+
+
+def test_sulci_of_a_brain_without_regions_are_numbered():
+    _, names = find_named_sulci(carved(4.0), "right", None, {}, radius_mm=3.0)
+    assert names == {1: "right 1"}

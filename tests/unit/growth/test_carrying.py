@@ -9,9 +9,17 @@ from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, carry, transform_points
+from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.tetrahedra import quadratic
 from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
-from gyriflow.growth.carrying import carry_mesh, carry_over_weeks, carry_regions, carry_surface, maps_on_template
+from gyriflow.growth.carrying import (
+    carry_mesh,
+    carry_over_weeks,
+    carry_regions,
+    carry_surface,
+    carry_to_pose,
+    maps_on_template,
+)
 from gyriflow.growth.channels import Channels, channels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.matched_surfaces import follow_surfaces, match_surfaces, outward
@@ -85,6 +93,16 @@ def test_the_inside_goes_along_smoothly(order):
     found = carry_mesh(solid, [GROWN])
     # a linear displacement is harmonic
     assert found[1] == pytest.approx(solid.vertices * STRETCH, abs=0.05)
+
+
+def test_a_posed_surface_is_carried_into_the_pose_of_the_later_brain():
+    own = own_surface()
+    first, last = Pose(rigid(0, 0, 30, shift=(4, 0, 1))), Pose(rigid(20, 0, 0, shift=(0, -3, 0)))
+    found = carry_to_pose(transformed(own, first.world), first, [GROWN], last)
+    expected = transformed(TriangleMesh(own.vertices * STRETCH, own.faces), last.world)
+    assert found.vertices == pytest.approx(expected.vertices, abs=0.05)
+    # the last brain itself stays where it is
+    assert carry_to_pose(own, last, [], last).vertices == pytest.approx(own.vertices)
 
 
 def test_regions_are_carried_along_matched_surfaces():
