@@ -28,6 +28,8 @@ from gyriflow.settings.terms import SPREAD_UNKNOWN
 from gyriflow.shipped import SHIPPED
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
+PARTS = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
+PARTS |= {"notice": "three.LICENSE.txt"}
 BRAINS = [
     {"id": name, "week": week, "population": "healthy", "source": "labels", "synthetic": False, "licence": licence}
     | {"covariates": covariates}
@@ -94,9 +96,7 @@ def page(figures: list[dict], view: dict | None = None, **others) -> str:
         **MEASURES | usual | others, norm="the norm", provenance=PROVENANCE, methods="**Brains.** Two.",
         configuration="start: young\n", shown=figures,
     )  # fmt: skip
-    parts = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
-    parts["notice"] = "three.LICENSE.txt"
-    texts = {name: (PAGE / file).read_text() for name, file in parts.items()}
+    texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
     return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
 
 

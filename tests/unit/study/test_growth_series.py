@@ -145,16 +145,6 @@ def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shap
     assert resolve(load(asked(shapes) | {"start": "s21"})).norm_reference == []
 
 
-def test_the_norm_is_of_brains_with_the_hemispheres_of_the_start(volume):
-    labels = {"scheme": "feta-7"}
-    brains = [{"id": f"w{week}", "week": week, "labels": volume, **labels} for week in (21, 22)]
-    for side in ("left", "right"):
-        brains.append({"id": side, "week": 21, "hemisphere": {"file": volume, "side": side}, **labels})
-    for start, norm in (("w21", ["w21", "w22"]), ("left", ["left"])):
-        assert resolve(load(asked(brains) | {"start": start})).norm_reference == norm
-    assert resolve(load(asked(brains, norm_reference=["w22", "left"]) | {"start": "w21"})).norm_reference == ["w22"]
-
-
 def test_averages_are_no_individuals(volume):
     atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
     own = {"labels": volume, "scheme": "feta-7"}
