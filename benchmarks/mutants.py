@@ -75,7 +75,7 @@ BY_TESTS = {
     "report/test_tables.py": [("src/gyriflow/settings/terms.py", "CORE_POWER_W = 12.0", "CORE_POWER_W = 120.0")],
     "report/test_report_scripts.py": [
         ("workflow/scripts/provenance.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),
-        ("workflow/scripts/study_runs.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),
+        ("workflow/scripts/run_tables.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),
     ],
     "io/test_exports.py": [
         ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),

@@ -13,7 +13,7 @@ from .conftest import SMALL_STUDY, Workflow, labelled
 pytestmark = pytest.mark.slow
 
 STAGES = (
-    *("pial_from_labels", "label_volumes", "cortical_thickness", "growth_curves", "growth_rates", "growth_figure"),
+    *("pial_from_labels", "cortical_thickness", "growth_curves", "growth_rates", "growth_figure"),
     *("register", "carried_mesh", "tetrahedralise", "parameters", "regions", "simulate", "folded_surface", "measure"),
     *("validation", "registration_ceiling", "study_resources", "html_report"),
 )
@@ -29,7 +29,7 @@ MESH = CARRIED | {"tetrahedralise": 1}
 CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
 # of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = RESULTS | CARRIED | CURVES | {
-    "pial_from_labels": 1, "label_volumes": 1, "cortical_thickness": 1, "register": 1, "measure": 1, "validation": 2,
+    "pial_from_labels": 1, "cortical_thickness": 1, "register": 1, "measure": 1, "validation": 2,
 }  # fmt: skip
 
 
@@ -73,9 +73,7 @@ SETTINGS = {
     "ranks": ({"folding": {"ranks": 1}}, REPORT),
     "new brain": (
         {"brains": [{"id": "c", "week": 23, **labelled(23)}]},
-        RESULTS
-        | CURVES
-        | {"pial_from_labels": 1, "label_volumes": 1, "cortical_thickness": 1, "measure": 1, "validation": 2},
+        RESULTS | CURVES | {"pial_from_labels": 1, "cortical_thickness": 1, "measure": 1, "validation": 2},
     ),
 }
 

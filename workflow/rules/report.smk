@@ -87,7 +87,7 @@ rule provenance:
 OF_PAGES = dict(
     quality=rules.quality_table.output[0],
     metrics=f"{STUDY}/metrics.csv",
-    centiles=rules.derived_tables.output.centiles,
+    centiles=rules.metrics_tables.output.centiles,
     warnings=rules.study_resources.output.warnings,
     provenance=rules.provenance.output.report,
     methods=rules.provenance.output.methods,
@@ -115,7 +115,7 @@ rule html_report:
         expand(PAGE_OF_BRAIN, brain=study.brains),
         **OF_PAGES,
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
-        runs=rules.study_runs.output.csv if study.folded else [],
+        runs=rules.run_tables.output.csv if study.folded else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
         view=asked_for(FIGURES, "view")[0],

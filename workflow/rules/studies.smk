@@ -78,7 +78,7 @@ rule replication:
             for name in ("members", "comparison", "nearest")
         },
         published=PUBLISHED,
-        displacement=study.files(DISPLACEMENT)[:1],
+        displacement=rules.run_tables.output.displacement,
         summary=study.files(FOLDING["summary"])[:1],
     output:
         csv=f"{STUDY}/replication.csv",
@@ -95,7 +95,7 @@ rule replication:
             for name, asked in CONFIG.studies.items()
             if name in study.comparisons
         },
-        run=next(iter(study.pairs), None),
+        run=next(iter(study.pairs), (None, None)),
     script:
         "../scripts/replication.py"
 

@@ -119,23 +119,6 @@ rule deviation:
         "../scripts/deviation.py"
 
 
-rule deviation_scores:
-    input:
-        f"{STUDY}/deviation.csv",
-    output:
-        f"{STUDY}/deviation_centiles.csv",
-    log:
-        f"{STUDY}/logs/deviation_scores.log",
-    benchmark:
-        f"{STUDY}/benchmarks/deviation_scores.tsv"
-    conda:
-        ENVIRONMENT
-    params:
-        individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
-    script:
-        "../scripts/deviation_scores.py"
-
-
 rule registration_ceiling:
     input:
         unpack(lambda w: ready_files(w.brain, study.ceiling_weeks(w.brain))),
@@ -229,8 +212,28 @@ VALIDATION_TABLES = {
 }
 
 
+WITH_ROWS = [name for name, files in VALIDATION_TABLES.items() if files]
+
+
+rule validation_tables:
+    input:
+        **VALIDATION_TABLES,
+    output:
+        **{name: f"{STUDY}/{name}.csv" for name in WITH_ROWS},
+        **({"deviation_centiles": f"{STUDY}/deviation_centiles.csv"} if study.expected else {}),
+    log:
+        f"{STUDY}/logs/validation_tables.log",
+    benchmark:
+        f"{STUDY}/benchmarks/validation_tables.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
+    script:
+        "../scripts/validation_tables.py"
+
+
 rule validate:
     input:
-        [f"{STUDY}/{name}.csv" for name, files in VALIDATION_TABLES.items() if files],
-        rules.deviation_scores.output if study.expected else [],
+        rules.validation_tables.output if study.validated else [],
         asked_for(FIGURES, "validate"),

@@ -7,13 +7,14 @@ from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_sur
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
-files = list(snakemake.input)
+files, volumes = list(snakemake.input), {}
 settings = {"week": params.week, **params.settings}
 with step(snakemake.log[0], *files):
     require_checksums(params.checksums)
     if params.labels:
         volume = params.labels.read(cropped=True)
         surface = from_labels(volume.labels, volume.affine, params.labels.scheme, params.side, **settings)
+        volumes = {"volumes_of_labels_mL": volume.volumes_ml}
     elif params.source == "hemispheres":
         left, right, declared = read_hemispheres(*files)
         settings |= {"coordinates": params.coordinates, **params.limits}
@@ -24,4 +25,4 @@ with step(snakemake.log[0], *files):
         mesh = read_one_hemisphere(files[0], params.side) if params.side else read_surface(files[0])
         surface = from_surface(mesh, params.side, coordinates=params.coordinates, **settings)
     write_brain(output, surface.whole, surface.left, surface.right)
-    write_json(output.report, surface.report)
+    write_json(output.report, surface.report | volumes)

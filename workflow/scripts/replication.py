@@ -18,7 +18,9 @@ with step(snakemake.log[0]):
         name: StudyTables(**params.studies[name], **dict(zip(NAMES, of, strict=True))) for name, of in tables.items()
     }
     published = read_yaml(files.published)
-    displacement, summary = read_table(files.displacement[0]), read_json(files.summary[0])
+    displacement, summary = read_table(files.displacement), read_json(files.summary[0])
+    run, brain = params.run
+    displacement = displacement[(displacement["run"] == run) & (displacement["subject"] == brain)]
     table = replication(published, displacement, list(studies.values()), summary)
     write_table(snakemake.output.csv, table)
     said = [

@@ -147,6 +147,13 @@ def read_table(path: AnyPath) -> "pd.DataFrame":
         return pd.read_csv(path)
 
 
+def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":
+    """Return CSV tables below each other; InputError where one is missing or torn."""
+    import pandas as pd
+
+    return pd.concat([read_table(path) for path in paths], ignore_index=True)
+
+
 @contextmanager
 def new_hdf5(path: AnyPath) -> Iterator["h5py.File"]:
     """Yield an HDF5 file to be filled, which takes its place when the block ends well; StorageError where it can't."""

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..settings.schemes import LabelScheme
 from ..settings.terms import AffineSource
+from ..units import ML_PER_MM3
 from .files import AGAIN, AnyPath, atomic_write, reading, require_finite
 
 log = logging.getLogger(__name__)
@@ -34,6 +35,13 @@ class LabelVolume:
 
     labels: NDArray[np.int32]
     affine: Floats
+
+    @property
+    def volumes_ml(self) -> dict[int, float]:
+        """The volume of each label in mL, without the background."""
+        numbers, voxels = np.unique(self.labels[self.labels > 0], return_counts=True)
+        voxel_ml = float(abs(np.linalg.det(self.affine[:3, :3]))) * ML_PER_MM3
+        return {int(number): int(count) * voxel_ml for number, count in zip(numbers, voxels, strict=True)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,6 +122,35 @@ def published_scores(
     return pd.DataFrame(rows, columns=columns)
 
 
+@dataclass(frozen=True)
+class LabelledBrain:
+    """A measured brain with the volume in mL of each of its labels, and what these mean."""
+
+    subject: str
+    week: float
+    sides: Sequence[Side]
+    scheme: LabelScheme
+    volumes: Mapping[int, float]
+
+
+def volume_tables(
+    brains: Sequence[LabelledBrain], norms: Mapping[str, PublishedNorm]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the volumes of all labels of some brains, and where these brains stand among published ones.
+
+    Columns subject, run ("real"), week, label, tissue, volume_mL; subject and those of `published_scores`.
+    """
+    rows, scores = [], []
+    for brain in brains:
+        known = brain.subject, MEASURED, brain.week
+        rows += [(*known, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
+        found, others = structure_volumes(brain.volumes, brain.scheme, norms)
+        scored = published_scores(found, brain.week, norms, others, brain.sides)
+        scores.append(scored.assign(subject=brain.subject)[["subject", *scored.columns]])
+    volumes = pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"])
+    return volumes, pd.concat(scores, ignore_index=True)
+
+
 def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
     """Return the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
 

@@ -334,7 +334,7 @@ def growth_found_figure(simulation: Simulation) -> Figure:
 
 ZONES_OF_RUN = Kind("zones_figure", f"{RUN_FIGURES}/zones.png", "pictures:zones_picture", target="", paper=True)
 RUNS = Kind(
-    "study_runs",
+    "run_tables",
     f"{STUDY}/runs.html",
     section="Folding",
     title="Parameters of the runs",

@@ -99,8 +99,6 @@ FOLDING = {
 
 MEASURES = {name: f"{PLACE}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
 """Tables that are made for every brain, whatever hemispheres it has."""
-DISPLACEMENT = f"{RUN}/metrics/displacement.csv"
-VOLUMES = {"volumes": f"{BRAIN}/metrics/volumes.csv", "scores": f"{BRAIN}/metrics/published_centiles.csv"}
 
 READY = {
     f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"

@@ -4,7 +4,7 @@ import nibabel as nib
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import rigid
+from shapes import rigid, scaling
 
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import LabelVolume, read_label_volume, read_volume_map, write_label_volume
@@ -141,6 +141,12 @@ def test_written_volume_comes_back(tmp_path, labels, shear):
     assert np.array_equal(back.labels, labels)
     assert back.affine == pytest.approx(affine, abs=1e-5)
     assert nib.load(tmp_path / "a.nii.gz").get_data_dtype() == np.uint8
+
+
+def test_volumes_of_labels_are_their_voxels_in_ml():
+    labels = np.zeros((4, 5, 6), np.int32)
+    labels[0, :, :], labels[1, :2, :3] = 7, 2
+    assert LabelVolume(labels, scaling((2.0, 5.0, 1.0))).volumes_ml == {2: pytest.approx(0.06), 7: pytest.approx(0.3)}
 
 
 def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, labels):

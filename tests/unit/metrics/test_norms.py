@@ -10,15 +10,17 @@ from scipy import stats
 
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.norms import (
+    LabelledBrain,
     measured_norms,
     measured_scores,
     norm_curves,
     published_norms,
     published_scores,
     structure_volumes,
+    volume_tables,
 )
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
-from gyriflow.settings.terms import SPREAD_UNKNOWN
+from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 
 FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))
@@ -163,6 +165,25 @@ def test_structures_of_the_norms_scheme_and_of_others() -> None:
     assert others == ["cortex", "white_matter"]
     scores = published_scores(found | {"cortex": 9.0}, 21.0, NORMS, others)
     assert scores["flag"].tolist() == ["other labels"] * 2
+
+
+def test_tables_of_volumes_have_the_labels_and_the_structures_of_each_brain():
+    brains = [
+        LabelledBrain("a", 21.0, SIDES, SCHEMES["feta-7"], {2: 8.0, 9: 1.5}),
+        LabelledBrain("b", 29.0, ("left",), SCHEMES["dhcp-19"], {7: 2.0, 3: 9.0}),
+    ]
+    volumes, scores = volume_tables(brains, NORMS)
+    assert volumes.to_numpy().tolist() == [
+        ["a", "real", 21.0, 2, "cortex", 8.0],
+        ["a", "real", 21.0, 9, "", 1.5],
+        ["b", "real", 29.0, 7, SCHEMES["dhcp-19"].labels[7], 2.0],
+        ["b", "real", 29.0, 3, SCHEMES["dhcp-19"].labels[3], 9.0],
+    ]
+    assert scores[["subject", "structure", "value", "week", "flag"]].to_numpy().tolist() == [
+        ["a", "cortex", 8.0, 21.0, "other labels"],
+        ["b", "cortex", 9.0, 29.0, "one hemisphere"],
+        ["b", "left_lateral_ventricle", 2.0, 29.0, "ok"],
+    ]
 
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]

@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
@@ -10,6 +11,7 @@ from scripts import run_script
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.figures import picture_addresses
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_table, write_text
+from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.yaml_files import write_yaml
 
 from .test_page import BRAINS, MEASURES, PAGE, PARTS, PROVENANCE, RUNS, VALIDATION
@@ -48,6 +50,11 @@ def folder(tmp_path, monkeypatch):
         zones = {"order": 1, "clamped_share": 0.1, "initial_penetration_mm": 0.2, "elements_through_cortex": 2.5}
         write_json(f"{at}/folding/zones.json", zones)
         write_text(f"{at}/folding/steps.csv", f"week,elements_through_cortex\n22.0,{2.5 - number}\n")
+        for week in (22.0, 23.0):
+            moved = (1 + number) * (week - 22.0) * np.array([1.0, 0.0, 0.0])
+            write_frame(f"{at}/{week}.h5", week, {"positions": np.vstack([np.zeros(3), np.eye(3)]) + moved})
+        frames = [f"{at}/{week}.h5" for week in (22.0, 23.0)]
+        join_frames(f"{at}/folding/frames.h5", np.array([[0, 1, 2, 3]]), frames)
         write_text(f"{at}/benchmarks/simulate.tsv", f"s\tcpu_time\tmax_rss\n{3600 + 3600 * number}\t7200\t100\n")
         write_text(f"{at}/logs/simulate.log", f"2026-01-01 10:00:00,000 WARNING root: of {run}\n")
     return tmp_path
@@ -123,13 +130,17 @@ def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(fo
 
 def test_tables_tell_runs_and_what_they_took_apart(folder):
     files = {"params": "params.yaml", "steps": "folding/steps.csv"}
-    files |= {"summaries": "folding/summary.json", "zones": "folding/zones.json"}
-    inputs, outputs = {kind: of_runs(file) for kind, file in files.items()}, {"csv": "runs.csv", "table": "runs.html"}
-    run_script("study_runs.py", folder, inputs, outputs, {"folded": FOLDED, "growth_of": GROWTH})
+    files |= {"summaries": "folding/summary.json", "zones": "folding/zones.json", "frames": "folding/frames.h5"}
+    inputs = {kind: of_runs(file) for kind, file in files.items()}
+    outputs = {"csv": "runs.csv", "table": "runs.html", "displacement": "displacement.csv"}
+    run_script("run_tables.py", folder, inputs, outputs, {"folded": FOLDED, "growth_of": GROWTH})
     columns = ["run", "subject", "growth_of", "thickness_mm", "least_elements_through_cortex", "steps"]
     assert read_table("runs.csv")[columns].to_numpy().tolist() == [
         ["thin", "young", "own", 1.5, 2.5, 7], ["thick", "old", "population P", 2.5, 1.5, 8]]  # fmt: skip
     assert re.findall(r"(own|population P)</td>", read_text("runs.html")) == GROWTH
+    moved = read_table("displacement.csv")
+    assert moved[["subject", "run", "mean_mm"]].drop_duplicates().to_numpy().tolist() == [
+        ["young", "thin", 1.0], ["old", "thick", 2.0]]  # fmt: skip
     pattern = r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"
     outputs = {"csv": "resources.csv", "table": "resources.html", "warnings": "warnings.csv"}
     params = {"folded": FOLDED, "brains": ["young", "old"], "benchmarks": {"simulate": pattern}}

@@ -13,7 +13,7 @@ HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\t
 PATTERNS = {
     "pial_from_labels": r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$",
     "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
-    "study_runs": r"results/study/benchmarks/study_runs\.tsv$",
+    "run_tables": r"results/study/benchmarks/run_tables\.tsv$",
 }
 
 
@@ -129,7 +129,7 @@ def test_what_could_not_be_measured_is_nan(tmp_path):
     write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line("-", "-", "-"))
     write(tmp_path, "runs/one/a/benchmarks/simulate.tsv", head="")
     write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0\t0:00:05", head="s\th:m:s")
-    write(tmp_path, "study/benchmarks/study_runs.tsv")
+    write(tmp_path, "study/benchmarks/run_tables.tsv")
     jobs = read_benchmarks(tmp_path, PATTERNS)
     assert len(jobs) == 5
     np.testing.assert_array_equal(jobs["wall_s"], [0.3, np.nan, np.nan, 5.0, np.nan])

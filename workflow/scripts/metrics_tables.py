@@ -1,0 +1,42 @@
+"""The metrics of all brains in one table each, and what follows: change, asymmetry, norms, distances of spectra."""
+
+import pandas as pd
+
+from gyriflow.io.files import read_json, read_tables, write_table
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.norms import (
+    LabelledBrain,
+    measured_norms,
+    measured_scores,
+    norm_curves,
+    published_norms,
+    volume_tables,
+)
+from gyriflow.metrics.spangy import spectral_distances
+from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, wide_table
+from gyriflow.step import step
+
+files, params = snakemake.input, snakemake.params
+with step(snakemake.log[0]):
+    tables = {name: read_tables(files[name]) for name in ("metrics", "spectra", "regions") if files[name]}
+    metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
+    people = metrics.assign(person=metrics["subject"].map(params.subjects))
+    parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
+    tables |= {
+        "metrics_long": (long := long_table([metrics, *regions])),
+        "metrics_wide": wide_table(long, params.covariates),
+        "change": change_between_scans(long, params.scans),
+        "asymmetry": pd.concat(parts, ignore_index=True),
+        "norms": measured_norms(people, params.reference),
+        "norm_curves": norm_curves(people, params.reference, individuals=params.individuals),
+        "centiles": measured_scores(people, params.reference, individuals=params.individuals),
+        "spectral_distance": spectral_distances(tables["spectra"]),
+    }
+    if files.labelled:
+        volumes = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
+        volumes = [{int(label): ml for label, ml in of_labels.items()} for of_labels in volumes]
+        brains = [LabelledBrain(*brain, of) for brain, of in zip(params.labelled, volumes, strict=True)]
+        norms = published_norms(read_yaml(files.norms))
+        tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
+    for name, path in snakemake.output.items():
+        write_table(path, tables[name])

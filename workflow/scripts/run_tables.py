@@ -1,0 +1,39 @@
+"""Parameters, zones and summaries of all runs, a row each and as a table for the report, and their displacements."""
+
+import pandas as pd
+
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
+from gyriflow.io.figures import write_html
+from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.tables import weekly_norms
+from gyriflow.report.tables import OF_EVERY_RUN, html_table, resolution_over_steps, runs_table
+from gyriflow.settings.terms import run_names
+from gyriflow.step import step
+
+BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through_cortex")
+
+files, output, folded = snakemake.input, snakemake.output, snakemake.params.folded
+with step(snakemake.log[0]):
+    rows, runs, displacements = [], {}, []
+    of_files = zip(files.params, files.summaries, files.zones, files.steps, files.frames, strict=True)
+    of_runs = zip(run_names(folded), folded, snakemake.params.growth_of, of_files, strict=True)
+    for name, (run, brain), grown, (params, summary, zones, steps, frames) in of_runs:
+        report = read_json(zones)
+        before = {name: report[name] for name in BEFORE_THE_SOLVE}
+        resolved = resolution_over_steps(report["order"], read_table(steps))
+        settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
+        settings["growth_of"] = grown
+        rows.append({"run": run, "subject": brain, **settings, **found})
+        # the shapes that a run grows towards are in files
+        settings.pop("targets", None)
+        runs[name] = settings | {key: value for key, value in found.items() if key in OF_EVERY_RUN}
+        weeks = read_weeks(frames)
+        positions = [read_positions(frames, week) for week in weeks]
+        _, pial = boundary_surface(TetrahedralMesh(positions[0], read_tets(frames)))
+        moved = weekly_norms(weeks, positions, pial)
+        displacements.append(moved.assign(subject=brain, run=run)[["subject", "run", *moved.columns]])
+    write_table(output.csv, pd.json_normalize(rows))
+    write_html(output.table, html_table(runs_table(runs)))
+    write_table(output.displacement, pd.concat(displacements, ignore_index=True))
