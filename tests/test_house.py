@@ -19,13 +19,14 @@ from gyriflow.version import RELEASE
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-GROUND = {"errors", "units", "quantities"}
+GROUND = {"errors", "units", "quantities", "formats"}
 PLAIN = GROUND | {"geometry", "settings"}
-"""What every room may import: errors, units, quantities, plain geometry and typed settings."""
+"""What every room may import: errors, units, quantities, formats of files, plain geometry and typed settings."""
 ARROWS = {
     "errors": set(),
     "units": set(),
     "quantities": set(),
+    "formats": set(),
     "code_hash": set(),
     "shipped": set(),
     "version": {"shipped"},

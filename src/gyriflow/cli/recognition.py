@@ -13,21 +13,20 @@ import numpy as np
 from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
+from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES
 from ..io.files import files_in, read_json
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean
 from ..study.participants import Scan, covariates, read_scans
 
-VOLUMES = (".nii", ".nii.gz", ".mgz", ".mgh")
-SURFACES = (".gii", ".vtk", ".vtp", ".stl", ".ply", ".obj")
-FREESURFER = re.compile(r"[lr]h\.(?:pial|white)")
 LABEL_NAME = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
 SIDE_NAME = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
 LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
 WEEK_NAME = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
+_SUFFIX_WORDS = sorted({word for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES) for word in suffix[1:].split(".")})
 SUFFIXES = re.compile(
-    r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|nii|gz|mgz|mgh|gii|vt[kp]|stl|ply|obj)(?=[._-]|$)",
+    rf"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|{'|'.join(_SUFFIX_WORDS)})(?=[._-]|$)",
     re.IGNORECASE,
 )
 SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.*[_/])?(ses-[A-Za-z0-9]+))?")
@@ -158,7 +157,7 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
     surfaces: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
         kind, side = LAYER_NAME.search(file.name), SIDE_NAME.search(file.name)
-        if kind and side and (file.name.lower().endswith(SURFACES) or FREESURFER.fullmatch(file.name)):
+        if kind and side and file.name.lower().endswith(SURFACE_SUFFIXES):
             rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", file.name)))
             sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
             sides["left" if side[1] else "right"] = file
@@ -177,7 +176,7 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
 
 
 def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
-    volumes = [file for file in files if file.name.lower().endswith(VOLUMES)]
+    volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
     for file in volumes:
         if LABEL_NAME.search(file.name):
             try:

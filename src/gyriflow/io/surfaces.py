@@ -6,7 +6,7 @@ Where a file says in which space its coordinates are, they are brought to scanne
 import hashlib
 import logging
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +20,7 @@ from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..formats import SURFACE_SUFFIXES, format_of
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
 from ..settings.terms import NO_REGION, STRUCTURES, Side
@@ -28,10 +29,10 @@ from .files import AnyPath, atomic_write, read_json, reading, require_finite
 log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
-MESH_SUFFIXES = (".stl", ".ply", ".obj")
-VTK_SUFFIXES = (".vtk", ".vtp")
-SURFACE_KINDS = ".surf.gii, .vtk, .vtp, .stl, .ply, .obj, or FreeSurfer's own binary kind, such as lh.pial"
+SURFACE_NAMES = f"a file that ends in {', '.join(SURFACE_SUFFIXES)}"
 FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
+RawSurface = tuple[Floats, NDArray, str | None, str | None]
+"""Points and faces as a file has them, the space of the points and the structure, None where it does not say so."""
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
@@ -53,16 +54,11 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
     "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
     """
     path = Path(path)
-    with reading(path, "a surface", SURFACE_KINDS):
-        if path.suffix.lower() in MESH_SUFFIXES:
-            vertices, faces, space, structure = *_read_with_trimesh(path), None, None
-        elif path.suffix.lower() in VTK_SUFFIXES:
-            vertices, faces, space, structure = *_read_with_pyvista(path), None, None
-        elif path.suffix.lower() == ".gii" or path.name.endswith(".gii.gz"):
-            vertices, faces, space, structure = _read_gifti_surface(path)
-        else:
-            vertices, faces, space = _read_freesurfer_surface(path)
-            structure = FREESURFER_SIDES.get(path.name.split(".")[0])
+    found = format_of(path, "surface")
+    # FreeSurfer's files have many endings
+    read = SURFACE_READERS[found.name if found else "FreeSurfer"]
+    with reading(path, "a surface", SURFACE_NAMES):
+        vertices, faces, space, structure = read(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
         shapes = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
         raise InputError("holds no surface", path=path, found=shapes, expected="(n, 3) points and (m, 3) faces")
@@ -102,7 +98,7 @@ def _read_side(path: AnyPath, side: Side) -> tuple[TriangleMesh, str | None]:
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
     """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()
-    if suffix in MESH_SUFFIXES:
+    if suffix in (".stl", ".ply", ".obj"):
         import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -166,7 +162,8 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     InputError for missing or truncated files, more than one array, another number of values than of vertices, NaN and
     infinite values, and STL surfaces, which have no order of vertices.
     """
-    if str(surface_path).lower().endswith(".stl"):
+    found = format_of(surface_path, "surface")
+    if found and found.name == "STL":
         problem = "is no surface that a map can belong to, since STL files do not number their vertices"
         raise InputError(problem, path=surface_path, expected=f"the GIFTI, PLY or OBJ file that {path} was made on")
     surface = read_surface(surface_path)
@@ -198,7 +195,7 @@ def load_gifti(path: AnyPath) -> GiftiImage:
     return image
 
 
-def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None, str | None]:
+def _read_gifti_surface(path: Path) -> RawSurface:
     image = load_gifti(path)
     points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
     triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
@@ -213,22 +210,23 @@ def _read_gifti_surface(path: Path) -> tuple[Floats, NDArray, str | None, str | 
     return vertices, np.asarray(triangles[0].data), space, structure
 
 
-def _read_with_trimesh(path: Path) -> tuple[Floats, NDArray]:
+def _read_with_trimesh(path: Path) -> RawSurface:
+    # VTK's readers of these formats end the process on damaged PLY files and leave polygons as they are
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
     body = trimesh.load_mesh(path, process=path.suffix.lower() == ".stl")
-    return np.asarray(body.vertices, dtype=float), np.asarray(body.faces)
+    return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
 
 
-def _read_with_pyvista(path: Path) -> tuple[Floats, NDArray]:
+def _read_with_pyvista(path: Path) -> RawSurface:
     import pyvista as pv
 
     data = pv.read(path)
     # what VTK computes from damaged cells may end the process, so that these are taken as they are
     if not isinstance(data, pv.PolyData) or not data.n_points or not data.is_all_triangles:
         raise InputError("holds no surface", path=path, found=type(data).__name__, expected="triangles (PolyData)")
-    return np.asarray(data.points, dtype=float), np.asarray(data.regular_faces)
+    return np.asarray(data.points, dtype=float), np.asarray(data.regular_faces), None, None
 
 
 def read_pose(path: AnyPath) -> Pose:
@@ -367,19 +365,31 @@ def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
         log.warning(said, path, *centre)
 
 
-def _read_freesurfer_surface(path: AnyPath) -> tuple[Floats, Ints, str | None]:
-    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, and their space.
+def _read_freesurfer_surface(path: Path) -> RawSurface:
+    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, their space and structure.
 
     Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file, by which
     they are brought to scanner space. Without it they stay relative to that centre, and a warning says so.
     """
+    structure = FREESURFER_SIDES.get(path.name.split(".")[0])
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)
     if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
         log.warning("%s: says nothing of its volume: the coordinates are relative to its centre (tkr RAS)", path)
-        return np.asarray(vertices, dtype=float), faces, None
+        return np.asarray(vertices, dtype=float), faces, None, structure
     axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER
+    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER, structure
+
+
+SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
+    "GIFTI": _read_gifti_surface,
+    "VTK": _read_with_pyvista,
+    "STL": _read_with_trimesh,
+    "PLY": _read_with_trimesh,
+    "OBJ": _read_with_trimesh,
+    "FreeSurfer": _read_freesurfer_surface,
+}
+"""The reader of each format of surfaces."""

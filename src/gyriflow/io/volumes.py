@@ -2,9 +2,10 @@
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import nibabel as nib
 import numpy as np
@@ -12,6 +13,7 @@ from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..formats import VOLUME_SUFFIXES, format_of
 from ..geometry.triangles import Floats
 from ..settings.schemes import LabelScheme
 from ..settings.terms import AffineSource
@@ -93,10 +95,7 @@ def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[N
 
 def voxels_of(path: AnyPath) -> tuple[int, float]:
     """Return the number of voxels of a volume and the volume of one in mm³, from its header alone."""
-    with reading(path, "an image"):
-        image = nib.load(path)
-        if not isinstance(image, SpatialImage):
-            raise InputError("is no volume", path=path, found=type(image).__name__)
+    image = _load(path)
     unit = _length_unit(image.header, path) if isinstance(image, nib.Nifti1Pair) else "mm"
     size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
     return math.prod(map(int, image.shape[:3])), float(size.prod())
@@ -104,8 +103,7 @@ def voxels_of(path: AnyPath) -> tuple[int, float]:
 
 def names_unit(path: AnyPath) -> bool:
     """Return whether a volume's header names its unit of length; MGH has mm always."""
-    with reading(path, "an image"):
-        image = nib.load(path)
+    image = _load(path)
     return not isinstance(image, nib.Nifti1Pair) or _length_unit(image.header, path) != "unknown"
 
 
@@ -115,14 +113,31 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
     `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
     of axes, unclear orientation.
     """
-    with reading(path, "an image", f"a whole volume of {content} (.nii, .nii.gz, .mgz)"):
-        image = nib.load(path)
-        if not isinstance(image, SpatialImage):
-            raise InputError("is no volume", path=path, found=type(image).__name__, expected=f"a volume of {content}")
-        _require_its_size(image, path)
+    image = _load(path, content)
+    with reading(path, "an image", _expected(content)):
+        if nib.is_proxy(image.dataobj):
+            _require_its_size(image, path)
         values = np.asanyarray(image.dataobj)
     values = _three_axes(values, path, content)
     return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
+
+
+VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}
+"""The reader of each format of volumes; it returns an image of nibabel, in mm if it is not NIfTI."""
+
+
+def _load(path: AnyPath, content: str = "numbers") -> SpatialImage:
+    found = format_of(path, "volume")
+    with reading(path, "an image", _expected(content)):
+        # nibabel knows other formats by what is in them
+        image = VOLUME_READERS[found.name if found else "NIfTI"](path)
+        if not isinstance(image, SpatialImage):
+            raise InputError("is no volume", path=path, found=type(image).__name__, expected=_expected(content))
+    return image
+
+
+def _expected(content: str) -> str:
+    return f"a whole volume of {content} ({', '.join(VOLUME_SUFFIXES)})"
 
 
 def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> ScalarVolume:

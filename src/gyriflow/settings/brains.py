@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
+from ..formats import is_volume
 from .base import InputFile, KeyProblem, Settings
 from .schemes import Label
 from .synthetic import ShapeSettings
@@ -12,9 +13,6 @@ from .varying import FileOrPair, Week, files_of
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """A brain has exactly one of these keys."""
-
-VOLUME_SUFFIXES = (".nii", ".nii.gz", ".mgz", ".mgh")
-"""How the names of volumes end."""
 
 HEMISPHERE_LABELS, HEMISPHERE_SURFACE = "labels of a hemisphere", "a hemisphere's surface"
 LABEL_SOURCES = ("labels", HEMISPHERE_LABELS)
@@ -125,8 +123,7 @@ class Brain(Settings):
     def _kind(self) -> str:
         if self.hemisphere is None:
             return self.source
-        volume = self.hemisphere.file.lower().endswith(VOLUME_SUFFIXES)
-        return HEMISPHERE_LABELS if volume else HEMISPHERE_SURFACE
+        return HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
 
     def problems(self) -> Iterator[KeyProblem]:
         given = [key for key in SOURCES if self.is_set(key)]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
 from pydantic.fields import FieldInfo
 
+from ..formats import format_of, is_volume
 from .base import InputFile, KeyProblem, Settings
 
 Maps = Mapping[str, NDArray[np.float64]]
@@ -65,9 +66,9 @@ class Varying(Settings):
             yield KeyProblem("has a `surface` but no `map`", ("surface",))
         elif surfaces and len(maps) != len(surfaces):
             yield KeyProblem("should have as many files as `map`", ("surface",))
-        elif surfaces and any(path.endswith((".nii", ".nii.gz")) for path in maps):
+        elif surfaces and any(map(is_volume, maps)):
             yield KeyProblem("is not used if the map is a volume; remove it", ("surface",))
-        elif not surfaces and (len(maps) > 1 or any(path.endswith(".gii") for path in maps)):
+        elif not surfaces and (len(maps) > 1 or any(format_of(path, "surface") for path in maps)):
             yield KeyProblem("is missing; it is the surface that the values of the map belong to", ("surface",))
 
 

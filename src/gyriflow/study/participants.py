@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..formats import is_volume
 from ..io.files import read_json, read_tab_separated
 from ..settings.base import located, path_in
-from ..settings.brains import SOURCES, VOLUME_SUFFIXES
+from ..settings.brains import SOURCES
 from ..settings.participants import ParticipantsSettings
 from ..settings.varying import WEEKS
 
@@ -209,4 +210,4 @@ def _of_files(files: list[str], side: str | None) -> dict[str, str]:
         return {"hemisphere.file": files[0], "hemisphere.side": side}
     if len(files) == 2:
         return {"hemispheres.left": files[0], "hemispheres.right": files[1]}
-    return {"labels" if files[0].lower().endswith(VOLUME_SUFFIXES) else "pial": files[0]}
+    return {"labels" if is_volume(files[0]) else "pial": files[0]}

@@ -1,0 +1,96 @@
+"""Each format of surfaces and volumes is read, recognised by `gyriflow init`, and hidden where a report shows keys."""
+
+import gzip
+
+import nibabel as nib
+import numpy as np
+import pytest
+import pyvista as pv
+from nibabel.freesurfer.io import write_geometry
+from pydantic import ValidationError
+from shapes import sphere
+
+from gyriflow.cli.recognition import recognise
+from gyriflow.formats import FORMATS, is_volume
+from gyriflow.io.surfaces import SURFACE_READERS, read_surface, write_surface
+from gyriflow.io.volumes import VOLUME_READERS, read_label_volume
+from gyriflow.report.page import hide_paths
+from gyriflow.settings.brains import Brain
+
+BALL = sphere(20.0, 2)
+LABELS = np.zeros((4, 5, 6), dtype=np.uint8)
+LABELS[1:3, 1:4, 1:5] = 1
+
+
+def save_surface(path):
+    write_surface(path, BALL)
+
+
+def save_with_vtk(path):
+    pv.PolyData.from_regular_faces(BALL.vertices, BALL.faces).save(path)
+
+
+def save_volume(kind):
+    return lambda path: nib.save(kind(LABELS.astype(np.int16), np.eye(4)), path)
+
+
+WRITERS = {
+    **dict.fromkeys(("GIFTI", "STL", "PLY", "OBJ"), save_surface),
+    "VTK": save_with_vtk,
+    "FreeSurfer": lambda path: write_geometry(path, BALL.vertices, BALL.faces),
+    "NIfTI": save_volume(nib.Nifti1Image),
+    "NIfTI pair": save_volume(nib.Nifti1Pair),
+    "MGH": save_volume(nib.MGHImage),
+}
+
+
+def written(form, folder, stem, suffix):
+    """Write a file of a format and return its path; what is packed is packed afterwards."""
+    WRITERS[form.name](folder / f"{stem}{suffix.removesuffix('.gz')}")
+    if suffix.endswith(".gz"):
+        for path in folder.glob(f"{stem}.*"):
+            path.with_name(f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes()))
+            path.unlink()
+    return folder / f"{stem}{suffix}"
+
+
+@pytest.mark.parametrize(
+    ("form", "suffix"),
+    [(form, suffix) for form in FORMATS for suffix in form.all_suffixes],
+    ids=lambda value: str(value),
+)
+def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
+    # FreeSurfer's ending is the layer
+    pial = "" if suffix in (".pial", ".white") else ".pial"
+    stems = ["case_week22_dseg"] if form.content == "volume" else [f"lh{pial}", f"rh{pial}"]
+    paths = [written(form, tmp_path, stem, suffix) for stem in stems]
+    if suffix == ".white":
+        for side in ("lh", "rh"):
+            written(form, tmp_path, side, ".pial")
+    for path in paths:
+        if form.content == "surface":
+            surface = read_surface(path)
+            assert np.sort(surface.vertices, axis=None) == pytest.approx(np.sort(BALL.vertices, axis=None), abs=1e-4)
+        else:
+            assert (read_label_volume(path).labels == LABELS).all()
+        assert is_volume(path) == (form.content == "volume")
+        assert hide_paths({"file": path.name}) == {"file": "(file)"}
+    (found,) = recognise(tmp_path)
+    # a pair is named by its header
+    assert all(repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths)
+
+
+def test_each_format_has_a_reader_and_each_reader_a_format():
+    readers = {"surface": SURFACE_READERS, "volume": VOLUME_READERS}
+    for content, by_name in readers.items():
+        assert list(by_name) == [form.name for form in FORMATS if form.content == content]
+    suffixes = [suffix for form in FORMATS for suffix in form.all_suffixes]
+    assert len(suffixes) == len(set(suffixes))
+
+
+@pytest.mark.parametrize("suffix", [".nii.gz", ".HDR", ".mgz"])
+def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
+    one = {"id": "a", "week": 22, "hemisphere": {"file": f"a{suffix}", "side": "left"}}
+    assert Brain(**one, scheme="feta-7").has_labels
+    with pytest.raises(ValidationError, match="scheme"):
+        Brain(**one)
