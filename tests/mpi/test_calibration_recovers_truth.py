@@ -6,7 +6,14 @@ import pytest
 from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
-from gyriflow.compare.calibration import calibrated_parameters, fit, optimum, propose, size_score, sobol_design
+from gyriflow.compare.calibration import (
+    calibrated_parameters,
+    find_optimum,
+    fit_surrogate,
+    propose_runs,
+    size_score,
+    sobol_design,
+)
 from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
@@ -50,8 +57,8 @@ def test_the_rate_of_a_simulated_brain_is_recovered(tmp_path):
 
     runs = scored(sobol_design(BOUNDS, 4, seed=0))
     for _ in range(2):
-        runs = pd.concat([runs, scored(propose(fit(runs, BOUNDS, seed=0), 2))], ignore_index=True)
-    best = optimum(fit(runs, BOUNDS, seed=0)).set_index("parameter")
+        runs = pd.concat([runs, scored(propose_runs(fit_surrogate(runs, BOUNDS, seed=0), 2))], ignore_index=True)
+    best = find_optimum(fit_surrogate(runs, BOUNDS, seed=0)).set_index("parameter")
     for name, truth in TRUTH.items():
         # the stated error: a fiftieth of the range
         assert best.loc[name, "value"] == pytest.approx(truth, abs=0.02 * np.ptp(BOUNDS[name])), best.to_string()

@@ -54,8 +54,15 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_
     assert table.loc["largest displacement, 21-22 GW (mm)", "verdict"] == "not run"
     assert tuple(table.loc["all thicknesses come to 28 GW", ["here", "verdict"]]) == ("2 of 2 runs", "as in the paper")
     assert table.loc["ratios of 1 to 20 come to 29 GW", "verdict"] == "not run"
+    nearest = pd.read_csv(folder / "paper_nearest.csv")
+    assert set(nearest["study"]) == {"thickness"}
+    assert dict(zip(nearest["measure"].str.removesuffix("_weyl"), nearest["paper"], strict=True)) == {
+        "relative_power_B4": 2.25,
+        "relative_power_B5": 0.8,
+    }
+    assert "paper" not in pd.read_csv(folder / "thickness" / "nearest.csv")
     page = (folder / "replication.html").read_text()
-    assert all(said in page for said in ("<p>Study thickness at 28 GW against", "dHCP", "2 of 2 runs"))
+    assert all(said in page for said in ("sweep thickness at 28 GW", "dHCP", "2 of 2 runs"))
     # nothing is left to do, and only what a change concerns runs again
     assert workflow.jobs("studies", "--configfile", name) == {}
     study["studies"]["rate"] = rates | {"vary": {"growth_rate_per_s": [1e-7, 1.5e-7]}}

@@ -1,7 +1,8 @@
 # Studies: runs that differ from one in a few parameters, measured at one week and compared with real brains of it.
 #
 # results/study/STUDY/ holds members (a row a run: values, resolution, outcome with its cause, time), comparison (how far
-# each is from each real brain by each measure), and nearest (which is nearest, with the paper's beside it). A run that has diverged before the week of comparison stands in `members` alone.
+# each is from each real brain by each measure), and nearest (which is nearest by each measure). A run that has diverged
+# before the week of comparison is in `members` alone.
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the real brains, none where it has not come there."""
     compared = study.comparisons[wildcards.study]
@@ -49,7 +50,6 @@ rule study_tables:
         params=from_members(PARAMETERS),
         summaries=from_members(FOLDING["summary"]),
         zones=from_members(FOLDING["zones"]),
-        published=PUBLISHED,
     output:
         members=f"{SWEEP}/members.csv",
         comparison=f"{SWEEP}/comparison.csv",
@@ -83,6 +83,7 @@ rule replication:
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
+        nearest=f"{STUDY}/paper_nearest.csv",
     log:
         f"{STUDY}/logs/replication.log",
     benchmark:

@@ -1,8 +1,8 @@
-"""The parameters of the runs of a round: spread over the bounds in the first, where the surrogate hopes most later."""
+"""Parameters of the runs of a round: spread over the bounds in the first, later where the surrogate expects most."""
 
 import pandas as pd
 
-from gyriflow.compare.calibration import fit, propose, sobol_design
+from gyriflow.compare.calibration import fit_surrogate, propose_runs, sobol_design
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 
@@ -11,7 +11,7 @@ with step(snakemake.log[0]):
     count = len(params.runs)
     if earlier:
         scores = pd.concat(map(read_table, earlier), ignore_index=True)
-        design = propose(fit(scores, params.bounds, params.seed), count)
+        design = propose_runs(fit_surrogate(scores, params.bounds, params.seed), count)
     else:
         design = sobol_design(params.bounds, count, params.seed)
     design.insert(0, "run", params.runs)

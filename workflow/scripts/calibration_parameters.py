@@ -1,4 +1,4 @@
-"""The parameters of a run of the calibration: those of the base run with the values of the run's round."""
+"""Parameters of a run of the calibration: those of the base run with the values from the design of its round."""
 
 from gyriflow.compare.calibration import calibrated_parameters
 from gyriflow.io.files import read_table

@@ -1,8 +1,8 @@
-"""What a calibration has found: its runs, and the optimum."""
+"""The runs of a calibration with their scores, and the optimum."""
 
 import pandas as pd
 
-from gyriflow.compare.calibration import fit, optimum
+from gyriflow.compare.calibration import find_optimum, fit_surrogate
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 
@@ -10,4 +10,4 @@ params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
     runs = pd.concat(map(read_table, snakemake.input.scores), ignore_index=True)
     write_table(output.runs, runs)
-    write_table(output.optimum, optimum(fit(runs, params.bounds, params.seed)))
+    write_table(output.optimum, find_optimum(fit_surrogate(runs, params.bounds, params.seed)))

@@ -1,31 +1,32 @@
-"""What the paper reports beside the same of this study, with a verdict on each: a table and a page."""
+"""What the paper reports, compared with the same of this study: two tables, and a page with the verdicts."""
 
 from markupsafe import Markup
 
-from gyriflow.compare.published import StudyTables, comparison_caption, replication
+from gyriflow.compare.published import SweepTables, comparison_caption, published_nearest, replication_table
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.tables import html_table
 from gyriflow.step import step
 
-NAMES = ("members", "comparison", "nearest")
-files, params = snakemake.input, snakemake.params
+files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    parts = (map(read_table, files[name]) for name in NAMES)
-    tables = dict(zip(params.studies, zip(*parts, strict=True), strict=True))
-    studies = {
-        name: StudyTables(**params.studies[name], **dict(zip(NAMES, of, strict=True))) for name, of in tables.items()
+    sweeps = {
+        name: SweepTables(
+            **asked, **{table: read_table(files[table][number]) for table in ("members", "comparison", "nearest")}
+        )
+        for number, (name, asked) in enumerate(params.studies.items())
     }
     published = read_yaml(files.published)
     displacement, summary = read_table(files.displacement), read_json(files.summary[0])
     run, brain = params.run
     displacement = displacement[(displacement["run"] == run) & (displacement["subject"] == brain)]
-    table = replication(published, displacement, list(studies.values()), summary)
-    write_table(snakemake.output.csv, table)
-    said = [
-        f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}."
+    table = replication_table(published, displacement, list(sweeps.values()), summary)
+    write_table(output.csv, table)
+    write_table(output.nearest, published_nearest(published, sweeps))
+    lines = [
+        f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}.",
+        *(comparison_caption(name, sweep.week, sweep.comparison) for name, sweep in sweeps.items()),
     ]
-    said += [comparison_caption(name, study.week, study.comparison) for name, study in studies.items()]
-    body = html_table(table)
-    write_html(snakemake.output.page, Markup("").join(Markup("<p>{}</p>\n").format(line) for line in said) + body)
+    paragraphs = Markup("").join(Markup("<p>{}</p>\n").format(line) for line in lines)
+    write_html(output.page, paragraphs + html_table(table))

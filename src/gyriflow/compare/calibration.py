@@ -1,7 +1,7 @@
-"""Calibration: designs of its rounds, the scores of their runs, and a surrogate that says where the least may be."""
+"""Calibration: parameters of the runs of a round, their scores, and a surrogate with its minimum."""
 
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -16,50 +16,51 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
+from .distances import aligned_distances
 from .placement import MEASURES, correlation, interpolate_measures
-from .shapes import PreparedSurface, curvature_differences
+from .shapes import PreparedSurface, curvature_differences, prepare_for_comparison
 
 DIGITS = 6
 """Significant digits of calibrated values."""
-CANDIDATES = 1024
-"""Points of a Sobol sequence at which the surrogate is looked at."""
-APART = 0.02
-"""Least distance of runs of a round from each other and from earlier runs, in the unit box."""
+N_CANDIDATES = 1024
+"""Points of a Sobol sequence at which the surrogate is evaluated."""
+MIN_SPACING = 0.02
+"""Distance in the unit box that a new run keeps from all others."""
 
 
 def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -> pd.DataFrame:
-    """Spread `count` rows of values evenly over the box of the bounds: a scrambled Sobol sequence.
+    """Spread `count` rows of values evenly over the bounds, by a scrambled Sobol sequence (Sobol 1967; Owen 1998).
 
-    The same seed gives the same rows. Source: Sobol 1967; Owen 1998 for the scrambling.
+    The same seed gives the same rows.
     """
-    # the sequence is balanced over powers of two; its first rows are taken
+    # the sequence is balanced over powers of two
     power = int(np.ceil(np.log2(max(count, 2))))
     points = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed)).random_base2(power)[:count]
-    return in_bounds(points, bounds)
+    return from_unit_box(points, bounds)
 
 
-def in_bounds(points: Floats, bounds: Mapping[str, Sequence[float]]) -> pd.DataFrame:
+def from_unit_box(points: Floats, bounds: Mapping[str, Sequence[float]]) -> pd.DataFrame:
     """Scale (n, d) points of the unit box to values between the bounds, in columns of the parameters' names."""
     low, high = np.transpose(list(bounds.values()))
     values = low + points * (high - low)
     return pd.DataFrame(values, columns=list(bounds)).map(lambda value: float(f"{value:.{DIGITS}g}"))
 
 
-def in_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> Floats:
+def to_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> Floats:
     """Scale rows of values to (n, d) points of the unit box."""
     low, high = np.transpose(list(bounds.values()))
     return np.asarray((values[list(bounds)].to_numpy(dtype=float) - low) / (high - low))
 
 
 def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
-    """Return the content of `params.yaml` of a run of a calibration, which ends at a week.
+    """Return the content of `params.yaml` for a run of a calibration that ends at a week.
 
     Parameters
     ----------
     base
-        Content of that of the base run.
+        Content of `params.yaml` of the base run.
     values
-        By parameter: a key with dots for inner ones, `stiffness_ratio`, or `KEY.amplitude`, which scales a curve.
+        By parameter: a key, with dots for nested ones, `stiffness_ratio`, or `KEY.amplitude`, which scales a curve.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
@@ -80,33 +81,91 @@ def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
     return {week: factor * value for week, value in curve.items()}
 
 
-def size_score(simulated: TriangleMesh, real: TriangleMesh) -> float:
-    """Return √(a² + v²) with a, v the relative differences in area and volume of two closed surfaces as they are."""
-    return float(np.hypot(area(simulated) / area(real) - 1, signed_volume(simulated) / signed_volume(real) - 1))
+def size_score(simulated: TriangleMesh, observed: TriangleMesh) -> float:
+    """Return √(a² + v²) with a, v the relative differences in area and volume of two closed surfaces."""
+    relative_volume = signed_volume(simulated) / signed_volume(observed)
+    return float(np.hypot(area(simulated) / area(observed) - 1, relative_volume - 1))
 
 
-SIZE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {"size": size_score}
-"""Those scores that compare closed surfaces, simulated and real, as they are."""
+def distance_score(simulated: TriangleMesh, observed: TriangleMesh) -> float:
+    """Return distance_mm of `distances.aligned_distances`."""
+    return aligned_distances(simulated, observed)["distance_mm"]
 
 
-def shape_scores(run: PreparedSurface, real: PreparedSurface, names: Collection[Score]) -> dict[Score, float]:
-    """Score shapes that are ready and laid onto each other by those of `names` that compare such.
+SURFACE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {
+    "size": size_score,
+    "surface_distance": distance_score,
+}
+"""Scores that compare closed surfaces in mm, simulated and observed, without scaling."""
 
-    shape_index and mean_curvature are 1 − r of `placement.placement`, curvature_distribution is
+
+def shape_scores(simulated: PreparedSurface, observed: PreparedSurface) -> dict[Score, float]:
+    """Return the scores that compare surfaces prepared for comparison.
+
+    shape_index and mean_curvature are 1 − r with r as in `placement.score_placement`; curvature_distribution is
     curvature_distance_per_mm of `shapes.curvature_differences`.
     """
-    values, _ = interpolate_measures(run, real)
-    scores = {measure: 1 - correlation(getattr(real, measure), values[measure], real.areas) for measure in MEASURES}
-    scores["curvature_distribution"] = curvature_differences(run, real)["curvature_distance_per_mm"]
+    values, _ = interpolate_measures(simulated, observed)
+    r = {name: correlation(getattr(observed, name), values[name], observed.areas) for name in MEASURES}
+    return {
+        "shape_index": 1 - r["shape_index"],
+        "mean_curvature": 1 - r["mean_curvature"],
+        "curvature_distribution": curvature_differences(simulated, observed)["curvature_distance_per_mm"],
+    }
+
+
+def brain_scores(
+    simulated: TriangleMesh, observed: TriangleMesh, names: Collection[Score], *, radius_mm: float
+) -> dict[Score, float]:
+    """Return the scores of `names` for a simulated brain: 0 if it equals the observed one.
+
+    Both are closed surfaces in mm; `radius_mm` is that of the fitted curvature.
+    """
+    scores = {name: score(simulated, observed) for name, score in SURFACE_SCORES.items() if name in names}
+    if set(names) - set(SURFACE_SCORES):
+        prepared = (prepare_for_comparison(mesh, observed, radius_mm) for mesh in (simulated, observed))
+        scores |= shape_scores(*prepared)
     return {name: scores[name] for name in names}
+
+
+def run_score(
+    pairs: Iterable[tuple[TriangleMesh, TriangleMesh]],
+    weights: Mapping[Score, float],
+    causes: Sequence[str],
+    *,
+    radius_mm: float,
+) -> dict[str, Any]:
+    """Return the score of a run, the weighted sum of its scores' means over all pairs of brains.
+
+    Parameters
+    ----------
+    pairs
+        Simulated and observed surfaces that are compared. They are not looked at if the run has diverged.
+    weights
+        Of each score.
+    causes
+        Why simulations of the run have diverged; empty if all have finished.
+
+    Returns
+    -------
+    dict
+        score and the mean of each score in `weights`, NaN if the run has diverged; outcome ("finished" or "diverged")
+        and cause.
+    """
+    rows = [brain_scores(*pair, list(weights), radius_mm=radius_mm) for pair in pairs] if not causes else []
+    table = pd.DataFrame(rows, columns=list(weights))
+    means: dict[str, float] = {name: float(table[name].mean()) for name in weights}
+    score = sum(weight * means[name] for name, weight in weights.items())
+    outcome = {"outcome": "diverged" if causes else "finished", "cause": "; ".join(causes)}
+    return {"score": score, **means, **outcome}
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """A Gaussian process over the unit box of the bounds, the lowest and highest value by parameter.
+    """A Gaussian process over the unit box of the bounds, which are the lowest and highest value by parameter.
 
-    The process is fitted, with a Matérn kernel (ν = 5/2), a length for each parameter, and noise, to (n, d) points with
-    (n,) scores: a diverged run has one worse than all others. The seed is that of the candidates.
+    It is fitted to n runs at points (n, d) with scores (n,), a diverged run with one worse than all others. The kernel
+    is Matérn's (ν = 5/2) with a length for each parameter, and noise. `seed` is that of the candidates.
     """
 
     process: GaussianProcessRegressor
@@ -116,60 +175,63 @@ class Surrogate:
     seed: int
 
 
-def fit(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
-    """Fit the surrogate to the runs of a calibration: columns of the parameters, score (NaN: has diverged)."""
-    points, scores = in_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
+def fit_surrogate(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
+    """Fit the surrogate to the runs of a calibration: columns of the parameters, and score (NaN if diverged).
+
+    ValueError if less than two runs have a score.
+    """
+    points, scores = to_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
     finished = scores[np.isfinite(scores)]
     if len(finished) < 2:
-        raise ValueError(f"{len(finished)} runs with a score; a surrogate needs two or more")
-    # a wall that the surrogate can follow: as far above the worst as that is above the best
+        raise ValueError(f"{len(finished)} runs have a score, but a surrogate needs two or more")
+    # diverged runs are as far above the worst score as that is above the best: a wall that the surrogate can follow
     scores = np.where(np.isfinite(scores), scores, 2 * finished.max() - finished.min())
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern([0.5] * len(bounds), (0.05, 20.0), nu=2.5)
     process = GaussianProcessRegressor(
         kernel + WhiteKernel(1e-4, (1e-8, 0.3)), normalize_y=True, n_restarts_optimizer=8, random_state=seed
     )
     with warnings.catch_warnings():
-        # lengths at their bounds are those of parameters without effect
+        # the length of a parameter without effect ends at its bound
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(points, scores)
     return Surrogate(process, bounds, points, scores, seed)
 
 
-def propose(surrogate: Surrogate, count: int) -> pd.DataFrame:
-    """Choose the values of the next `count` runs: where the score is expected to improve the most.
+def propose_runs(surrogate: Surrogate, count: int) -> pd.DataFrame:
+    """Choose the values of the next `count` runs, those with the largest expected improvement of the score.
 
-    Each is added with the score that the surrogate expects before the next is chosen (the kriging believer of
-    Ginsbourger, Le Riche and Carraro 2010), so that they lie apart.
+    Each is added with its expected score before the next is chosen, so that they do not cluster (the kriging believer
+    of Ginsbourger, Le Riche and Carraro 2010).
     """
     process, points, scores = surrogate.process, surrogate.points, surrogate.scores
     candidates, chosen = _candidates(surrogate), []
     for _ in range(count):
-        free = np.linalg.norm(candidates[:, None] - points[None], axis=2).min(axis=1) >= APART
+        free = np.linalg.norm(candidates[:, None] - points[None], axis=2).min(axis=1) >= MIN_SPACING
         candidates = candidates[free] if free.any() else candidates
         best = candidates[int(expected_improvement(process, candidates, float(scores.min())).argmax())]
         chosen.append(best)
         points, scores = np.vstack([points, best]), np.append(scores, process.predict(best[None]))
         believer = GaussianProcessRegressor(surrogate.process.kernel_, optimizer=None, normalize_y=True)
         process = believer.fit(points, scores)
-    return in_bounds(np.array(chosen), surrogate.bounds)
+    return from_unit_box(np.array(chosen), surrogate.bounds)
 
 
 def expected_improvement(process: GaussianProcessRegressor, points: Floats, best: float) -> Floats:
-    """Return by how much (n, d) points are expected to be below the best score (Jones, Schonlau and Welch 1998)."""
+    """Return the expected improvement of (n, d) points over the best score, (n,) (Jones, Schonlau and Welch 1998)."""
     mean, sd = process.predict(points, return_std=True)
     sd = np.maximum(sd, 1e-12)
     gain = best - mean
     return np.asarray(gain * norm.cdf(gain / sd) + sd * norm.pdf(gain / sd))
 
 
-def optimum(surrogate: Surrogate) -> pd.DataFrame:
-    """Find the parameters where the surrogate is least.
+def find_optimum(surrogate: Surrogate) -> pd.DataFrame:
+    """Find the minimum of the surrogate.
 
     Returns
     -------
     DataFrame
-        A row per parameter: parameter, value, lowest, highest (the bounds), at_bound (whether the value is within 1 %
-        of one), score, score_sd (mean and standard deviation of the surrogate there).
+        A row per parameter: parameter, value, lowest and highest (the bounds), at_bound (whether the value is within
+        1 % of a bound), score and score_sd (mean and standard deviation of the surrogate at the minimum).
     """
     process, candidates = surrogate.process, _candidates(surrogate)
     box = [(0.0, 1.0)] * candidates.shape[1]
@@ -181,7 +243,7 @@ def optimum(surrogate: Surrogate) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "parameter": list(surrogate.bounds),
-            "value": in_bounds(best[None], surrogate.bounds).iloc[0].to_numpy(),
+            "value": from_unit_box(best[None], surrogate.bounds).iloc[0].to_numpy(),
             "lowest": lowest,
             "highest": highest,
             "at_bound": (best < 0.01) | (best > 0.99),
@@ -194,8 +256,8 @@ def optimum(surrogate: Surrogate) -> pd.DataFrame:
 def _candidates(surrogate: Surrogate) -> Floats:
     rng = np.random.default_rng(surrogate.seed)
     dimension = len(surrogate.bounds)
-    spread = qmc.Sobol(dimension, rng=rng).random(CANDIDATES)
+    spread = qmc.Sobol(dimension, rng=rng).random(N_CANDIDATES)
     best = surrogate.points[surrogate.scores.argmin()]
-    # as many near the best run, where the least is looked for
-    near = np.clip(best + 0.1 * rng.standard_normal((CANDIDATES // 2, dimension)), 0, 1)
+    # and half as many near the best run
+    near = np.clip(best + 0.1 * rng.standard_normal((N_CANDIDATES // 2, dimension)), 0, 1)
     return np.vstack([spread, near])

@@ -1,22 +1,24 @@
-"""Designs fill their bounds, scores grow with what differs, and the surrogate finds a known least."""
+"""Designs fill their bounds, scores grow with differences, and the surrogate finds a known minimum."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from gyriflow.compare.calibration import (
+    brain_scores,
     calibrated_parameters,
-    fit,
-    in_unit_box,
-    optimum,
-    propose,
+    find_optimum,
+    fit_surrogate,
+    propose_runs,
+    run_score,
     shape_scores,
     size_score,
     sobol_design,
+    to_unit_box,
 )
 from gyriflow.geometry.triangles import TriangleMesh
 
-from .bumpy import bumpy, shaped
+from .bumpy import RADIUS, bumpy, shaped
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
@@ -25,7 +27,7 @@ SCORES = ("shape_index", "mean_curvature", "curvature_distribution")
 
 def scored(design):
     """Return a design with the score of a bowl around the truth, steeper along the rate."""
-    away = in_unit_box(design, BOUNDS) - in_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
+    away = to_unit_box(design, BOUNDS) - to_unit_box(pd.DataFrame([TRUTH]), BOUNDS)
     return design.assign(score=0.1 + 0.3 * away[:, 0] ** 2 + 2.0 * away[:, 1] ** 2)
 
 
@@ -33,7 +35,7 @@ def test_a_design_fills_every_part_of_the_bounds_and_is_the_same_again():
     design = sobol_design(BOUNDS, 16, seed=3)
     pd.testing.assert_frame_equal(design, sobol_design(BOUNDS, 16, seed=3))
     assert not design.equals(sobol_design(BOUNDS, 16, seed=4))
-    points = in_unit_box(design, BOUNDS)
+    points = to_unit_box(design, BOUNDS)
     assert ((points >= 0) & (points <= 1)).all()
     # a Sobol sequence has one point in each of 16 slices of each axis
     for axis in points.T:
@@ -43,8 +45,8 @@ def test_a_design_fills_every_part_of_the_bounds_and_is_the_same_again():
 def test_the_optimum_is_found():
     runs = scored(sobol_design(BOUNDS, 10, seed=0))
     for _ in range(2):
-        runs = pd.concat([runs, scored(propose(fit(runs, BOUNDS, seed=0), 3))], ignore_index=True)
-    best = optimum(fit(runs, BOUNDS, seed=0)).set_index("parameter")
+        runs = pd.concat([runs, scored(propose_runs(fit_surrogate(runs, BOUNDS, seed=0), 3))], ignore_index=True)
+    best = find_optimum(fit_surrogate(runs, BOUNDS, seed=0)).set_index("parameter")
     for name, truth in TRUTH.items():
         width = BOUNDS[name][1] - BOUNDS[name][0]
         assert best.loc[name, "value"] == pytest.approx(truth, abs=0.03 * width)
@@ -56,13 +58,13 @@ def test_a_diverged_run_keeps_others_away():
     runs = scored(sobol_design(BOUNDS, 12, seed=0))
     thick = runs["thickness_mm"] > 2.4
     runs.loc[thick, "score"] = np.nan
-    surrogate = fit(runs, BOUNDS, seed=0)
+    surrogate = fit_surrogate(runs, BOUNDS, seed=0)
     best, worst = runs["score"].min(), runs["score"].max()
     assert surrogate.scores[thick] == pytest.approx(worst + (worst - best))
     assert surrogate.scores[~thick] == pytest.approx(runs["score"][~thick])
-    assert (propose(surrogate, 3)["thickness_mm"] < 2.4).all()
-    with pytest.raises(ValueError, match="0 runs with a score"):
-        fit(runs.assign(score=np.nan), BOUNDS, seed=0)
+    assert (propose_runs(surrogate, 3)["thickness_mm"] < 2.4).all()
+    with pytest.raises(ValueError, match="0 runs"):
+        fit_surrogate(runs.assign(score=np.nan), BOUNDS, seed=0)
 
 
 def test_values_take_their_places_in_the_parameters():
@@ -87,16 +89,16 @@ def test_values_take_their_places_in_the_parameters():
 
 def test_the_same_brain_has_the_score_0():
     shape = shaped(bumpy(1))
-    assert shape_scores(shape, shape, SCORES) == pytest.approx(dict.fromkeys(SCORES, 0.0), abs=1e-9)
+    assert shape_scores(shape, shape) == pytest.approx(dict.fromkeys(SCORES, 0.0), abs=1e-9)
     assert size_score(shape.mesh, shape.mesh) == 0
 
 
 def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution():
     one, same, other = shaped(bumpy(1)), shaped(bumpy(1, height=1.05)), shaped(bumpy(2))
-    near, far = shape_scores(same, one, SCORES), shape_scores(other, one, SCORES)
+    near, far = shape_scores(same, one), shape_scores(other, one)
     assert near["shape_index"] < 0.1 < far["shape_index"]
     assert near["mean_curvature"] < 0.1 < far["mean_curvature"]
-    flat = shape_scores(shaped(bumpy(1, height=0.05)), one, SCORES)
+    flat = shape_scores(shaped(bumpy(1, height=0.05)), one)
     assert flat["curvature_distribution"] > 3 * far["curvature_distribution"]
 
 
@@ -104,3 +106,36 @@ def test_a_brain_scaled_by_a_tenth_differs_in_area_and_volume():
     mesh = bumpy(1)
     larger = TriangleMesh(1.1 * mesh.vertices, mesh.faces)
     assert size_score(larger, mesh) == pytest.approx(np.hypot(1.1**2 - 1, 1.1**3 - 1))
+
+
+def test_a_brain_has_the_scores_that_are_asked_for():
+    mesh = bumpy(1)
+    larger = TriangleMesh(1.05 * mesh.vertices, mesh.faces)
+    assert brain_scores(larger, mesh, ["size"], radius_mm=3.0) == {"size": size_score(larger, mesh)}
+    found = brain_scores(larger, mesh, ["surface_distance", "shape_index", "curvature_distribution"], radius_mm=3.0)
+    assert list(found) == ["surface_distance", "shape_index", "curvature_distribution"]
+    assert found["surface_distance"] == pytest.approx(0.05 * RADIUS, rel=0.05)
+    # folds are compared after scaling
+    assert found["shape_index"] == pytest.approx(0, abs=0.05)
+    assert found["curvature_distribution"] == pytest.approx(0, abs=0.002)
+    other = brain_scores(bumpy(2), mesh, ["shape_index"], radius_mm=3.0)
+    assert other["shape_index"] > 0.5
+
+
+def test_a_run_has_the_weighted_sum_of_the_means_over_its_pairs():
+    mesh = bumpy(1)
+    first, second = (TriangleMesh(factor * mesh.vertices, mesh.faces) for factor in (1.05, 1.15))
+    weights = {"size": 2.0, "surface_distance": 0.5}
+    found = run_score([(first, mesh), (second, mesh)], weights, [], radius_mm=3.0)
+    size = (size_score(first, mesh) + size_score(second, mesh)) / 2
+    assert found["size"] == pytest.approx(size)
+    assert found["surface_distance"] == pytest.approx(0.1 * RADIUS, rel=0.05)
+    assert found["score"] == pytest.approx(2 * size + 0.5 * found["surface_distance"])
+    assert (found["outcome"], found["cause"]) == ("finished", "")
+
+
+def test_a_run_that_has_diverged_has_no_score_whatever_its_other_brains_are():
+    mesh = bumpy(1)
+    found = run_score([(mesh, mesh)], {"size": 1.0}, ["det F", "no step"], radius_mm=3.0)
+    assert np.isnan([found["score"], found["size"]]).all()
+    assert (found["outcome"], found["cause"]) == ("diverged", "det F; no step")

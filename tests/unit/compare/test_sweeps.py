@@ -1,12 +1,26 @@
-"""Which run of a study is nearest, and what the paper reports beside the same here, with the verdicts."""
+"""Distances of runs from observed brains, the nearest run, and verdicts on the results of the paper."""
 
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from shapes import sphere
 
-from gyriflow.compare.members import distances_to, member_row, nearest
-from gyriflow.compare.published import NOT_ALIKE, StudyTables, replication, with_published_nearest
+from gyriflow.compare.published import (
+    NOT_COMPARABLE,
+    SweepTables,
+    comparison_caption,
+    published_nearest,
+    replication_table,
+)
+from gyriflow.compare.sweeps import (
+    COMPARISON_COLUMNS,
+    comparison_table,
+    distances_to,
+    joined_comparisons,
+    member_row,
+    nearest_runs,
+)
 from gyriflow.io.yaml_files import read_yaml
 
 
@@ -56,6 +70,48 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
 
 
+def parts(radius):
+    return {"whole": sphere(radius, 3), "left": sphere(radius / 2, 3)}
+
+
+def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named():
+    tables = [
+        spectra("sim", "a", (0.5, 0.2, 0.1)),
+        spectra("real", "b", (0.4, 0.3, 0.1)),
+        spectra("real", "c", (0.1, 0.1, 0.1)),
+    ]
+    power = [table.assign(week=28.0, power=table["relative_power"] * 10) for table in tables]
+    bands = [table.assign(band=band, power=5.0, relative_power=0.1) for table in power for band in (1, 2, 3)]
+    rows = [("real", "c", "whole", "area", 180.0, "cm2")]
+    metrics = pd.concat([METRICS, pd.DataFrame(rows, columns=list(METRICS))])
+    populations = {"a": "normal", "b": "normal", "c": "operated"}
+    observed = {"b": parts(12.0), "c": parts(15.0)}
+    both = pd.concat([*power, *bands], ignore_index=True)
+    table = comparison_table("sim", "a", populations, metrics, both, parts(10.0), observed)
+    assert list(table) == COMPARISON_COLUMNS
+    assert set(table["subject"] + table["run"]) == {"asim"}
+    named = table.groupby("real")[["real_population", "same_population"]].first()
+    assert named.to_dict("index") == {
+        "b": {"real_population": "normal", "same_population": True},
+        "c": {"real_population": "operated", "same_population": False},
+    }
+    distances = table.set_index(["real", "hemisphere", "measure"])["distance"]
+    assert distances["b", "whole", "area"] == pytest.approx(0.1)
+    assert distances["c", "whole", "area"] == pytest.approx(0.5)
+    assert distances["b", "whole", "surface_distance"] == pytest.approx(2.0, abs=0.1)
+    assert distances["c", "whole", "surface_distance95"] == pytest.approx(5.0, abs=0.1)
+    assert distances["c", "left", "surface_distance"] == pytest.approx(2.5, abs=0.1)
+    # shares of B1 to B4: 5/20 and 4/19
+    assert distances["b", "left", "spectral_distance_B4"] == pytest.approx(5 / 20 - 4 / 19)
+
+
+def test_comparisons_without_rows_keep_their_columns():
+    empty = joined_comparisons([])
+    assert list(empty) == COMPARISON_COLUMNS
+    row = pd.DataFrame([["x"] * len(COMPARISON_COLUMNS)], columns=COMPARISON_COLUMNS)
+    assert len(joined_comparisons([empty, row, row])) == 2
+
+
 def member(run, thickness, through=2.0, diverged=None):
     return member_row(
         {"study": "thickness", "run": run, "subject": "a", "compare_week": 28},
@@ -80,21 +136,11 @@ def compared(**distances):
 
 
 def test_the_nearest_run_is_named_with_the_next_and_what_stands_against_it():
-    (row,) = nearest(compared(t1=0.3, t2=0.1, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
+    (row,) = nearest_runs(compared(t1=0.3, t2=0.1, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert (row["thickness_mm"], row["distance"], row["next_thickness_mm"], row["next_distance"]) == (2, 0.1, 3, 0.2)
     assert row["flag"] == "ok"
-    (row,) = nearest(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
+    (row,) = nearest_runs(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
-
-
-def test_the_papers_value_stands_beside_ours_where_it_reports_one():
-    published = {"nearest": [{"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 2.25}]}
-    table = nearest(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
-    for measure in ("relative_power_B4", "relative_power_B4_weyl"):
-        found = with_published_nearest(table.assign(measure=measure), published, ["thickness_mm"], 28)
-        assert found["paper"].tolist() == [2.25]
-    assert with_published_nearest(table, published, ["thickness_mm"], 27)["paper"].isna().all()
-    assert with_published_nearest(table, published, ["poisson_ratio"], 28)["paper"].isna().all()
 
 
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
@@ -108,7 +154,7 @@ def moves(**largest: float) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["from_week", "to_week", "nodes", "max_mm", "mean_mm"])
 
 
-def study(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, ...], whole_b6: float) -> StudyTables:
+def sweep(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, ...], whole_b6: float) -> SweepTables:
     """Return a study of thickness from shares of B4 and B5 (cut) by run and side, and those of the real brain."""
     rows = []
     for (run, side), own in shares.items():
@@ -126,14 +172,14 @@ def study(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, .
             "flag": ["ok", "not resolved by the mesh"],
         }
     )
-    return StudyTables(["thickness_mm"], 28, members, comparison, nearest)
+    return SweepTables(["thickness_mm"], 28, members, comparison, nearest)
 
 
 SHARES = {("thin", "left"): (0.5, 0.2), ("thin", "right"): (0.6, 0.3), ("thick", "left"): (0.1, 0.4)}
 
 
-def verdicts(displacement: pd.DataFrame, *studies: StudyTables) -> dict[str, tuple[str, str]]:
-    table = replication(PUBLISHED, displacement, studies, SUMMARY)
+def verdicts(displacement: pd.DataFrame, *studies: SweepTables) -> dict[str, tuple[str, str]]:
+    table = replication_table(PUBLISHED, displacement, studies, SUMMARY)
     assert list(table) == ["result", "place", "paper", "here", "verdict"]
     return {row["result"]: (row["here"], row["verdict"]) for row in table.to_dict("records")}
 
@@ -155,7 +201,7 @@ def test_energy_and_emissions_are_those_of_a_week_of_the_run():
 
 
 def test_findings_of_a_study_are_checked_one_by_one():
-    found = verdicts(moves(), study(SHARES, (0.4, 0.35), 0.2))
+    found = verdicts(moves(), sweep(SHARES, (0.4, 0.35), 0.2))
     assert found["all thicknesses come to 28 GW"] == ("1 of 2 runs", "in part")
     here, verdict = found["nearest thickness_mm by relative_power_B4, 28 GW"]
     assert here == "left, cut: 2.25; right, cut: 0.8 (not resolved by the mesh)"
@@ -174,6 +220,38 @@ def test_findings_of_a_study_are_checked_one_by_one():
 
 @pytest.mark.parametrize(("week", "varied"), [(27, ["thickness_mm"]), (28, ["thickness_mm", "poisson_ratio"])])
 def test_another_study_is_not_the_papers(week, varied):
-    own = study(SHARES, (0.4, 0.35), 0.01)
-    other = StudyTables(varied, week, own.members, own.comparison, own.nearest)
-    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run", NOT_ALIKE}
+    own = sweep(SHARES, (0.4, 0.35), 0.01)
+    other = SweepTables(varied, week, own.members, own.comparison, own.nearest)
+    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run", NOT_COMPARABLE}
+
+
+def test_nearest_runs_stand_with_the_papers_value_where_it_reports_one():
+    nearest = nearest_runs(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
+    nearest = pd.concat([nearest, nearest.assign(measure="relative_power_B5_weyl"), nearest.assign(measure="area")])
+    tables = {"members": MEMBERS, "comparison": compared(t1=0.3, t2=0.1), "nearest": nearest}
+    sweeps = {
+        "thickness": SweepTables(["thickness_mm"], 28, **tables),
+        "earlier": SweepTables(["thickness_mm"], 27, **tables),
+        "ratio": SweepTables(["poisson_ratio"], 28, **tables),
+        "both": SweepTables(["thickness_mm", "poisson_ratio"], 28, **tables),
+    }
+    table = published_nearest(PUBLISHED, sweeps)
+    names = ["study", "measure", "parameter", "nearest", "run", "paper", "place"]
+    assert table[names].to_numpy().tolist() == [
+        ["thickness", "relative_power_B4", "thickness_mm", 2.0, "t2", 2.25, "section 4.1.3"],
+        ["thickness", "relative_power_B5_weyl", "thickness_mm", 2.0, "t2", 0.8, "section 4.1.3"],
+    ]
+    none = published_nearest(PUBLISHED, {"ratio": sweeps["ratio"]})
+    assert len(none) == 0
+    assert list(none) == list(table)
+
+
+def test_a_caption_names_the_observed_brains_and_another_population():
+    table = compared(t1=0.3)
+    text = comparison_caption("thickness", 28.0, pd.concat([table, table.assign(real="c", same_population=True)]))
+    assert all(fact in text for fact in ("thickness", "28 GW", "b (other)", "c (other)"))
+    assert "another population" in text
+    assert "another population" not in comparison_caption("thickness", 28.0, table.assign(same_population=True))
+    none = comparison_caption("thickness", 28.0, table[:0])
+    assert "No run" in none
+    assert "28 GW" in none

@@ -1,0 +1,204 @@
+"""Sweeps: how far each run is from the observed brains of a week, and which run is nearest by each measure."""
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..geometry.triangles import TriangleMesh
+from ..metrics.spangy import spectral_distances
+from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
+from .distances import aligned_distances
+
+SIZES = ("area", "volume", "gyrification_index")
+"""Metrics whose relative difference from the observed brain is a measure of distance."""
+WEYL_NUMBER = "weyl_number"
+"""The metric that gives the number of modes at which the spectrum of a hemisphere is cut."""
+DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
+"""Columns of `distances_to`."""
+LABELS = ("subject", "run", "real", "real_population", "same_population")
+COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
+
+Parts = Mapping[str, TriangleMesh]
+"""Surfaces of a brain in mm: the "whole" and its hemispheres."""
+
+
+def comparison_table(
+    run: str,
+    subject: str,
+    populations: Mapping[str, str],
+    metrics: pd.DataFrame,
+    spectra: pd.DataFrame,
+    simulated: Parts,
+    observed: Mapping[str, Parts],
+) -> pd.DataFrame:
+    """Measure how far a simulated brain is from each observed one.
+
+    Parameters
+    ----------
+    run, subject
+        Names of the run and of its start brain.
+    populations
+        Of the start brain and of the observed brains, by id.
+    metrics, spectra
+        Rows of the simulated brain and of the observed ones, whose `run` is "real".
+    simulated, observed
+        Surfaces of the simulated brain, and of the observed ones by id, in the same order of parts.
+
+    Returns
+    -------
+    DataFrame
+        The columns `COMPARISON_COLUMNS`: those of `distances_to`, with the populations compared.
+    """
+    spectral = spectral_distances(spectra)
+    spectral = spectral[spectral["run"] != MEASURED]
+    tables = []
+    for brain, parts in observed.items():
+        surfaces = {part: aligned_distances(simulated[part], mesh) for part, mesh in parts.items()}
+        same = populations[brain] == populations[subject]
+        labels: dict[str, Any] = dict(zip(LABELS, (subject, run, brain, populations[brain], same), strict=True))
+        tables.append(distances_to(brain, metrics, spectra, spectral, surfaces).assign(**labels)[COMPARISON_COLUMNS])
+    return joined_comparisons(tables)
+
+
+def joined_comparisons(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Join tables of comparisons; without any rows, return a table of the same columns without rows."""
+    tables = [table for table in tables if len(table)]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COMPARISON_COLUMNS)
+
+
+def distances_to(
+    observed: str,
+    metrics: pd.DataFrame,
+    spectra: pd.DataFrame,
+    spectral: pd.DataFrame,
+    surfaces: Mapping[str, Mapping[str, float]],
+) -> pd.DataFrame:
+    """Return the distances of one simulated brain from an observed one, a row per hemisphere and measure.
+
+    Parameters
+    ----------
+    observed
+        Id of the observed brain.
+    metrics, spectra
+        Rows of the simulated brain and of the observed one, whose `run` is "real".
+    spectral
+        Rows of `metrics.spangy.spectral_distances` of the simulated brain, with the column `real`.
+    surfaces
+        `distances.aligned_distances` by hemisphere.
+
+    Returns
+    -------
+    DataFrame
+        The columns `DISTANCE_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
+        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum, and the same with `_weyl`, of
+        spectra cut at Weyl's number as in the paper (distance: absolute difference); `spectral_distance_…`;
+        `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of the surfaces); `area`, `volume`,
+        `gyrification_index` (distance: absolute relative difference); `weyl_number` (no distance).
+    """
+    rows = [*_band_rows(observed, spectra), *_size_rows(observed, metrics)]
+    for row in spectral[spectral["real"] == observed].itertuples():
+        rows.append((row.hemisphere, row.metric, np.nan, np.nan, row.value, "1", row.flag))
+    for hemisphere, distances in surfaces.items():
+        for name in ("distance", "distance95"):
+            rows.append((hemisphere, f"surface_{name}", np.nan, np.nan, distances[f"{name}_mm"], "mm", "ok"))
+    return pd.DataFrame(rows, columns=list(DISTANCE_COLUMNS))
+
+
+def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
+    pairs = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], observed, ["hemisphere", "band"])
+    for pair in pairs.sort_values("band", kind="stable").to_dict("records"):
+        name = f"relative_power_B{pair['band']}"
+        resolved = "ok" if pair["resolved"] and pair["resolved_real"] else "not resolved"
+        whole = pair["relative_power"], pair["relative_power_real"]
+        if not (pair["complete"] and pair["complete_real"]):
+            whole = np.nan, np.nan
+        cut = pair["relative_power_weyl"], pair["relative_power_weyl_real"]
+        for measure, (value, real_value) in ((name, whole), (f"{name}_weyl", cut)):
+            flag = "cut off" if np.isnan(value + real_value) else resolved
+            yield pair["hemisphere"], measure, value, real_value, abs(value - real_value), "1", flag
+
+
+def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
+    pairs = _pairs(metrics[metrics["metric"].isin([*SIZES, WEYL_NUMBER])], observed, ["hemisphere", "metric"])
+    for pair in pairs.to_dict("records"):
+        # the number of modes is no measure of similarity
+        distance = np.nan if pair["metric"] == WEYL_NUMBER else abs(pair["value"] / pair["value_real"] - 1)
+        yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
+
+
+def _pairs(table: pd.DataFrame, observed: str, keys: list[str]) -> pd.DataFrame:
+    measured = table["run"] == MEASURED
+    observed_rows = table[measured & (table["subject"] == observed)]
+    return table[~measured].merge(observed_rows, on=keys, suffixes=("", "_real"))
+
+
+def member_row(
+    labels: Mapping[str, object], values: Mapping[str, object], params: Mapping, zones: Mapping, summary: Mapping
+) -> dict[str, object]:
+    """Return the row of a run in `members.csv`: its values, how it ended, and what it cost.
+
+    Labels are study, run, subject and compare_week; values are the varied ones by key; params, zones and summary are
+    the content of the run's files.
+    """
+    elements = zones["elements_through_cortex"]
+    is_resolved = elements is not None and elements >= ELEMENTS_NEEDED[zones["order"]]
+    return {
+        **labels,
+        **values,
+        "thickness_mm": params["thickness_mm"],
+        "shear_modulus_cortex_pa": params["shear_modulus_cortex_pa"],
+        "elements_through_cortex": elements,
+        "resolution": "ok" if is_resolved else "not resolved by the mesh",
+        "outcome": "finished" if summary.get("diverged") is None else "diverged",
+        "reached_week": summary.get("reached_week", params["end_week"]),
+        "cause": summary.get("diverged") or "",
+        "steps": summary["steps"],
+        "cpu_s": summary["cpu_seconds"],
+    }
+
+
+def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
+    """Find the run that is nearest to each observed brain by each measure, per hemisphere.
+
+    Parameters
+    ----------
+    comparison
+        The columns subject, run, real and `DISTANCE_COLUMNS`.
+    members
+        Rows of `member_row`.
+    varied
+        Columns of members with the varied values.
+
+    Returns
+    -------
+    DataFrame
+        subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
+        distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
+        of the range, or not resolved).
+    """
+    keys, varied = ["subject", "real", "hemisphere", "measure"], list(varied)
+    columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]
+    table = comparison.dropna(subset=["distance"]).merge(
+        members[["subject", "run", *varied, "resolution"]], on=["subject", "run"]
+    )
+    rows = []
+    for _, group in table.groupby(keys, sort=False):
+        best, *others = group.sort_values("distance", kind="stable").to_dict("records")
+        row = {name: best[name] for name in (*keys, *varied, "run", "distance")}
+        if others:
+            row |= {f"next_{name}": others[0][name] for name in (*varied, "distance")}
+        rows.append(row | {"flag": _flags(best, members[members["subject"] == best["subject"]], varied)})
+    return pd.DataFrame(rows).reindex(columns=columns)
+
+
+def _flags(best: Mapping[Hashable, Any], members: pd.DataFrame, varied: Sequence[str]) -> str:
+    flags = [] if best["flag"] == "ok" else [f"band {best['flag']}"]
+    if best["resolution"] != "ok":
+        flags.append(str(best["resolution"]))
+    for name in varied:
+        values = pd.to_numeric(members[name], errors="coerce")
+        if values.min() < values.max() and best[name] in (values.min(), values.max()):
+            flags.append("at the end of the range")
+    return "; ".join(dict.fromkeys(flags)) or "ok"
