@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Fit, Planes, fits_from_all_sides, follow_planes, margin
+from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Fit, Planes, fits_from_all_sides, follow_planes, residual_ratio
 from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
@@ -121,7 +121,7 @@ def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Fit
         DISTINCT_DEG,
     )
     best = min(fits, key=lambda fit: fit.residual)
-    confidence = margin(fits, best, DISTINCT_DEG)
+    confidence = residual_ratio(fits, best, DISTINCT_DEG)
     fine = [_descend(shape, target, best.rotation, best.shift, FINE, 30, 1) for target in targets]
     return min(fine, key=lambda fit: fit.residual), confidence
 
@@ -144,10 +144,10 @@ def _descend(
         ahead = np.einsum("ij,ij->i", target.points[nearest] - at, plane)
         return at, plane, ahead, (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
 
-    def arrived(_: Floats, turn: Floats, move: Floats) -> bool:
+    def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
         return bool(np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3)
 
-    rotation, shift = follow_planes(rotation, np.zeros(3) if shift is None else shift, planes, rounds, arrived)
+    rotation, shift = follow_planes(rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged)
     there, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
     theirs, facing = target.points[::every], target.normals[::every]
     back, _ = shape.tree.query(shape.features((theirs - shift) @ rotation, facing @ rotation))

@@ -1,4 +1,4 @@
-"""How one brain's points come to lie in another: a smooth map of space, or surfaces with the same vertices."""
+"""Correspondence between the points of two brains: a smooth deformation, or surfaces with the same vertices."""
 
 from dataclasses import dataclass
 
@@ -13,8 +13,8 @@ from .triangles import Floats, TriangleMesh, frozen, transformed
 class Deformation:
     """The map p → A(p + u(p)) from one brain's space to another's, both in RAS+ mm.
 
-    A is the affine (4, 4) `matrix`, u the (i, j, k, 3) `displacement` in mm at the points of a grid in the first
-    brain's space, whose index `affine` (4, 4) leads to RAS+ mm; in between it is linear, beyond the grid as at its rim.
+    A is the affine (4, 4) `matrix`, u the (i, j, k, 3) `displacement` in mm on a grid in the first brain's space. The
+    grid's `affine` (4, 4) leads from indices to RAS+ mm. u is interpolated linearly, and constant outside the grid.
     """
 
     matrix: Floats
@@ -30,9 +30,9 @@ class Deformation:
 
 @dataclass(frozen=True, eq=False)
 class MatchedSurfaces:
-    """Surfaces of two brains with the same triangles, whose vertices are the same places of the cortex.
+    """Surfaces of two brains with the same triangles and corresponding vertices.
 
-    The first brain's surface in mm, and the (n, 3) positions of its vertices in the second brain.
+    These are the first brain's surface in mm and the (n, 3) positions of its vertices in the second brain.
     """
 
     first: TriangleMesh
@@ -45,21 +45,21 @@ class MatchedSurfaces:
 
 
 Correspondence = Deformation | MatchedSurfaces
-"""What a registration, or the vertices of matched surfaces, say of two brains."""
+"""Result of a registration, or of matched surfaces."""
 
 
 def transform_points(points: NDArray[np.number], matrix: NDArray[np.floating]) -> Floats:
-    """Return (n, 3) points under a (4, 4) affine map."""
+    """Apply a (4, 4) affine map to (n, 3) points."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float64)
 
 
 def voxel_index(points: Floats, affine: ArrayLike) -> Floats:
-    """Return the (3, …) indices of voxels, with fractions, at (…, 3) points in mm of a volume's (4, 4) affine."""
+    """Return the (3, …) fractional voxel indices of (…, 3) points in mm, for a volume's (4, 4) affine."""
     return np.moveaxis(transform_points(points, np.linalg.inv(np.asarray(affine, dtype=float))), -1, 0)
 
 
 def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Correspondence:
-    """Return what two brains' correspondence is after (4, 4) rigid motions of the first and of the second."""
+    """Return the correspondence of two brains after (4, 4) rigid motions of the first and of the second."""
     if isinstance(pair, MatchedSurfaces):
         return MatchedSurfaces(transformed(pair.first, first), transform_points(pair.second, second))
     turned = (pair.displacement @ first[:3, :3].T).astype(pair.displacement.dtype)
@@ -67,16 +67,16 @@ def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Corres
 
 
 def carry(deformation: Deformation, points: Floats) -> Floats:
-    """Return where (n, 3) points of the first brain come to lie in the second, A(p + u(p)), in mm."""
+    """Map (n, 3) points of the first brain in mm to the second, A(p + u(p))."""
     index = voxel_index(points, deformation.affine)
     parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
     return transform_points(points + np.stack(parts, axis=1).astype(np.float64), deformation.matrix)
 
 
 def determinants(deformation: Deformation) -> Floats:
-    """Return the (i, j, k) determinant of the map's gradient at the points of its grid: local growth of volume.
+    """Return the (i, j, k) Jacobian determinant of the map on its grid: the local change of volume.
 
-    By central differences of the displacement; 0 or less where the map folds.
+    Central differences of the displacement are used. The determinant is 0 or less where the map folds.
     """
     gradient = np.stack(np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2)), axis=-1)
     gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])

@@ -1,4 +1,4 @@
-"""Values smoothed or continued along a surface or inside a solid mesh, not across a sulcus or fissure."""
+"""Smoothing and harmonic continuation of values along a surface or a solid mesh, not across sulci."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from .tetrahedra import volumes_between
 from .triangles import Floats, TriangleMesh, face_areas
 
 STEPS = 8
-"""Implicit steps: their product has the Gaussian's variance, and nearly its shape."""
+"""Number of implicit steps; their product has the Gaussian's variance and almost its shape."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """A process' share of a task: number `rank` of `ranks`; `summed` adds the arrays of all processes up."""
+    """The share of one MPI process, number `rank` of `ranks`; `summed` adds up the arrays of all processes."""
 
     rank: int = 0
     ranks: int = 1
     summed: Callable[[Floats], Floats] = np.asarray
 
     def of(self, count: int) -> slice:
-        """Return which of a number of things are this process'."""
+        """Return the slice of `count` items that belongs to this process."""
         return slice(count * self.rank // self.ranks, count * (self.rank + 1) // self.ranks)
 
 
@@ -39,15 +39,15 @@ def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
 
 
 def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
-    """Return the (n,) areas or volumes that belong to the vertices: equal parts of the cells around."""
+    """Return the (n,) areas or volumes of the vertices: equal parts of the cells around them."""
     share = np.repeat(cell_sizes(vertices, cells) / cells.shape[1], cells.shape[1])
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
 def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
-    """Return (n,) or (n, k) values smoothed as by a Gaussian of standard deviation `sigma_mm` along the mesh.
+    """Smooth (n,) or (n, k) values along the mesh, as a Gaussian of standard deviation `sigma_mm` would.
 
-    Linear finite elements with lumped mass, implicit steps of the heat equation over the time σ²/2, which keep the
+    Implicit steps of the heat equation over the time σ²/2, with linear finite elements and lumped mass, preserve the
     integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted.
     """
     if sigma_mm == 0:
@@ -62,32 +62,32 @@ def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_
 
 
 def harmonic_continuation(
-    vertices: Floats, cells: NDArray[np.integer], known: NDArray[np.integer], tolerance: float = 1e-8
+    vertices: Floats, cells: NDArray[np.integer], fixed: NDArray[np.integer], tolerance: float = 1e-8
 ) -> Callable[[Floats], Floats]:
-    """Return the function that continues values (m, k) at the `known` vertices to (n, k) harmonically along a mesh.
+    """Return a function that extends values (m, k) at the `fixed` vertices to (n, k) harmonically along a mesh.
 
-    The boundary is free elsewhere; `tolerance` is that of `conjugate_gradients`.
+    The rest of the boundary is free; `tolerance` is that of `conjugate_gradients`.
     """
-    unknown = np.setdiff1d(np.unique(cells), known)
-    rows = stiffness_matrix(vertices, cells)[unknown]
-    matrix, to_known = rows[:, unknown], rows[:, known]
+    free = np.setdiff1d(np.unique(cells), fixed)
+    rows = stiffness_matrix(vertices, cells)[free]
+    matrix, to_fixed = rows[:, free], rows[:, fixed]
 
-    def continued(values: Floats) -> Floats:
+    def extend(values: Floats) -> Floats:
         everywhere = np.zeros((len(vertices), values.shape[1]))
-        everywhere[known], right = values, -(to_known @ values)
-        everywhere[unknown] = conjugate_gradients(matrix, right, np.zeros_like(right), tolerance)
+        everywhere[fixed], right = values, -(to_fixed @ values)
+        everywhere[free] = conjugate_gradients(matrix, right, np.zeros_like(right), tolerance)
         return everywhere
 
-    return continued
+    return extend
 
 
 def conjugate_gradients(matrix: sparse.csr_matrix, right: Floats, start: Floats, tolerance: float) -> Floats:
-    """Solve for all (n, k) columns at once by conjugate gradients with Jacobi's preconditioner.
+    """Solve for all (n, k) columns by conjugate gradients with the Jacobi preconditioner.
 
-    The residual of each column falls below a part `tolerance` of its right-hand side; ValueError where it does not, as
-    with degenerate cells.
+    The residual of each column is reduced below `tolerance` times its right-hand side. ValueError if it is not, as with
+    degenerate cells.
     """
-    # in rows, one for each column: products with single vectors take half the time of those with all at once
+    # one row for each column: products with single vectors take half the time of a product with all
     right, solution = np.ascontiguousarray(right.T), start.T.copy()
     inverse = 1.0 / matrix.diagonal()
 
@@ -95,22 +95,22 @@ def conjugate_gradients(matrix: sparse.csr_matrix, right: Floats, start: Floats,
         return np.stack([matrix @ row for row in rows])
 
     residual = right - product(solution)
-    least = tolerance * np.linalg.norm(right, axis=1)
+    limits = tolerance * np.linalg.norm(right, axis=1)
     preconditioned = inverse * residual
     direction = preconditioned.copy()
     slope = np.einsum("ij,ij->i", residual, preconditioned)
     for _ in range(10_000):
-        left = np.linalg.norm(residual, axis=1) > least
-        if not left.any():
+        active = np.linalg.norm(residual, axis=1) > limits
+        if not active.any():
             return np.ascontiguousarray(solution.T)
         steps = product(direction)
-        # a column that is solved exactly has no direction any more
-        length = (slope / np.where(left, np.einsum("ij,ij->i", direction, steps), np.inf))[:, None]
+        # columns that are solved have no search direction
+        length = (slope / np.where(active, np.einsum("ij,ij->i", direction, steps), np.inf))[:, None]
         solution += np.multiply(length, direction, out=preconditioned)
         residual -= np.multiply(length, steps, out=steps)
         np.multiply(inverse, residual, out=preconditioned)
         before, slope = slope, np.einsum("ij,ij->i", residual, preconditioned)
-        direction *= (slope / np.where(left, before, np.inf))[:, None]
+        direction *= (slope / np.where(active, before, np.inf))[:, None]
         direction += preconditioned
     raise ValueError("diffusion does not converge: the mesh has degenerate cells")
 

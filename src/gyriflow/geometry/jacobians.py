@@ -1,9 +1,9 @@
-"""Where the map of a tetrahedron with ten nodes may fold over: bounds of its Jacobian over the whole element.
+"""Bounds of the Jacobian determinant of ten-node tetrahedra, over the whole element.
 
-The sides of such an element may be curved, so that the determinant of the map from the regular element varies: it is
-a polynomial of third degree in the barycentric coordinates. In Bernstein's form, a mean of its coefficients with
-weights that are positive and sum to 1 everywhere, it lies between the least and the largest of the 20 coefficients
-(Johnen, Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
+Such an element may have curved sides, so the determinant of the map from the regular element varies: it is a cubic
+polynomial in the barycentric coordinates. In Bernstein form it is a weighted mean of its 20 coefficients, with positive
+weights that sum to 1, so it lies between the smallest and the largest of them (Johnen, Remacle and Geuzaine 2013,
+J. Comput. Phys. 233, 359-372).
 """
 
 import math
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from .triangles import Floats
 
-# corners of the edges on whose middles nodes 4 to 9 lie, as VTK has them
+# corners of the edges whose midpoints are nodes 4 to 9, in the order of VTK
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-# the eight parts between the nodes of an element: one at each corner, four around the axis from node 4 to node 9
+# the eight parts of an element between its nodes: one at each corner, four around the axis from node 4 to node 9
 PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
 NODES = np.array([np.eye(4)[i] for i in range(4)] + [(np.eye(4)[a] + np.eye(4)[b]) / 2 for a, b in EDGES])
 """Barycentric coordinates (10, 4) of the nodes."""
@@ -26,9 +26,9 @@ POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(power
 SLOPES = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 """Gradients of the barycentric coordinates in the regular element."""
 DEPTH = 3
-"""How often an element that the bounds leave undecided is subdivided."""
+"""Number of subdivisions of an element whose bounds are inconclusive."""
 CHUNK = 4096
-"""Elements at a time, which the processor's cache holds."""
+"""Number of elements that fit into the processor's cache."""
 
 
 def shape_values(places: Floats) -> Floats:
@@ -52,15 +52,15 @@ def bernstein(places: Floats) -> Floats:
 
 
 FROM_VALUES = np.linalg.inv(bernstein(POWERS / 3))
-"""The coefficients of a polynomial from its values at the 20 points of the lattice."""
+"""Matrix from a polynomial's values at the 20 lattice points to its coefficients."""
 LATTICE_SLOPES = shape_slopes(POWERS / 3)
 ON_PARTS = np.stack([FROM_VALUES @ bernstein(POWERS / 3 @ NODES[list(part)]) for part in PARTS])
-"""The (8, 20, 20) matrices that give a polynomial's coefficients on the parts from those on the whole."""
+"""The (8, 20, 20) matrices from a polynomial's coefficients on the whole element to those on its parts."""
 AT_CORNERS = np.flatnonzero(POWERS.max(axis=1) == 3)
 
 
 def determinants(matrices: Floats) -> Floats:
-    """Return the determinants of (..., 3, 3) matrices, written out: many times faster than a factorisation of each."""
+    """Return the determinants of (..., 3, 3) matrices, written out: many times faster than factorisations."""
     a, b, c = matrices[..., 0, :], matrices[..., 1, :], matrices[..., 2, :]
     return np.asarray(
         a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
@@ -70,13 +70,13 @@ def determinants(matrices: Floats) -> Floats:
 
 
 def chunks(count: int) -> Iterator[slice]:
-    """Yield the parts of a number of elements that the processor's cache holds."""
+    """Yield slices of a number of elements that fit into the processor's cache."""
     for first in range(0, count, CHUNK):
         yield slice(first, first + CHUNK)
 
 
 def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Floats:
-    """Return the (m, p) determinants of the maps of (m, 10) elements where shape functions have (p, 10, 3) slopes."""
+    """Return the (m, p) Jacobian determinants of (m, 10) elements, from (p, 10, 3) shape function gradients."""
     values = np.empty((len(tets), len(slopes)))
     by_node = slopes.transpose(0, 2, 1).reshape(-1, 10)
     for chunk in chunks(len(tets)):
@@ -86,7 +86,7 @@ def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Fl
 
 
 def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return the (m, 20) Bernstein coefficients of the determinants of the maps of (m, 10) elements.
+    """Return the (m, 20) Bernstein coefficients of the Jacobian determinants of (m, 10) elements.
 
     Their mean is six times the element's volume.
     """
@@ -94,23 +94,23 @@ def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
 
 
 def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return for (m, 10) elements a number that the determinant of the map is nowhere below.
+    """Return a lower bound of the Jacobian determinant of each (m, 10) element.
 
-    It is positive only where the element is folded over nowhere. Elements for which it might be so, though the
-    coefficients do not show it, are subdivided up to three times; a smaller part's bounds are closer.
+    The element folds over nowhere if it is positive. Elements whose coefficients are inconclusive are subdivided up to
+    three times, since the bounds of smaller parts are tighter.
     """
     whole = coefficients(vertices, tets)
     bounds = whole.min(axis=1)
-    open_ = np.flatnonzero((bounds <= 0) & (whole[:, AT_CORNERS].min(axis=1) > 0))
-    if len(open_):
-        bounds[open_] = _parted_bounds(whole[open_], DEPTH)
+    undecided = np.flatnonzero((bounds <= 0) & (whole[:, AT_CORNERS].min(axis=1) > 0))
+    if len(undecided):
+        bounds[undecided] = _subdivided_bounds(whole[undecided], DEPTH)
     return bounds
 
 
-def _parted_bounds(whole: Floats, depth: int) -> Floats:
+def _subdivided_bounds(whole: Floats, depth: int) -> Floats:
     parts = np.einsum("sij,kj->ksi", ON_PARTS, whole)
-    least = parts.min(axis=2)
-    open_ = (least <= 0) & (parts[:, :, AT_CORNERS].min(axis=2) > 0)
-    if depth > 1 and open_.any():
-        least[open_] = _parted_bounds(parts[open_], depth - 1)
-    return np.asarray(least.min(axis=1))
+    bounds = parts.min(axis=2)
+    undecided = (bounds <= 0) & (parts[:, :, AT_CORNERS].min(axis=2) > 0)
+    if depth > 1 and undecided.any():
+        bounds[undecided] = _subdivided_bounds(parts[undecided], depth - 1)
+    return np.asarray(bounds.min(axis=1))

@@ -1,4 +1,4 @@
-"""What lies inside surfaces, where they are near each other, match or cross, and values brought from one to another."""
+"""Points inside surfaces, nearest and matching points, crossing faces, and transfer of values between surfaces."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from scipy.spatial import cKDTree
 
 from .triangles import Floats, Ints, TriangleMesh, corners, face_normals, transformed, vertex_normals
 
-AGREEING = 0.5
-"""Least cosine between normals that agree: 60 degrees."""
+MIN_NORMAL_COSINE = 0.5
+"""Normals agree if their cosine is at least this: 60 degrees."""
 
 NEIGHBOURS = (16, 64, 256)
-"""How many nearest vertices are looked through for an agreeing one, in turn."""
+"""Numbers of nearest vertices that are searched for one with an agreeing normal, in turn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Points of a surface for n points, by the vertices of their face and barycentric weights (n, 3).
+    """Matching points on a surface, as face corners and barycentric weights (n, 3).
 
-    `agrees` (n,) is False where no normal near it agrees, and the nearest point of all was taken.
+    `agrees` (n,) is False if no normal nearby agrees, so that the nearest point was taken.
     """
 
     corners: Ints
@@ -34,37 +34,37 @@ class Match:
 
 
 def nearest_on(points: Floats, surface: TriangleMesh) -> tuple[Floats, Ints, Floats]:
-    """Return the (n,) distances of points from a surface, and the faces and (n, 3) positions of its nearest points."""
+    """Return the (n,) distances of points from a surface, and faces and (n, 3) positions of its nearest points."""
     squared, face, place = igl.point_mesh_squared_distance(points, surface.vertices, surface.faces)
     return np.sqrt(squared), face.astype(np.int64), place
 
 
 def surface_distance(ways: Iterable[tuple[Floats, Floats]], share: float = 0.95) -> tuple[float, float]:
-    """Summarise how far two surfaces are from each other, given the (n,) distances of points of either and weights.
+    """Summarise the distance between two surfaces from the (n,) distances and weights of the points of either.
 
-    The mean of both weighted means, and the larger of the distances within which a `share` of each weight lies.
+    The first value is the mean of both weighted means, the second the larger of both weighted quantiles at `share`.
     """
     both = list(ways)
-    mean = float(np.mean([np.average(away, weights=weights) for away, weights in both]))
-    far = [np.quantile(away, share, weights=weights, method="inverted_cdf") for away, weights in both]
+    mean = float(np.mean([np.average(distance, weights=weights) for distance, weights in both]))
+    far = [np.quantile(distance, share, weights=weights, method="inverted_cdf") for distance, weights in both]
     return mean, float(max(far))
 
 
 def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
-    """Return the (n,) thickness in mm at the vertices of the outer surface of the layer between two surfaces.
+    """Return the (n,) thickness in mm of the layer between two surfaces, at the vertices of the outer one.
 
     It is the mean of two distances: from the vertex to the nearest point of the inner surface, and from there to the
     nearest point of the outer one (Fischl and Dale 2000, doi 10.1073/pnas.200033797).
     """
-    there, _, nearest = nearest_on(outer.vertices, inner)
-    back, _, _ = nearest_on(nearest, outer)
-    return 0.5 * (there + back)
+    inward, _, nearest = nearest_on(outer.vertices, inner)
+    outward, _, _ = nearest_on(nearest, outer)
+    return 0.5 * (inward + outward)
 
 
 def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
-    """Return a label volume with 1 inside a closed surface, and its (4, 4) affine: what a brain without labels has.
+    """Return a label volume with 1 inside a closed surface, and its (4, 4) affine.
 
-    The volume holds the surface with a margin of four voxels, or else the (2, 3) corners of a box with that margin.
+    The volume covers the surface, or the (2, 3) corners of a box, plus a margin of four voxels.
     """
     low, high = (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
     low = low - 4 * voxel_mm
@@ -77,7 +77,7 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
 def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats) -> NDArray[np.int32]:
     """Return an (i, j, k) label volume with 2 in the layer of (n,) thickness in mm below a closed surface, 1 deeper.
 
-    `affine` (4, 4) leads from voxels to mm; what lies beyond the volume is not in it.
+    `affine` (4, 4) leads from voxels to mm. Parts outside the volume are cut off.
     """
     inside = np.argwhere(_inside(mesh, shape, affine))
     depth, faces, _ = nearest_on(inside @ affine[:3, :3].T + affine[:3, 3], mesh)
@@ -87,23 +87,23 @@ def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], 
 
 
 def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> NDArray[np.bool_]:
-    """Return whether the centres of an (i, j, k) volume's voxels lie inside a closed surface, by winding numbers.
+    """Return the (i, j, k) mask of the voxels whose centres lie inside a closed surface, by winding numbers.
 
-    They are asked for beside the surface, and once for each region of voxels that it does not part.
+    They are computed at each voxel near the surface, and once for each connected region of other voxels.
     """
     index = transformed(mesh, np.linalg.inv(affine))
     pieces, _ = trimesh.remesh.subdivide_to_size(index.vertices, index.faces, 1.0, max_iter=20)
     points = np.rint(pieces).astype(np.int64)
-    beside = np.zeros(shape, dtype=bool)
-    beside[tuple(points[((points >= 0) & (points < shape)).all(axis=1)].T)] = True
-    beside = ndimage.binary_dilation(beside, np.ones((3, 3, 3)))
-    regions, number = ndimage.label(~beside)
-    some = np.zeros(number + 1, dtype=np.int64)
-    some[regions.ravel()] = np.arange(regions.size)
-    asked = np.stack(np.unravel_index(np.concatenate([some, np.flatnonzero(beside)]), shape), axis=1)
-    winding = igl.fast_winding_number(index.vertices, index.faces, asked.astype(float)) > 0.5
-    inside = winding[: len(some)][regions]
-    inside[beside] = winding[len(some) :]
+    near = np.zeros(shape, dtype=bool)
+    near[tuple(points[((points >= 0) & (points < shape)).all(axis=1)].T)] = True
+    near = ndimage.binary_dilation(near, np.ones((3, 3, 3)))
+    regions, number = ndimage.label(~near)
+    representatives = np.zeros(number + 1, dtype=np.int64)
+    representatives[regions.ravel()] = np.arange(regions.size)
+    queries = np.stack(np.unravel_index(np.concatenate([representatives, np.flatnonzero(near)]), shape), axis=1)
+    winding = igl.fast_winding_number(index.vertices, index.faces, queries.astype(float)) > 0.5
+    inside = winding[: len(representatives)][regions]
+    inside[near] = winding[len(representatives) :]
     return np.asarray(inside)
 
 
@@ -119,35 +119,35 @@ def crossing_faces(mesh: TriangleMesh) -> int:
 
 
 def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
-    """Return for (n, 3) points with unit normals the nearest points of a surface whose normal agrees.
+    """Match (n, 3) points with unit normals to the nearest points of a surface whose normals agree.
 
-    So the other wall of a sulcus or of the fissure is not taken. It is the nearest point of all where the face there
-    agrees; else the nearest of the 256 nearest vertices that does.
+    Thus the opposite wall of a sulcus or of the fissure is not taken. A match is the nearest point of the surface if
+    the normal of its face agrees, or else the closest agreeing one of the 256 nearest vertices.
     """
     distance, face, on = nearest_on(points, mesh)
     nearest_corners = mesh.faces[face].astype(np.int64)
     weights = barycentric(on, corners(mesh)[face])
-    agrees = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) >= AGREEING
+    agrees = np.einsum("ij,ij->i", normals, face_normals(mesh)[face]) >= MIN_NORMAL_COSINE
     tree, directions = cKDTree(mesh.vertices), vertex_normals(mesh)
     for count in NEIGHBOURS:
-        left = np.flatnonzero(~agrees)
-        if not len(left):
+        unmatched = np.flatnonzero(~agrees)
+        if not len(unmatched):
             break
-        away, near = tree.query(points[left], k=min(count, len(mesh.vertices)))
-        away, near = away.reshape(len(left), -1), near.reshape(len(left), -1)
-        good = np.einsum("ik,ijk->ij", normals[left], directions[near]) >= AGREEING
-        some = good.any(axis=1)
-        first = good.argmax(axis=1)[some]
-        rows = left[some]
-        nearest_corners[rows] = near[some, first][:, None]
+        distances, vertices = tree.query(points[unmatched], k=min(count, len(mesh.vertices)))
+        distances, vertices = distances.reshape(len(unmatched), -1), vertices.reshape(len(unmatched), -1)
+        agreeing = np.einsum("ik,ijk->ij", normals[unmatched], directions[vertices]) >= MIN_NORMAL_COSINE
+        is_matched = agreeing.any(axis=1)
+        first = agreeing.argmax(axis=1)[is_matched]
+        rows = unmatched[is_matched]
+        nearest_corners[rows] = vertices[is_matched, first][:, None]
         weights[rows] = [1.0, 0.0, 0.0]
-        distance[rows] = away[some, first]
+        distance[rows] = distances[is_matched, first]
         agrees[rows] = True
     return Match(nearest_corners, weights, distance, agrees)
 
 
 def match_surface(mesh: TriangleMesh, surface: TriangleMesh) -> Match:
-    """Match the vertices of a mesh with the nearest points of another surface whose normal agrees."""
+    """Match the vertices of a mesh to the nearest points of another surface whose normals agree."""
     return match_points(mesh.vertices, vertex_normals(mesh), surface)
 
 
@@ -158,7 +158,7 @@ def values_at(match: Match, values: NDArray) -> Floats:
 
 
 def labels_at(match: Match, labels: NDArray[np.integer]) -> Ints:
-    """Return the (n,) labels at matched points: those of the nearest corner of the face."""
+    """Return the (n,) labels at matched points, those of the nearest corner of the face."""
     nearest = match.weights.argmax(axis=1)
     return np.asarray(labels[match.corners[np.arange(len(nearest)), nearest]], dtype=np.int64)
 

@@ -1,4 +1,4 @@
-"""How the files of a brain lie to its posed surface: one record, with its inverse and what it was judged by."""
+"""Pose of a brain: rigid motions from the coordinates of its files to its posed surface, and their evidence."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,13 +18,12 @@ CONVENTIONS: dict[str, Floats] = {"ras": np.eye(4), "lps": LPS_TO_RAS}
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Rigid motions (4, 4) in mm that pose a brain, and what they were judged by.
+    """Rigid motions (4, 4) in mm that pose a brain, and their evidence.
 
-    `world` leads from the world of the brain's volumes, RAS+, to its surface; brains correspond in these worlds.
-    `files` lead from the coordinates of its surface files: by side ("left", "right") where there are hemispheres, and
-    of the "whole". `by` is what the pose was judged by: "file", "shape", "configuration", "default", or parts of the
-    labels. `together` is False where the hemispheres were posed separately. `evidence` are angles, residuals and
-    distances that it rests on, in plain values for JSON, and `warnings` what is doubtful about it.
+    `world` leads from the world of the brain's volumes, RAS+, to its surface; correspondences refer to these worlds.
+    `files` lead from the coordinates of its surface files: "left" and "right" for hemispheres, and "whole". `by` is the
+    origin of the pose: "file", "shape", "configuration", "default", or parts of the labels. `together` is False if the
+    hemispheres were posed separately. `evidence` has angles, residuals and distances, in plain values for JSON.
     """
 
     world: Floats = field(default_factory=lambda: np.eye(4))
@@ -44,7 +43,7 @@ class Pose:
         return self.files.get(side, self.files.get("whole", self.world))
 
     def of_volume(self, path: str) -> Floats:
-        """Return the (4, 4) motion from the brain's volumes to its surface; InputError where the sides have two."""
+        """Return the (4, 4) motion from the brain's volumes to its surface; InputError if the sides have two."""
         if self.together:
             return self.world
         problem = "a volume cannot belong to a brain whose hemispheres were posed separately"
@@ -53,21 +52,21 @@ class Pose:
 
     def then(self, matrix: Floats) -> "Pose":
         """Return the pose with a (4, 4) motion after it."""
-        files = {name: matrix @ one for name, one in self.files.items()}
+        files = {name: matrix @ pose for name, pose in self.files.items()}
         return replace(self, world=matrix @ self.world, files=files)
 
     def plain(self) -> dict[str, Any]:
         """Return the pose in plain values for JSON."""
-        files = {name: one.tolist() for name, one in self.files.items()}
+        files = {name: pose.tolist() for name, pose in self.files.items()}
         plain = {"by": self.by, "together": self.together, "world": self.world.tolist(), "files": files}
         return plain | {"evidence": dict(self.evidence), "warnings": list(self.warnings)}
 
 
 def pose_from(plain: Mapping[str, Any]) -> Pose:
-    """Return the pose that plain values hold."""
-    files = {name: np.array(one) for name, one in plain["files"].items()}
-    judged = plain["by"], plain["together"], plain["evidence"], tuple(plain["warnings"])
-    return Pose(np.array(plain["world"]), files, *judged)
+    """Return the pose from its plain values (see `Pose.plain`)."""
+    files = {name: np.array(pose) for name, pose in plain["files"].items()}
+    warnings = tuple(plain["warnings"])
+    return Pose(np.array(plain["world"]), files, plain["by"], plain["together"], plain["evidence"], warnings)
 
 
 def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:

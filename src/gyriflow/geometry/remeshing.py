@@ -1,4 +1,4 @@
-"""Surfaces remeshed with even triangles and freed of self-intersections, by MeshLab's filters."""
+"""Remeshing of surfaces with even triangles, and removal of self-intersections, by MeshLab's filters."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,22 +6,22 @@ from petsc4py.lib import ImportPETSc
 
 from .triangles import TriangleMesh
 
-# Loaded, not initialised, which would start MPI. The wheel of pymeshlab brings libraries such as OpenSSL under the
-# names of the system's; where they come first, those that PETSc needs cannot be loaded any more.
+# PETSc's libraries are loaded before pymeshlab, but not initialised, which would start MPI: the wheel of pymeshlab has
+# libraries such as OpenSSL under the names of the system's, and PETSc's could not be loaded afterwards.
 ImportPETSc()
 
 import pymeshlab  # noqa: E402
 
 REMESHING_ROUNDS = 5
 UNTANGLING_ROUNDS = 10
-# MeshLab's own
+# MeshLab's default
 SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """Return the (m,) mask of the faces that cut other faces.
 
-    Unlike for `matching.faces_that_cross`, those that only touch or overlap in a plane do not, as of adjoined pieces.
+    Unlike in `matching.faces_that_cross`, faces that only touch or overlap in a plane do not count.
     """
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
@@ -33,7 +33,7 @@ def remesh(
 ) -> TriangleMesh:
     """Return the surface with triangles close to equilateral, edges of about `edge_length_mm`.
 
-    Edges at which faces meet at more than `sharp_deg` stay where they are.
+    Edges at which faces meet at more than `sharp_deg` are kept.
     """
     document = in_meshlab(mesh)
     document.meshing_isotropic_explicit_remeshing(
@@ -43,9 +43,9 @@ def remesh(
 
 
 def untangle(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the surface with places that cut each other relaxed (Laplacian smoothing of these places alone).
+    """Remove self-intersections by Laplacian smoothing of the faces concerned.
 
-    The number of vertices and the topology stay; each round takes in a wider neighbourhood.
+    The number of vertices and the topology are kept. Each round smooths a wider neighbourhood.
     """
     for round_ in range(UNTANGLING_ROUNDS):
         document = in_meshlab(mesh)
@@ -61,7 +61,7 @@ def untangle(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def in_meshlab(mesh: TriangleMesh) -> pymeshlab.MeshSet:
-    """Return a MeshLab document that holds the surface alone."""
+    """Return a MeshLab document with the surface."""
     document = pymeshlab.MeshSet(verbose=False)
     document.add_mesh(pymeshlab.Mesh(mesh.vertices, mesh.faces))
     return document

@@ -1,4 +1,4 @@
-"""Tetrahedral meshes: a frozen pair of arrays, and what can be measured on it."""
+"""Tetrahedral meshes: a frozen pair of arrays, and measures of it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from .triangles import Floats, Ints, TriangleMesh, frozen
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
 NODES_OF_ORDER = {1: 4, 2: 10}
-# the face opposite to each corner, seen counter-clockwise from outside; with nodes on the edges, its four triangles:
-# at its corners in turn, and between the nodes
+# the face opposite to each corner, counter-clockwise from outside; and its four triangles if its edges have nodes: at
+# its corners in turn, and between the nodes
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 FINE_FACES = (
     ((1, 5, 8), (5, 2, 9), (8, 9, 3), (5, 9, 8)),
@@ -23,7 +23,7 @@ FINE_FACES = (
     ((0, 4, 7), (4, 1, 8), (7, 8, 3), (4, 8, 7)),
     ((0, 6, 4), (6, 2, 5), (4, 5, 1), (6, 5, 4)),
 )
-# the linear elements between the nodes of a quadratic one: at its corners, and round the diagonal from node 6 to 8
+# the linear elements between the nodes of a quadratic one: at its corners, and around the diagonal from node 6 to 8
 PIECES = (
     (0, 4, 6, 7),
     (4, 1, 5, 8),
@@ -35,12 +35,12 @@ PIECES = (
     (6, 8, 7, 4),
 )
 PIECES_OF_ORDER = {1: 1, 2: 4}
-"""Triangles that a face is made of: one at each corner and one in the middle where it has nodes on its edges."""
+"""Number of triangles of a face; with nodes on its edges, one at each corner and one in the middle."""
 
 FINER = 4
-"""Pieces of each edge of a face: two between neighbouring nodes."""
+"""Number of pieces of each edge of a face: two between neighbouring nodes."""
 LATTICE = np.array([(i, j, FINER - i - j) for i in range(FINER + 1) for j in range(FINER + 1 - i)])
-"""Vertices of the triangles within a face: barycentric coordinates in `FINER`."""
+"""Vertices of the triangles within a face: barycentric coordinates times `FINER`."""
 PLACE = {(i, j, k): place for place, (i, j, k) in enumerate(LATTICE.tolist())}
 LATTICE_TRIANGLES = np.array(
     [
@@ -50,7 +50,7 @@ LATTICE_TRIANGLES = np.array(
         if second in PLACE and third in PLACE
     ]
 )
-"""The (16, 3) triangles of the lattice, all turned alike."""
+"""The (16, 3) triangles of the lattice, all with the same orientation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class TetrahedralMesh:
         wide = np.ndim(self.tets) == 2 and np.shape(self.tets)[1] == NODES_OF_ORDER[2]
         object.__setattr__(self, "tets", frozen(self.tets, np.int64, NODES_OF_ORDER[2 if wide else 1]))
         if len(self.tets) and not 0 <= self.tets.min() <= self.tets.max() < len(self.vertices):
-            raise ValueError("a tetrahedron names a vertex that does not exist")
+            raise ValueError("a tetrahedron has a vertex index out of range")
 
     @property
     def order(self) -> int:
@@ -83,13 +83,13 @@ class TetrahedralMesh:
 
 
 def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the given unit."""
+    """Return the (m,) volumes of (m, 4) or (m, 10) tetrahedra, negative if inverted, in cubes of the vertices' unit."""
     if tets.shape[1] == NODES_OF_ORDER[2]:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     volumes = np.empty(len(tets))
     for part in chunks(len(tets)):
         a, b, c, d = (np.take(vertices, corners, axis=0) for corners in tets[part].T)
-        # the triple product of edges written out: faster than with NumPy's cross product
+        # the triple product is written out, since NumPy's cross product is slower
         (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
         volumes[part] = ((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0
     return volumes
@@ -103,7 +103,7 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
 def radius_ratios(mesh: TetrahedralMesh) -> Floats:
     """Return the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
 
-    Of quadratic elements they are those of the corners.
+    For quadratic elements they are computed from the corners.
     """
     ratios = np.empty(len(mesh.tets))
     for part in chunks(len(ratios)):
@@ -121,7 +121,7 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 
 
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
-    """Return for each of the (n,) vertices the number of the connected part of the mesh that it belongs to."""
+    """Return the (n,) number of the connected part of the mesh that each vertex belongs to."""
     pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)
     graph = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)
@@ -140,7 +140,7 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
 
 
 def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Return a mesh of linear elements with a node on the middle of each edge: quadratic elements, not yet curved.
+    """Add a node at the midpoint of each edge of a linear mesh: quadratic elements with straight sides.
 
     Corners keep their numbers.
     """
@@ -152,9 +152,9 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
-    """Return the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight of each quadratic one.
+    """Return the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight for each quadratic one.
 
-    Positive volumes stay positive where the sides are straight.
+    Elements with straight sides and positive volume give pieces of positive volume.
     """
     return mesh.tets if mesh.order == 1 else np.asarray(mesh.tets[:, PIECES]).reshape(-1, 4)
 
@@ -162,8 +162,8 @@ def linear_pieces(mesh: TetrahedralMesh) -> Ints:
 def boundary_faces(mesh: TetrahedralMesh) -> tuple[Ints, Ints]:
     """Return the (f, 3) triangles of the faces that belong to one element only, outward, and the (f,) element of each.
 
-    Outward holds for elements of positive volume. The four triangles of one quadratic element's face follow each other:
-    with corners a, b, c, these are (a, ab, ca), (ab, b, bc), (ca, bc, c) and (ab, bc, ca).
+    Elements must have positive volume. The four triangles of a quadratic element's face are consecutive: with corners
+    a, b, c, these are (a, ab, ca), (ab, b, bc), (ca, bc, c) and (ab, bc, ca).
     """
     faces = np.sort(mesh.tets[:, FACES].reshape(-1, 3))
     # one number per face: much faster than comparing rows
@@ -182,31 +182,31 @@ def whole_faces(triangles: NDArray[np.integer], order: int) -> NDArray[np.intege
     return triangles.reshape(-1, PIECES_OF_ORDER[2], 3)[:, [0, 1, 2], [0, 1, 2]]
 
 
-def on_whole_faces(chosen: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
-    """Return which of the (f,) triangles of `boundary_faces` belong to a face of which all triangles are chosen."""
+def on_whole_faces(selected: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
+    """Return the (f,) mask of the triangles of `boundary_faces` whose whole face is selected."""
     pieces = PIECES_OF_ORDER[order]
-    return np.repeat(chosen.reshape(-1, pieces).all(axis=1), pieces)
+    return np.repeat(selected.reshape(-1, pieces).all(axis=1), pieces)
 
 
 def boundary_surface(mesh: TetrahedralMesh) -> tuple[TriangleMesh, Ints]:
-    """Return the outward surface of the mesh and its vertices' indices in the mesh."""
+    """Return the outward surface of the mesh and the indices of its vertices in the mesh."""
     faces, _ = boundary_faces(mesh)
     used, local = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[used], local.reshape(-1, 3)), used
 
 
 def finer_surface(triangles: Ints) -> tuple[sparse.csr_array, Ints]:
-    """Return a finer surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
+    """Return a refined surface of curved faces: weights (t, n) of the nodes at its vertices, and its (16 f, 3) faces.
 
-    Its first n vertices are the nodes. The (4 f, 3) triangles are between these, as `boundary_faces` has them.
+    Its first n vertices are the nodes. `triangles` (4 f, 3) are those of `boundary_faces`.
     """
     split = triangles.reshape(-1, 4, 3)
     nodes = np.concatenate([split[:, [0, 1, 2], [0, 1, 2]], split[:, 3]], axis=1)
-    # those of a tetrahedron's face whose nodes are 0, 1, 2 and 4, 5, 6
+    # shape functions on a tetrahedron's face with the nodes 0, 1, 2 and 4, 5, 6
     on_lattice = shape_values(np.pad(LATTICE / FINER, ((0, 0), (0, 1))))[:, [0, 1, 2, 4, 5, 6]]
     weights = np.broadcast_to(on_lattice, (len(nodes), len(LATTICE), 6)).reshape(-1, 6)
     names = np.repeat(nodes, len(LATTICE), axis=0)
-    # a vertex is the same for all faces that have it: by the nodes that it follows, and how much
+    # faces share a vertex if it has the same nodes with the same weights
     parts = np.rint(weights * 2 * FINER).astype(np.int64)
     names = np.where(parts == 0, -1, names)
     order = np.argsort(names, axis=1, kind="stable")

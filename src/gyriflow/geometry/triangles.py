@@ -1,9 +1,9 @@
-"""Triangle surfaces: a frozen pair of arrays, and what can be measured on it."""
+"""Triangle surfaces: a frozen pair of arrays, and measures of it."""
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its parts are imported where they are used, which a dry run need not wait for
+import scipy  # submodules load lazily, which keeps dry runs fast
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MeshError
@@ -33,7 +33,7 @@ class TriangleMesh:
         object.__setattr__(self, "vertices", frozen(self.vertices, np.float64, 3))
         object.__setattr__(self, "faces", frozen(self.faces, np.int64, 3))
         if len(self.faces) and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
-            raise ValueError("a face names a vertex that does not exist")
+            raise ValueError("a face has a vertex index out of range")
 
 
 def corners(mesh: TriangleMesh) -> Floats:
@@ -58,7 +58,7 @@ def area(mesh: TriangleMesh) -> float:
 
 
 def signed_volume(mesh: TriangleMesh) -> float:
-    """Return the enclosed volume in mm³, negative where the faces look inwards (divergence theorem)."""
+    """Return the enclosed volume in mm³, negative if the faces are oriented inward (divergence theorem)."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
@@ -84,12 +84,12 @@ def scatter_to_vertices(mesh: TriangleMesh, face_values: NDArray) -> Floats:
 
 
 def vertex_normals(mesh: TriangleMesh) -> Floats:
-    """Return the (n, 3) unit vertex normals, the area-weighted mean of the faces around."""
+    """Return the (n, 3) unit vertex normals: area-weighted means of the normals of adjacent faces."""
     return unit(scatter_to_vertices(mesh, area_vectors(mesh)))
 
 
 def vertex_areas(mesh: TriangleMesh) -> Floats:
-    """Return the (n,) areas in mm² that belong to the vertices: a third of each face around."""
+    """Return the (n,) areas of the vertices in mm²: a third of each adjacent face."""
     return np.asarray(scatter_to_vertices(mesh, face_areas(mesh)) / 3.0, dtype=np.float64)
 
 
@@ -108,7 +108,7 @@ def mean_edge_length(mesh: TriangleMesh) -> float:
 
 
 def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
-    """Return the mean length of edges that are known, (e, 2) vertex indices, in the vertices' unit."""
+    """Return the mean length of edges given as (e, 2) vertex indices, in the vertices' unit."""
     return float(np.linalg.norm(np.diff(vertices[pairs], axis=1), axis=-1).mean())
 
 
@@ -143,7 +143,7 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     try:
         hull = scipy.spatial.ConvexHull(mesh.vertices)
     except scipy.spatial.QhullError as error:
-        raise MeshError("the surface has no convex hull", remedy="It has to enclose a volume") from error
+        raise MeshError("the surface has no convex hull", remedy="It must enclose a volume") from error
     faces = np.asarray(hull.simplices, dtype=np.int64)
     a, b, c = mesh.vertices[faces].transpose(1, 0, 2)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
@@ -168,12 +168,12 @@ def merged(*meshes: TriangleMesh) -> TriangleMesh:
 
 
 def flipped(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the surface with every face turned round."""
+    """Return the surface with every face flipped."""
     return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
 def transformed(mesh: TriangleMesh, matrix: ArrayLike) -> TriangleMesh:
-    """Return the surface moved by a (4, 4) affine matrix; faces are turned where it mirrors."""
+    """Apply a (4, 4) affine matrix to a surface; faces are flipped if it mirrors."""
     matrix = np.asarray(matrix, dtype=float)
     moved = TriangleMesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.faces)
     return flipped(moved) if np.linalg.det(matrix[:3, :3]) < 0 else moved

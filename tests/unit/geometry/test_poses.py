@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from shapes import LPS, rigid
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import Fit, angle_deg, fits_from_all_sides, margin, step_towards_planes
+from gyriflow.geometry.alignment import Fit, angle_deg, fits_from_all_sides, residual_ratio, step_towards_planes
 from gyriflow.geometry.poses import Pose, pose_from, turned
 
 TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
@@ -77,8 +77,8 @@ def test_the_best_poses_that_differ_are_compared_and_the_first_start_always():
         asked.append(fit.residual)
         return Fit(fit.rotation, fit.shift, {3.0: 1.5, 1.0: 0.9, 2.0: 0.6}[fit.residual])
 
-    fits = fits_from_all_sides([about(angle) for angle in rough], roughly, better, candidates=2, apart_deg=30.0)
+    fits = fits_from_all_sides([about(angle) for angle in rough], roughly, better, candidates=2, distinct_deg=30.0)
     assert asked == [3.0, 1.0, 2.0]
     assert [fit.residual for fit in fits] == [1.5, 0.9, 0.6]
-    assert margin(fits, fits[2], 30.0) == pytest.approx(1.5)
-    assert margin(fits[2:], fits[2], 30.0) == np.inf
+    assert residual_ratio(fits, fits[2], 30.0) == pytest.approx(1.5)
+    assert residual_ratio(fits[2:], fits[2], 30.0) == np.inf
