@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 from shapes import ellipsoid, octasphere, sphere
 
-from gyriflow.compare.prediction import deviation_maps
+from gyriflow.compare.deviation import deviation_maps
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
