@@ -22,14 +22,14 @@ def surface(brain, part=""):
 
 @pytest.fixture(scope="module")
 def planned(checkout_copy, tmp_path_factory):
-    """Return a function: the inputs of each job that a dry run of a configuration plans, by the job's first output."""
+    """Return a function: the inputs of the jobs that a dry run of a configuration plans, by output."""
 
     def inputs(config, *targets):
         workflow = Workflow(checkout_copy, tmp_path_factory.mktemp("planned"))
         outcome = workflow.run("-n", *targets, "--configfile", workflow.write("study.yaml", config))
         assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-        jobs = re.findall(r"\n    input: (.*)\n    output: ([^,\n]+)", outcome.stdout + outcome.stderr)
-        return {output: files.split(", ") for files, output in jobs}
+        jobs = re.findall(r"\n    input: (.*)\n    output: (.*)", outcome.stdout + outcome.stderr)
+        return {output: files.split(", ") for files, outputs in jobs for output in outputs.split(", ")}
 
     return inputs
 
@@ -86,10 +86,12 @@ def test_maps_of_simulated_brains_are_brought_to_the_template_from_their_start(j
 
 
 def test_maps_of_parameters_are_made_of_the_files_of_the_user(jobs):
-    (volume, *made) = jobs["results/runs/soft/b21/folding/maps.h5"]
+    (volume, *made) = jobs["results/runs/soft/b21/params.yaml"]
     assert volume == LABELLED["labels"]
     assert all(path.startswith("results/brains/b21/") for path in made)
-    assert "results/runs/reference/b21/folding/maps.h5" not in jobs
+    assert LABELLED["labels"] not in jobs["results/runs/reference/b21/params.yaml"]
+    assert "results/runs/soft/b21/folding/maps.h5" in jobs["results/runs/soft/b21/folding/steps.csv"]
+    assert "results/runs/reference/b21/folding/maps.h5" not in jobs["results/runs/reference/b21/folding/steps.csv"]
 
 
 def test_members_of_a_study_are_gathered_with_the_run_that_equals_one(jobs):
@@ -110,7 +112,7 @@ def test_what_deviates_is_compared_with_what_was_expected_at_its_week(planned):
     study = {"brains": brains, "start": "own22", "folding": {"end_week": 24}, "runs": {"a": {"preset": "expected"}}}
     table = "results/runs/a/own22/metrics/week-24.00/deviation.csv"
     jobs = planned(study, "results/study/deviation.csv")
-    joined = [file for file in jobs["results/study/prediction.csv"] if file.endswith("deviation.csv")]
+    joined = [file for file in jobs["results/study/deviation.csv"] if file.endswith("deviation.csv")]
     assert joined == [table.replace("24", "23"), table]
     weekly = "results/runs/a/own22/surfaces/week-{}.00".format
     maps = "results/brains/{}/surface/measured_thickness.shape.gii".format

@@ -14,14 +14,14 @@ pytestmark = pytest.mark.slow
 
 STAGES = (
     *("pial_from_labels", "cortical_thickness", "growth_curves", "growth_rates", "growth_figure"),
-    *("register", "carried_mesh", "tetrahedralise", "parameters", "regions", "simulate", "folded_surface", "measure"),
+    *("register", "carried_mesh", "tetrahedralise", "prepare", "simulate", "folded_surface", "measure"),
     *("validation", "registration_ceiling", "study_resources", "html_report"),
 )
 """The rules that stand for all: tables and figures follow what they are made of."""
 REPORT = {"html_report": 1}
 RESULTS = REPORT | {"study_resources": 1}
 ONE_RUN = RESULTS | {
-    "regions": 1, "simulate": 1, "parameters": 1, "folded_surface": 2, "measure": 2, "validation": 1,
+    "prepare": 1, "simulate": 1, "folded_surface": 2, "measure": 2, "validation": 1,
 }  # fmt: skip
 BOTH_RUNS = RESULTS | {rule: 2 * count for rule, count in ONE_RUN.items() if rule not in RESULTS}
 CARRIED = {"carried_mesh": 1, "registration_ceiling": 1}
@@ -62,7 +62,7 @@ SETTINGS = {
     "growth": ({"folding": {"growth_rate_per_s": 1e-7}}, BOTH_RUNS | {"growth_figure": 1}),
     "mesh": (
         {"mesh": {"surface_edge_mm": 0.9}},
-        {rule: count for rule, count in (BOTH_RUNS | MESH).items() if rule != "parameters"},
+        BOTH_RUNS | MESH,
     ),
     "surface": (
         {"surface": {"edge_length_mm": 1.5}},
@@ -92,7 +92,7 @@ CODE = {
     "figure": (["src/gyriflow/report/growth.py"], RESULTS | {"growth_figure": 1}),
     "solver": (
         ["src/gyriflow/folding/contact.py"],
-        {rule: count for rule, count in BOTH_RUNS.items() if rule not in ("parameters", "regions")},
+        {rule: count for rule, count in BOTH_RUNS.items() if rule != "prepare"},
     ),
     # what the terminal says, comments in rules and the environment make no result
     "around": (["src/gyriflow/running/launch.py", "workflow/rules/metrics.smk", "envs/gyriflow.yaml"], {}),

@@ -26,16 +26,22 @@ rule calibration_design:
         "../scripts/calibration_design.py"
 
 
-rule calibration_parameters:
+rule prepare_calibrated:
     input:
         design=lambda w: CALIBRATED.design(w.run),
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
+        maps=lambda w: simulation_of(w).maps,
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
     output:
-        PARAMETERS,
+        params=PARAMETERS,
+        regions=REGIONS["mesh"],
+        data=REGIONS["data"],
     log:
-        f"{RUN}/logs/calibration_parameters.log",
+        f"{RUN}/logs/prepare_calibrated.log",
     benchmark:
-        f"{RUN}/benchmarks/calibration_parameters.tsv"
+        f"{RUN}/benchmarks/prepare_calibrated.tsv"
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     conda:
@@ -43,7 +49,7 @@ rule calibration_parameters:
     params:
         week=lambda w: CONFIG.calibrate.compare_week,
     script:
-        "../scripts/calibration_parameters.py"
+        "../scripts/prepare_calibrated.py"
 
 
 def calibrated_surfaces(wildcards):

@@ -3,32 +3,6 @@ from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
 from gyriflow.settings.varying import files_of
 
-# runs of a calibration have their parameters from its rounds, and their maps from its base
-with_parameters = {one.run: one for one in study.simulations.values() if one.base == one.run}
-
-
-rule parameters:
-    input:
-        surface=PIAL["report"],
-        curves=lambda w: simulation_of(w).curves,
-        targets=lambda w: simulation_of(w).targets,
-    output:
-        PARAMETERS,
-    log:
-        f"{RUN}/logs/parameters.log",
-    benchmark:
-        f"{RUN}/benchmarks/parameters.tsv"
-    wildcard_constraints:
-        run=one_of(with_parameters),
-    conda:
-        ENVIRONMENT
-    params:
-        settings=lambda w: simulation_of(w).parameters,
-        weeks=lambda w: simulation_of(w).weeks,
-        series=lambda w: simulation_of(w).followed_series,
-    script:
-        "../scripts/parameters.py"
-
 
 def map_sources(wildcards):
     """Return the user's files of each parameter that has a map, under "map" and "surface"."""
@@ -38,49 +12,47 @@ def map_sources(wildcards):
     }
 
 
-rule parameter_maps:
-    input:
-        lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
-        mesh=MESH["mesh"],
-        data=MESH["data"],
-        surface=PIAL["report"],
-        targets=lambda w: simulation_of(w).targets,
-    output:
-        MAPS,
-    log:
-        f"{RUN}/logs/parameter_maps.log",
-    benchmark:
-        f"{RUN}/benchmarks/parameter_maps.tsv"
-    wildcard_constraints:
-        run=one_of(run for run, one in with_parameters.items() if one.maps),
-    conda:
-        ENVIRONMENT
-    params:
-        # volumes of maps are read like those of the brain
-        affine_from=lambda w: brain_of(w).given.affine_from,
-        maps=map_sources,
-    script:
-        "../scripts/parameter_maps.py"
+# Runs of a calibration have their parameters from its rounds, and their maps from its base.
+for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
 
-
-rule regions:
-    input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
-        params=PARAMETERS,
-        maps=lambda w: simulation_of(w).maps,
-        # the hemispheres of the folded brain are those of the measured one
-        sides=lambda w: [PIAL[side] for side in brain_of(w).sides],
-    output:
-        **REGIONS,
-    log:
-        f"{RUN}/logs/regions.log",
-    benchmark:
-        f"{RUN}/benchmarks/regions.tsv"
-    conda:
-        ENVIRONMENT
-    script:
-        "../scripts/regions.py"
+    rule:
+        name:
+            f"prepare{suffix}"
+        input:
+            lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
+            mesh=MESH["mesh"],
+            data=MESH["data"],
+            surface=PIAL["report"],
+            curves=lambda w: simulation_of(w).curves,
+            targets=lambda w: simulation_of(w).targets,
+            # the hemispheres of the folded brain are those of the measured one
+            sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+        output:
+            **maps,
+            params=PARAMETERS,
+            regions=REGIONS["mesh"],
+            data=REGIONS["data"],
+        log:
+            f"{RUN}/logs/prepare{suffix}.log",
+        benchmark:
+            f"{RUN}/benchmarks/prepare{suffix}.tsv"
+        wildcard_constraints:
+            run=one_of(
+                one.run
+                for one in study.simulations.values()
+                if one.base == one.run and bool(one.maps) == bool(maps)
+            ),
+        conda:
+            ENVIRONMENT
+        params:
+            settings=lambda w: simulation_of(w).parameters,
+            weeks=lambda w: simulation_of(w).weeks,
+            series=lambda w: simulation_of(w).followed_series,
+            # volumes of maps are read like those of the brain
+            affine_from=lambda w: brain_of(w).given.affine_from,
+            maps=map_sources,
+        script:
+            "../scripts/prepare.py"
 
 
 SOLVED_FROM = {
@@ -88,7 +60,7 @@ SOLVED_FROM = {
     "data": MESH["data"],
     "params": PARAMETERS,
     "maps": lambda w: simulation_of(w).maps,
-    # that rule refuses impossible zones, before the ranks start
+    # impossible zones are refused with them, before the ranks start
     "regions": REGIONS["mesh"],
 }
 SOLVE = (

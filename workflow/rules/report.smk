@@ -173,6 +173,5 @@ rule report:
 # what only moves text: no jobs of their own on a cluster, as targets
 localrules:
     atlas_file,
-    parameters,
     html_report,
     brain_page,

@@ -4,15 +4,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import yaml
 from ellipsoid import RUN, SEMI_AXES
 from scripts import run_script
 from shapes import ellipsoid, ellipsoid_mesh
 
+from gyriflow.anatomy.fissure import nearer_left
+from gyriflow.folding.start_regions import start_regions
 from gyriflow.geometry.triangles import corners, submesh
 from gyriflow.io.frames import join_frames, write_frame
-from gyriflow.io.surfaces import read_surface, write_surface
-from gyriflow.io.tetmeshes import read_regions, write_tetrahedral_mesh
+from gyriflow.io.surfaces import read_surface
+from gyriflow.io.tetmeshes import read_regions, write_regions
+from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import LEFT, RIGHT
 
 
@@ -31,15 +33,15 @@ def made(tmp_path_factory):
     """A folder with the regions of the brain's mesh, and with the surfaces of its second frame."""
     folder = tmp_path_factory.mktemp("folded")
     brain = ellipsoid_mesh(16, SEMI_AXES)
-    write_tetrahedral_mesh(folder / "brain.xdmf", brain)
     # the measured brain, in triangles of its own
     surface = ellipsoid(SEMI_AXES, 5)
     on_left = beyond_fissure(corners(surface).mean(axis=1)) < 0
-    for side, faces in (("left", on_left), ("right", ~on_left)):
-        write_surface(folder / f"start.{side}.gii", submesh(surface, faces)[0])
-    (folder / "params.yaml").write_text(yaml.safe_dump(RUN))
-    start = {"mesh": "brain.xdmf", "params": "params.yaml", "sides": ["start.left.gii", "start.right.gii"]}
-    run_script("regions.py", folder, start | {"maps": None}, {"mesh": "regions.xdmf"})
+    left, right = (submesh(surface, faces)[0] for faces in (on_left, ~on_left))
+
+    def left_faces(mesh):
+        return nearer_left(mesh, left, right)
+
+    write_regions(folder / "regions.xdmf", start_regions(brain, parameters_from(RUN), {}, left_faces))
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})
     join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])

@@ -6,7 +6,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.growth.curves import curve_table, errors, fitted, interval, rate, tabulated, value
-from gyriflow.growth.following import fits_of_series, followed_sizes, sizes_on_curves
+from gyriflow.growth.following import fits_of_series, followed_sizes, run_parameters, sizes_on_curves
 from gyriflow.growth.rates import growth_rates, rates_of_series
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
@@ -152,6 +152,23 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
     with pytest.raises(InputError, match="area_cm2 shrinks"):
         followed_sizes(growth, None, None, [21.0, 22.0], False)
     assert followed_sizes(growth, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
+
+
+def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_it_grows_towards():
+    weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
+    settings = {"growth": MEASURED | {"thickness_mm": "measured"}, "thickness_mm": 1.5, "end_week": 22.0}
+    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21)))
+    found = run_parameters(settings, weeks, surface, {}, table, "volume")
+    assert {name: found[name] for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")} == {
+        **{"start_week": 21.0, "output_weeks": weeks, "fissure_x_mm": 0.5, "side": "left", "end_week": 22.0}
+    }
+    assert found["growth"]["area_cm2"][22.0] == pytest.approx(99, rel=5e-3)
+    assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)
+    assert "targets" not in found
+    shapes = {"area_cm2": {21.0: 90.0, 23.0: 80.0}, "volume_ml": {21.0: 40.0, 23.0: 60.0}}
+    found = run_parameters({"growth": {"model": "shapes"}}, weeks, surface, shapes, None, None)
+    assert found["targets"] == {23.0: "target_23.00"}
+    assert found["growth"]["volume_ml"][22.0] == pytest.approx(np.sqrt(40 * 60), rel=1e-9)
 
 
 def test_thickness_follows_its_measured_curve_and_may_shrink():

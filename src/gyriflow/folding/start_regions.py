@@ -1,0 +1,44 @@
+"""Zones, tags and fields of a run on its start mesh, for inspection before the solve."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import TriangleMesh
+from ..io.tetmeshes import Regions
+from ..settings.folding import FoldingParameters, require_maps
+from ..settings.terms import REGION_FIELDS
+from ..settings.varying import Maps
+from .checks import refuse_impossible
+from .growth import GrowthInputs, StepStart
+from .growth_models import growth_model
+from .output import layer_fields
+from .zones import cell_tags, facet_tags, zones_of_run
+
+
+def start_regions(
+    mesh: TetrahedralMesh,
+    parameters: FoldingParameters,
+    maps: Maps,
+    left_faces: Callable[[TriangleMesh], NDArray[np.bool_]],
+) -> Regions:
+    """Return the regions of a run on its start mesh, with the fields of the first step.
+
+    `left_faces` returns the mask of the left faces of the mesh's boundary; of a brain of one hemisphere it is not
+    asked. InputError where maps or zones are impossible.
+    """
+    require_maps(parameters, maps, len(mesh.vertices))
+    zones = zones_of_run(mesh, parameters)
+    refuse_impossible(mesh, zones)
+    model = growth_model(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
+    growth = model(StepStart(mesh.vertices, 0.0, parameters.step_s))
+    at_start = parameters.start_week, REGION_FIELDS, growth.logarithm()
+    fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, *at_start)
+    if parameters.side is None:
+        on_left = left_faces(TriangleMesh(mesh.vertices, zones.facets))
+    else:
+        on_left = np.full(len(zones.facets), parameters.side == "left")
+    tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
+    return Regions(mesh, zones.facets, fields, *tags)

@@ -1,0 +1,45 @@
+"""What a run is solved with: its parameters, their maps on the start mesh, and its zones and fields there."""
+
+from gyriflow.anatomy.fissure import nearer_left
+from gyriflow.folding.start_regions import start_regions
+from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
+from gyriflow.growth.following import run_parameters
+from gyriflow.io.files import read_json, read_table
+from gyriflow.io.registrations import read_weekly_shapes
+from gyriflow.io.surfaces import read_pose, read_surface, read_surface_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_maps, write_regions
+from gyriflow.io.volumes import read_volume_map
+from gyriflow.io.yaml_files import write_yaml
+from gyriflow.mesh import maps as on_mesh
+from gyriflow.settings.folding import FoldingSettings, parameters_from, target_maps
+from gyriflow.settings.varying import bounds_of
+from gyriflow.step import step
+
+files, output, params = snakemake.input, snakemake.output, snakemake.params
+with step(snakemake.log[0]):
+    mesh, maps, sizes = read_tetrahedral_mesh(files.mesh), {}, {}
+    facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
+    for name, source in params.maps.items():
+        path = ", ".join(source["map"])
+        if source["surface"]:
+            surface, values = read_surface_maps(source["map"], source["surface"])
+            surface = on_mesh.move_to_mesh(mesh.vertices[boundary_surface(mesh)[1]], surface, pose.of_file())
+            maps[name] = on_mesh.vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
+        else:
+            volume, motion = read_volume_map(path, params.affine_from), pose.of_volume(path)
+            maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
+        on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
+    if files.targets:
+        targets = read_weekly_shapes(files.targets)
+        weekly = targets.weeks.tolist()
+        sizes = {name: dict(zip(weekly, of.tolist(), strict=True)) for name, of in targets.sizes.items()}
+        maps |= target_maps(targets.weeks[1:], targets.positions[1:])
+    curves = read_table(files.curves) if files.curves else None
+    known = params.settings, params.weeks, read_json(files.surface), sizes, curves, params.series
+    write_yaml(output.params, parameters := run_parameters(*known))
+    if maps:
+        write_maps(output.maps, maps)
+    regions = start_regions(
+        mesh, parameters_from(parameters), maps, lambda mesh: nearer_left(mesh, *map(read_surface, files.sides))
+    )
+    write_regions(output.regions, regions)
