@@ -1,31 +1,32 @@
-# What simulations are worth: each simulated brain beside the real one of its week, with the scaled start as baseline.
-rule ready_surfaces:
+# Accuracy of simulations: each simulated brain is compared with the observed one of its week, with the scaled start as
+# baseline.
+rule prepared_surfaces:
     input:
         real=lambda w: study.references[w.brain, float(w.week)][0].pial,
         adjacent=lambda w: study.references[w.brain, float(w.week)][1].pial,
         start=PIAL["whole"],
     output:
-        **READY,
+        **PREPARED,
     log:
-        f"{STUDY}/logs/ready_surfaces.{{brain}}.{WEEK}.log",
+        f"{STUDY}/logs/prepared_surfaces.{{brain}}.{WEEK}.log",
     benchmark:
-        f"{STUDY}/benchmarks/ready_surfaces.{{brain}}.{WEEK}.tsv"
+        f"{STUDY}/benchmarks/prepared_surfaces.{{brain}}.{WEEK}.tsv"
     conda:
         ENVIRONMENT
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
-        "../scripts/ready_surfaces.py"
+        "../scripts/prepared_surfaces.py"
 
 
-def ready_files(start, weeks):
-    """Return the files of `ready_surfaces` of a start brain, by kind, one for each of the weeks."""
-    return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in READY.items()}
+def prepared_files(start, weeks):
+    """Return the files that `prepared_surfaces` writes for a start brain by kind, one for each of the weeks."""
+    return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in PREPARED.items()}
 
 
 rule validation:
     input:
-        unpack(lambda w: ready_files(w.brain, simulation_of(w).real)),
+        unpack(lambda w: prepared_files(w.brain, simulation_of(w).real)),
         simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
         whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
         params=PARAMETERS,
@@ -53,7 +54,7 @@ rule validation:
 
 rule prediction:
     input:
-        unpack(lambda w: ready_files(w.brain, simulation_of(w).real)),
+        unpack(lambda w: prepared_files(w.brain, simulation_of(w).real)),
         simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
         whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
         atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
@@ -121,7 +122,7 @@ rule deviation:
 
 rule registration_ceiling:
     input:
-        unpack(lambda w: ready_files(w.brain, study.ceiling_weeks(w.brain))),
+        unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
         whole=lambda w: [study.references[w.brain, week][0].pial for week in study.ceiling_weeks(w.brain)],
         mesh=MESH["mesh"],
         data=MESH["data"],

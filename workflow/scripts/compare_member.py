@@ -1,4 +1,4 @@
-"""How far a run of a sweep is from the observed brains of its week; without rows if it has not reached that week."""
+"""Distances of a run of a sweep from the observed brains of its week; no rows if it has not reached that week."""
 
 from itertools import batched
 

@@ -1,4 +1,4 @@
-"""How the displacement of a run's pial vertices agrees with the measured one, interval by interval."""
+"""Agreement of the displacement of a run's pial vertices with the measured one, interval by interval."""
 
 from gyriflow.compare.displacement import displacement_table
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface

@@ -2,21 +2,20 @@
 
 import pandas as pd
 
-from gyriflow.geometry.triangles import area, signed_volume
+from gyriflow.geometry.triangles import area_cm2, volume_ml
 from gyriflow.growth.rates import TISSUES, rates_of_series
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
-from gyriflow.units import CM2_PER_MM2, ML_PER_MM3
 
 files, params, output = snakemake.input, snakemake.params, snakemake.output
 thickness = dict(zip(params.with_thickness, files.thickness, strict=True))
 with step(snakemake.log[0]):
     areas = pd.DataFrame({"series": params.series, "subject": params.brains, "week": params.weeks})
     surfaces = [read_surface(file) for file in files.whole]
-    areas["area_cm2"] = [area(surface) * CM2_PER_MM2 for surface in surfaces]
+    areas["area_cm2"] = list(map(area_cm2, surfaces))
     areas["thickness_mm"] = areas["subject"].map({name: read_json(path)["mean_mm"] for name, path in thickness.items()})
-    areas["volume_ml"] = [signed_volume(surface) * ML_PER_MM3 for surface in surfaces]
+    areas["volume_ml"] = list(map(volume_ml, surfaces))
     known = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
     for tissue in TISSUES:
         areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in known]

@@ -1,4 +1,4 @@
-"""The week in which each sulcus of the last observed brain appears: in the observed brains, and in a run."""
+"""Onset week of each sulcus of the last observed brain: in the observed brains, and in a run."""
 
 import pandas as pd
 
@@ -26,10 +26,8 @@ with step(snakemake.log[0]):
         ]
         # the run keeps the vertices of its start
         start = carry_to_pose(next(iter(simulated.values())), poses[0], pairs, poses[-1])
-        for run, surfaces, on_last in (
-            (MEASURED, observed, carried),
-            (params.run, simulated, [start] * len(simulated)),
-        ):
-            table = onset_table(surfaces, on_last, last, *sulci)
+        on_last = {MEASURED: carried, params.run: [start for _ in simulated]}
+        for run, surfaces in ((MEASURED, observed), (params.run, simulated)):
+            table = onset_table(surfaces, on_last[run], last, *sulci)
             tables.append(table.assign(run=run, subject=params.subject, hemisphere=side))
     write_table(snakemake.output[0], pd.concat(tables, ignore_index=True))

@@ -1,4 +1,4 @@
-"""What the paper reports, compared with the same of this study: two tables, and a page with the verdicts."""
+"""Comparison with what the paper reports: two tables, and a page with the verdicts."""
 
 from markupsafe import Markup
 

@@ -1,1 +1,1 @@
-"""What a simulation is worth: compared with real brains, with no folding, and with chance."""
+"""Comparison of simulations with observed brains: validation, prediction, deviation, sweeps and calibration."""

@@ -1,4 +1,4 @@
-"""Onset of sulci: the week in which each sulcus of the last observed brain appears."""
+"""Onset of sulci: the week when each sulcus of the last observed brain appears."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ from ..metrics.curvature import curvature
 from ..metrics.gyrification import sulcal_depth
 
 MIN_DEPTH_MM = 2.0
-"""Depth below the neighbouring crowns from which a sulcus counts as present."""
+"""A sulcus is present if it is at least this deep below its neighbouring crowns."""
 
 CROWN_DISTANCE_MM = 10.0
 """Distance from a sulcus within which its crowns are looked for."""
@@ -138,7 +138,7 @@ def onset_table(
     sulci: NDArray[np.integer],
     names: Mapping[int, str],
 ) -> pd.DataFrame:
-    """Find the week in which each sulcus of the last observed brain appears in a series of surfaces.
+    """Find the week when each sulcus of the last observed brain appears in a series of surfaces.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def measure_relief(
 
 
 def find_onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
-    """Find the week in which each sulcus appears, from tables of `measure_relief` by week.
+    """Find the week when each sulcus appears, from tables of `measure_relief` by week.
 
     It is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly between weeks; if the relief of the week
     before is unknown, the week itself. Columns region, there_at_start, onset_week (NaN if the sulcus was present at the

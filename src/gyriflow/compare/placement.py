@@ -32,7 +32,7 @@ def correlation(x: Floats, y: Floats, weights: Floats) -> float:
 def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
     """Return (r − r_start)/(r_adjacent − r_start): 0 is as good as the scaled start, 1 as the observed week before.
 
-    NaN for horizons (GW) up to `MIN_SKILL_HORIZON_GW`, and where the adjacent week is no better than the start.
+    NaN for horizons (GW) up to `MIN_SKILL_HORIZON_GW`, and where the adjacent week is not better than the start.
     """
     room = r_adjacent - r_start
     return float((r - r_start) / room) if horizon > MIN_SKILL_HORIZON_GW and room > 0 else float("nan")

@@ -123,7 +123,7 @@ def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
     pairs = _pairs(metrics[metrics["metric"].isin([*SIZES, WEYL_NUMBER])], observed, ["hemisphere", "metric"])
     for pair in pairs.to_dict("records"):
-        # the number of modes is no measure of similarity
+        # the number of modes is not a measure of similarity
         distance = np.nan if pair["metric"] == WEYL_NUMBER else abs(pair["value"] / pair["value_real"] - 1)
         yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
 

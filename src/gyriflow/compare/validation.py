@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.alignment import align
-from ..geometry.triangles import TriangleMesh, area, signed_volume
-from ..units import CM2_PER_MM2, ML_PER_MM3
+from ..geometry.triangles import TriangleMesh, area, area_cm2, signed_volume, volume_ml
 from .distances import pairwise_distances, surface_distances
 from .placement import score_placement
 from .shapes import PreparedSurface, cortex_dice, curvature_differences, prepare_for_comparison
@@ -106,9 +105,5 @@ def validation_row(
 
 
 def _sizes(mesh: TriangleMesh) -> dict[str, float]:
-    surface, volume = area(mesh), signed_volume(mesh)
-    return {
-        "area_cm2": surface * CM2_PER_MM2,
-        "volume_ml": volume * ML_PER_MM3,
-        "relative_area": surface / volume ** (2 / 3),
-    }
+    relative_area = area(mesh) / signed_volume(mesh) ** (2 / 3)
+    return {"area_cm2": area_cm2(mesh), "volume_ml": volume_ml(mesh), "relative_area": relative_area}

@@ -7,6 +7,7 @@ import scipy  # submodules load lazily, which keeps dry runs fast
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MeshError
+from ..units import CM2_PER_MM2, ML_PER_MM3
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,6 +62,16 @@ def signed_volume(mesh: TriangleMesh) -> float:
     """Return the enclosed volume in mm³, negative if the faces are oriented inward (divergence theorem)."""
     a, b, c = corners(mesh).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def area_cm2(mesh: TriangleMesh) -> float:
+    """Return the area of a mesh in mm, in cm²."""
+    return area(mesh) * CM2_PER_MM2
+
+
+def volume_ml(mesh: TriangleMesh) -> float:
+    """Return the volume that a closed mesh in mm encloses, in mL; negative where its faces look inwards."""
+    return signed_volume(mesh) * ML_PER_MM3
 
 
 def unit(vectors: Floats) -> Floats:

@@ -11,9 +11,8 @@ from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, vertex_sizes
 from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume, vertex_areas, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..settings.growth import BEFORE_GW
-from ..units import CM2_PER_MM2, ML_PER_MM3
 from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
 
@@ -182,6 +181,6 @@ def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Fl
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
     return {
-        "area_cm2": np.array([area(surface) * CM2_PER_MM2 for surface in surfaces]),
-        "volume_ml": np.array([signed_volume(surface) * ML_PER_MM3 for surface in surfaces]),
+        "area_cm2": np.array(list(map(area_cm2, surfaces))),
+        "volume_ml": np.array(list(map(volume_ml, surfaces))),
     }

@@ -100,12 +100,12 @@ FOLDING = {
 MEASURES = {name: f"{PLACE}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
 """Tables that are made for every brain, whatever hemispheres it has."""
 
-READY = {
+PREPARED = {
     f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"
     for name in ("real", "start", "adjacent")
     for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
 }
-"""What all runs from a start brain are compared with in a week: surfaces that are ready, with their curvature."""
+"""Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
