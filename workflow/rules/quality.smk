@@ -1,4 +1,4 @@
-# Quality control before the solve: a page and a verdict for each brain.
+# What is drawn of each measured brain, before any solve: quality control with a verdict, its maps, and small pictures.
 def quality_columns(name):
     """Return what the table of quality says of a brain before it is looked at, also of a refused one."""
     given = CONFIG.brain(name)
@@ -17,7 +17,7 @@ def surface_logs(wildcards):
     return expand(f"{BRAIN}/logs/{{rule}}.log", brain=brain.id, rule=[*made_by, "cortical_thickness"])
 
 
-rule quality_page:
+rule brain_figures:
     input:
         surface=PIAL["whole"],
         report=PIAL["report"],
@@ -26,28 +26,35 @@ rule quality_page:
         white=lambda w: list(brain_of(w).given.white_files.values()),
         thickness=lambda w: brain_of(w).measured.thickness,
         measured=lambda w: THICKNESS["report"].format(brain=w.brain) if brain_of(w).has_thickness else [],
+        hemispheres=lambda w: brain_of(w).measured.hemispheres,
+        maps=lambda w: brain_of(w).measured.maps,
     output:
-        png=f"{BRAIN}/figures/quality.png",
-        pdf=f"{BRAIN}/figures/quality.pdf",
+        quality=f"{BRAIN}/figures/quality.png",
+        quality_pdf=f"{BRAIN}/figures/quality.pdf",
+        maps=f"{BRAIN}/figures/shape_index.png",
+        maps_pdf=f"{BRAIN}/figures/shape_index.pdf",
+        small=f"{BRAIN}/figures/small.png",
+        small_pdf=f"{BRAIN}/figures/small.pdf",
         row=f"{BRAIN}/quality.json",
     log:
-        f"{BRAIN}/logs/quality_page.log",
+        f"{BRAIN}/logs/brain_figures.log",
     benchmark:
-        f"{BRAIN}/benchmarks/quality_page.tsv"
+        f"{BRAIN}/benchmarks/brain_figures.tsv"
     conda:
         ENVIRONMENT
     params:
         white_files=lambda w: brain_of(w).given.white_files,
         labels=lambda w: brain_of(w).labels,
         columns=lambda w: quality_columns(w.brain),
+        side=lambda w: brain_of(w).sides[0],
         logs=surface_logs,
     script:
-        "../scripts/quality_page.py"
+        "../scripts/brain_figures.py"
 
 
 rule quality_table:
     input:
-        expand(rules.quality_page.output.row, brain=study.brains),
+        expand(rules.brain_figures.output.row, brain=study.brains),
     output:
         f"{STUDY}/quality.csv",
     log:
@@ -68,5 +75,5 @@ rule quality_table:
 
 rule quality:
     input:
-        expand(list(rules.quality_page.output), brain=study.brains),
+        expand(list(rules.brain_figures.output), brain=study.brains),
         rules.quality_table.output,

@@ -1,5 +1,5 @@
-# What the jobs took and warned of, and the report: an HTML page with the figures and tables of the registry, and one of
-# each brain.
+# What the jobs took and warned of, and the report: an HTML page of the study and one of each brain, with the figures and
+# tables of the registry.
 from itertools import takewhile
 
 from gyriflow.running.reruns import benchmark_patterns
@@ -84,19 +84,6 @@ rule provenance:
         "../scripts/provenance.py"
 
 
-OF_PAGES = dict(
-    quality=rules.quality_table.output[0],
-    metrics=f"{STUDY}/metrics.csv",
-    centiles=rules.metrics_tables.output.centiles,
-    warnings=rules.study_resources.output.warnings,
-    provenance=rules.provenance.output.report,
-    methods=rules.provenance.output.methods,
-    page=f"{PAGE}/page.html",
-    style=f"{PAGE}/style.css",
-)
-PAGE_OF_BRAIN = f"{REPORT}/brains/{{brain}}.html"
-
-
 def figures_on_page(brain=None):
     """Return what the page of a brain, or that of the study, says of its figures."""
     shown = [figure for figure in FIGURES if figure.kind.section]
@@ -111,20 +98,27 @@ rule html_report:
         rules.figures.input,
         rules.metrics.input,
         rules.influence_figures.input,
-        asked_for(FIGURES, "report"),
-        expand(PAGE_OF_BRAIN, brain=study.brains),
-        **OF_PAGES,
-        small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
+        asked_for(FIGURES, "report", "quality", "brain"),
+        quality=rules.quality_table.output[0],
+        metrics=f"{STUDY}/metrics.csv",
+        centiles=rules.metrics_tables.output.centiles,
+        warnings=rules.study_resources.output.warnings,
         runs=rules.run_tables.output.csv if study.folded else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
+        small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
         view=asked_for(FIGURES, "view")[0],
+        provenance=rules.provenance.output.report,
+        methods=rules.provenance.output.methods,
+        page=f"{PAGE}/page.html",
+        style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
         notice=f"{PAGE}/three.LICENSE.txt",
         controls=f"{PAGE}/OrbitControls.js",
         viewer=f"{PAGE}/viewer.js",
     output:
-        f"{REPORT}/report.html",
+        report=f"{REPORT}/report.html",
+        brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=study.brains),
     log:
         f"{REPORT}/logs/html_report.log",
     benchmark:
@@ -133,32 +127,10 @@ rule html_report:
         ENVIRONMENT
     params:
         figures=figures_on_page(),
+        brain_figures={brain: figures_on_page(brain) for brain in study.brains},
         brains=study.described_brains,
         prediction=study.described_prediction,
-        pictured=list(study.brains),
         norm=measured_name(study.brains[brain] for brain in study.norm_reference),
-        config=study.used_settings,
-    script:
-        "../scripts/html_report.py"
-
-
-rule brain_page:
-    input:
-        lambda w: [figure["path"] for figure in figures_on_page(w.brain)],
-        **OF_PAGES,
-    output:
-        PAGE_OF_BRAIN,
-    log:
-        f"{REPORT}/logs/brain_page.{{brain}}.log",
-    benchmark:
-        f"{REPORT}/benchmarks/brain_page.{{brain}}.tsv"
-    conda:
-        ENVIRONMENT
-    params:
-        figures=lambda w: figures_on_page(w.brain),
-        brains=lambda w: [brain for brain in study.described_brains if brain["id"] == w.brain],
-        pictured=None,
-        norm=rules.html_report.params.norm,
         config=study.used_settings,
     script:
         "../scripts/html_report.py"
@@ -174,4 +146,3 @@ rule report:
 localrules:
     atlas_file,
     html_report,
-    brain_page,

@@ -1,34 +1,35 @@
-"""The report of a study or of one brain, an HTML page that needs nothing else."""
+"""The report of a study and the pages of its brains: HTML pages that need nothing else."""
 
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_text
 from gyriflow.io.yaml_files import read_yaml, yaml_text
-from gyriflow.report.page import hide_paths, page_content, report_page, shown_figures
+from gyriflow.report.page import Origin, Tables, brain_page, hide_paths, report_page, shown_figures, study_page
 from gyriflow.step import step
 
 PICTURE_BYTES = 9_000_000
 PARTS = ("style", "three", "notice", "controls", "viewer")
-files, params = snakemake.input, snakemake.params
-with step(snakemake.log[0]):
-    paths = [figure["path"] for figure in params.figures]
+TABLES = ("quality", "metrics", "centiles", "warnings", "runs", "validation")
+files, output, params = snakemake.input, snakemake.output, snakemake.params
+
+
+def shown(figures):
+    """Return figures and tables with their content, as pages show them."""
+    paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
-    contents |= {path: read_body(path) for path in paths if path not in contents}
-    small = None if params.pictured is None else picture_addresses(files.small, PICTURE_BYTES)
-    prediction = params.get("prediction")
-    prediction = prediction and prediction | {"worth": read_yaml(files.worth)}
-    content = page_content(
-        prediction=prediction,
-        brains=params.brains,
-        pictures=None if small is None else dict(zip(params.pictured, small, strict=True)),
-        norm=params.norm,
-        provenance=read_json(files.provenance),
-        methods=read_text(files.methods),
-        configuration=yaml_text(hide_paths(params.config)),
-        shown=shown_figures(params.figures, contents),
-        **{name: read_table(files[name]) for name in ("quality", "warnings", "metrics", "centiles")},
-        **{name: read_table(path) if (path := files.get(name)) else None for name in ("runs", "validation")},
-    )
-    parts = {name: read_text(path) for name, path in files.items() if name in PARTS}
-    view = read_json(path) if (path := files.get("view")) else {"groups": []}
-    write_text(snakemake.output[0], report_page(read_text(files.page), parts, view, **content))
+    return shown_figures(figures, {path: contents.get(path) or read_body(path) for path in paths})
+
+
+with step(snakemake.log[0]):
+    template, parts = read_text(files.page), {name: read_text(files[name]) for name in PARTS}
+    tables = Tables(**{name: read_table(files[name]) for name in TABLES if files[name]})
+    origin = Origin(read_json(files.provenance), read_text(files.methods), yaml_text(hide_paths(params.config)))
+    brains = {brain["id"]: brain for brain in params.brains}
+    for path, (name, figures) in zip(output.brains, params.brain_figures.items(), strict=True):
+        page = brain_page(brains[name], tables, origin, shown(figures), norm=params.norm)
+        write_text(path, report_page(template, parts, {"groups": []}, **page))
+    small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
+    prediction = params.prediction and params.prediction | {"worth": read_yaml(files.worth)}
+    about = {"norm": params.norm, "pictures": small, "prediction": prediction}
+    page = study_page(params.brains, tables, origin, shown(params.figures), **about)
+    write_text(output.report, report_page(template, parts, read_json(files.view), **page))

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import count
 from typing import Any
@@ -88,80 +89,134 @@ def sections(shown: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[st
     ]
 
 
-def page_content(
-    *,
-    brains: Sequence[Mapping[str, Any]],
-    quality: pd.DataFrame,
-    metrics: pd.DataFrame,
-    centiles: pd.DataFrame,
-    pictures: Mapping[str, tuple[str, float]] | None,
-    norm: str,
-    runs: pd.DataFrame | None,
-    validation: pd.DataFrame | None,
-    warnings: pd.DataFrame,
-    provenance: Mapping[str, Any],
-    methods: str,
-    configuration: str,
-    shown: Sequence[Mapping[str, Any]],
-    prediction: Mapping[str, Any] | None = None,
-) -> dict[str, Any]:
-    """Return what the page's template names: the first page, the sections, and where all comes from.
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """The tables of a study that its pages show.
 
-    Parameters
+    Attributes
     ----------
-    brains, quality, metrics, centiles, pictures : as for `brains_table`; without pictures the page is of one brain
-    norm : what the brains of the norm are called
-    runs, validation : as for `scores_table`; no runs where brains were measured only
+    quality, metrics, centiles : as for `brains_table`
     warnings : columns subject, run, step, level, message
+    runs, validation : as for `scores_table`; no runs where brains were measured only
+    """
+
+    quality: pd.DataFrame
+    metrics: pd.DataFrame
+    centiles: pd.DataFrame
+    warnings: pd.DataFrame
+    runs: pd.DataFrame | None = None
+    validation: pd.DataFrame | None = None
+
+    def __post_init__(self) -> None:
+        # messages name files without their folders
+        for name in ("quality", "warnings"):
+            object.__setattr__(self, name, getattr(self, name).replace(_FOLDERS, "", regex=True))
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where the results of a study come from.
+
+    Attributes
+    ----------
     provenance : what `software` returns, and files (brain, what, sha256)
     methods : reStructuredText
     configuration : text, without paths
+    """
+
+    provenance: Mapping[str, Any]
+    methods: str
+    configuration: str
+
+
+def study_page(
+    brains: Sequence[Mapping[str, Any]],
+    tables: Tables,
+    origin: Origin,
+    shown: Sequence[Mapping[str, Any]],
+    *,
+    norm: str,
+    pictures: Mapping[str, tuple[str, float]],
+    prediction: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Return what the page's template names for the report of a study.
+
+    Parameters
+    ----------
+    brains, pictures : as for `brains_table`
     shown : what `shown_figures` returns
+    norm : what the brains of the norm are called
     prediction : what `Study.described_prediction` returns, and worth, of `norms/predictions.yaml`
     """
-    software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
-    warnings, quality = (table.replace(_FOLDERS, "", regex=True) for table in (warnings, quality))
-    ids = [brain["id"] for brain in brains]
-    if pictures is None:
-        warnings = warnings[warnings["subject"].isin(ids)]
-    own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
-    files = [file for file in provenance["files"] if file["brain"] in ids]
-    flags = set(own["flag"])
-    # the brains of an atlas are too few for norms of each other
-    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    versions = [(name, version) for name, version in software.items() if version]
-    title, said, scores = f"Measured cortical folding, {ids[0]}", "", ""
-    if pictures is not None:
-        title, said = "Measured cortical folding", measured_verdict(quality)
+    runs, validation = tables.runs, tables.validation
+    title, sentence, scores = "Measured cortical folding", measured_verdict(tables.quality), ""
     if runs is not None:
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
-        said = verdict(runs, validation, warnings, worth_told(prediction) if prediction else NOT_COMPARED)
+        sentence = verdict(runs, validation, tables.warnings, worth_told(prediction) if prediction else NOT_COMPARED)
         # a prediction alone is compared with nothing
         scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
     if prediction:
         title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
         title += prediction["growth_of"]
-        numbers, known = predicted_table(metrics, prediction), worth_table(prediction["worth"])
+        numbers, known = predicted_table(tables.metrics, prediction), worth_table(prediction["worth"])
         prediction = {**prediction, "numbers": html_table(numbers), "known": html_table(known)}
-    return {
+    return _shared(brains, tables, origin, shown, norm, pictures) | {
         "title": title,
-        "verdict": said,
+        "verdict": sentence,
         "prediction": prediction,
-        "given": brains,
         "folded": [] if runs is None else runs.to_dict("records"),
-        "brains": html_table(brains_table(brains, quality, metrics, centiles, pictures or {})),
-        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
-        "alone": pictures is None,
-        "numbers": html_table(brain_table(metrics[metrics["subject"] == ids[0]], centiles)) if pictures is None else "",
+        "alone": False,
+        "numbers": "",
         "runs": scores,
-        "warnings": "" if warnings.empty else html_table(grouped(warnings)),
+    }
+
+
+def brain_page(
+    brain: Mapping[str, Any], tables: Tables, origin: Origin, shown: Sequence[Mapping[str, Any]], *, norm: str
+) -> dict[str, Any]:
+    """Return what the page's template names for the page of a measured brain; parameters are as for `study_page`."""
+    own = tables.metrics["subject"] == brain["id"]
+    warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
+    return _shared([brain], replace(tables, warnings=warnings), origin, shown, norm, {}) | {
+        "title": f"Measured cortical folding, {brain['id']}",
+        "verdict": "",
+        "prediction": None,
+        "folded": [],
+        "alone": True,
+        "numbers": html_table(brain_table(tables.metrics[own], tables.centiles)),
+        "runs": "",
+    }
+
+
+def _shared(
+    brains: Sequence[Mapping[str, Any]],
+    tables: Tables,
+    origin: Origin,
+    shown: Sequence[Mapping[str, Any]],
+    norm: str,
+    pictures: Mapping[str, tuple[str, float]],
+) -> dict[str, Any]:
+    """Return what the pages of a study and of a brain both have: rows of brains, warnings, sections, provenance."""
+    ids, centiles, provenance = [brain["id"] for brain in brains], tables.centiles, origin.provenance
+    own = centiles[centiles["subject"].isin(ids) & centiles["metric"].isin(OF_BRAINS) & (centiles["run"] == MEASURED)]
+    flags = set(own["flag"])
+    # the brains of an atlas are too few for norms of each other
+    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
+    files = [file for file in provenance["files"] if file["brain"] in ids]
+    software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
+    versions = [(name, version) for name, version in software.items() if version]
+    return {
+        "given": brains,
+        "brains": html_table(brains_table(brains, tables.quality, tables.metrics, centiles, pictures)),
+        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
+        "warnings": "" if tables.warnings.empty else html_table(grouped(tables.warnings)),
         "weeks": next((item for item in shown if item["first"]), None),
         "sections": sections([item for item in shown if not item["first"]]),
         "made": made(provenance),
-        "methods": caption_html(methods),
+        "methods": caption_html(origin.methods),
         "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
         "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
-        "configuration": configuration,
+        "configuration": origin.configuration,
     }
 
 

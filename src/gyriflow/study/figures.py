@@ -8,7 +8,6 @@ from .comparison_figures import comparison_figures
 from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, RUN, STUDY
 from .records import Brain, Simulation
 from .registry import (
-    AROUND,
     THREE_SIDES,
     Figure,
     Kind,
@@ -48,9 +47,7 @@ def figures_of(study: Study) -> list[Figure]:
 def _brain_figures(study: Study) -> Iterator[Figure]:
     for brain in study.brains.values():
         names = {"brain": brain.id}
-        yield Figure(QUALITY, names=names)
-        yield small_pictures(brain)
-        yield brain_maps(brain)
+        yield from (Figure(kind, names=names) for kind in (QUALITY, SMALL, BRAIN_MAPS))
         if brain.has_regions:
             yield Figure(BRAIN_REGIONS, {"brains": {brain.id: regions_of(brain.measured)}}, names=names)
     yield inputs_figure(study)
@@ -58,6 +55,7 @@ def _brain_figures(study: Study) -> Iterator[Figure]:
         yield mesh_quality(study)
 
 
+# these three are drawn by the rule `brain_figures`
 QUALITY = Kind(
     "quality_page",
     f"{BRAIN_FIGURES}/quality.png",
@@ -69,6 +67,15 @@ QUALITY = Kind(
         "and the warnings."
     ),
     target="quality",
+)
+SMALL = Kind("small_pictures", f"{BRAIN_FIGURES}/small.png", target="small")
+BRAIN_MAPS = Kind(
+    "brain_maps",
+    f"{BRAIN_FIGURES}/shape_index.png",
+    section="Metrics",
+    title="Shape index",
+    caption="Shape index: −½ is a valley (sulci, blue), +½ a ridge (gyri, red), −1 a cup, +1 a cap.",
+    target="brain",
 )
 BRAIN_REGIONS = Kind(
     "brain_regions",
@@ -82,31 +89,6 @@ BRAIN_REGIONS = Kind(
     ),
     target="brain",
 )
-
-SMALL = Kind("small_pictures", f"{BRAIN_FIGURES}/small.png", "pictures:small_pictures", target="small")
-
-
-def small_pictures(brain: Brain) -> Figure:
-    """Return the pictures in the row of a brain in the report."""
-    row = brain.measured
-    return Figure(SMALL, {"halves": halves_of(row)}, {"side": row.sides[0]}, {"brain": brain.id})
-
-
-BRAIN_MAPS = Kind(
-    "brain_maps",
-    f"{BRAIN_FIGURES}/shape_index.png",
-    "pictures:shape_maps",
-    section="Metrics",
-    title="Shape index",
-    caption="Shape index: −½ is a valley (sulci, blue), +½ a ridge (gyri, red), −1 a cup, +1 a cap.",
-    target="brain",
-)
-
-
-def brain_maps(brain: Brain) -> Figure:
-    inputs: Given = {"brains": {"": {brain.week: halves_of(brain.measured)}}}
-    return Figure(BRAIN_MAPS, inputs, {"quantity": "shape_index", "views": AROUND}, {"brain": brain.id})
-
 
 INPUTS = Kind("inputs_figure", f"{STUDY_FIGURES}/inputs.png", "pictures:runs_by_week", target="", paper=True)
 
@@ -238,6 +220,7 @@ WEEKLY = Kind(
         "``results/study/runs.csv``."
     ),
     paper=True,
+    job="folding_figures",
 )
 
 
@@ -261,6 +244,7 @@ OUTLINES = Kind(
         "(a) and axial sections (b) through the middle, sagittal sections (c) through the right hemisphere."
     ),
     paper=True,
+    job="folding_figures",
 )
 
 
@@ -285,6 +269,7 @@ DISPLACEMENT_MAPS = Kind(
         "position in RAS+ mm. The mean is over the vertices."
     ),
     paper=True,
+    job="folding_figures",
 )
 
 

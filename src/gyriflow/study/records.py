@@ -55,6 +55,11 @@ class Measured:
     def hemispheres(self) -> list[str]:
         return [self.parts[side] for side in self.sides]
 
+    @property
+    def maps(self) -> list[str]:
+        """The files with the maps on its hemispheres."""
+        return [f"{self.folder}/{side}.shape.gii" for side in self.sides]
+
 
 @dataclass(frozen=True, eq=False)
 class Brain:

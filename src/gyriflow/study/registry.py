@@ -153,7 +153,7 @@ def measured_name(brains: Iterable[Brain]) -> str:
 
 def halves_of(row: Measured) -> list[list[str]]:
     """Return the hemispheres of a measured brain, each with its maps."""
-    return [[row.parts[side], f"{row.folder}/{side}.shape.gii"] for side in row.sides]
+    return [list(pair) for pair in zip(row.hemispheres, row.maps, strict=True)]
 
 
 def regions_of(row: Measured) -> list[list[str]]:

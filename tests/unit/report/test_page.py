@@ -10,16 +10,19 @@ from markupsafe import Markup
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.page import (
+    Origin,
+    Tables,
+    brain_page,
     brains_table,
     caption_html,
     hide_paths,
     methods_text,
-    page_content,
     report_page,
     run_verdict,
     scores_table,
     sections,
     shown_figures,
+    study_page,
     verdict,
     worth_told,
 )
@@ -90,12 +93,17 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
     return shown_figures(figures, {figure["path"]: content for figure in figures})
 
 
-def page(figures: list[dict], view: dict | None = None, **others) -> str:
-    usual = {"brains": BRAINS, "pictures": PICTURES, "runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
-    content = page_content(
-        **MEASURES | usual | others, norm="the norm", provenance=PROVENANCE, methods="**Brains.** Two.",
-        configuration="start: young\n", shown=figures,
-    )  # fmt: skip
+TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
+ORIGIN = Origin(PROVENANCE, "**Brains.** Two.", "start: young\n")
+
+
+def page(figures: list[dict], view: dict | None = None, prediction: dict | None = None, **tables) -> str:
+    """Return the page of a study, with others than the usual tables."""
+    about = {"norm": "the norm", "pictures": PICTURES, "prediction": prediction}
+    return written(study_page(BRAINS, Tables(**TABLES | tables), ORIGIN, figures, **about), view)
+
+
+def written(content: dict, view: dict | None = None) -> str:
     texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
     return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
 
@@ -240,8 +248,8 @@ def test_a_brain_has_a_page_of_its_own():
     warnings = pd.DataFrame(
         {"subject": ["young", "other"], "run": np.nan, "step": "s", "level": "warning", "message": ["own", "other's"]}
     )
-    alone = {"brains": BRAINS[:1], "pictures": None, "runs": None, "validation": None, "warnings": warnings}
-    text = page(shown("quality"), **alone)
+    tables = Tables(**TABLES | {"warnings": warnings})
+    text = written(brain_page(BRAINS[0], tables, ORIGIN, shown("quality"), norm="the norm"))
     assert "<h1>Measured cortical folding, young</h1>" in text
     assert 'href="../report.html"' in text
     assert "other&#39;s" not in text

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
-from pictures import words
+from pictures import tone, words
+from PIL import Image
+from scripts import run_script
 from shapes import rigid, scaling, sphere
 
 from gyriflow.anatomy.extraction import isosurface
 from gyriflow.geometry.poses import LPS_TO_RAS, Pose
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.io.files import read_json, write_json, write_text
+from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.report.quality import Brain, quality_page, quality_row, quality_table, tissue_groups
 
@@ -103,3 +107,29 @@ def test_line_and_edge_agree_in_every_plane(figure, number, name, axes):
     np.testing.assert_allclose(found, centre[list(axes)], atol=0.4)
     spans = np.array([np.ptp(columns), np.ptp(rows)]) * size / 2
     np.testing.assert_allclose(spans, expected, atol=0.5)
+
+
+def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
+    sides = {side: sphere(10.0, 3, centre=(x, 0, 0)) for side, x in (("left", -10.0), ("right", 10.0))}
+    for name, mesh in (*sides.items(), ("whole", merged(*sides.values()))):
+        write_surface(tmp_path / f"{name}.surf.gii", mesh)
+        maps = {"shape_index": np.full(len(mesh.vertices), 0.7), "sulcal_depth_mm": np.zeros(len(mesh.vertices))}
+        write_vertex_maps(tmp_path / f"{name}.shape.gii", maps)
+    write_vertex_maps(tmp_path / "thickness.shape.gii", {"thickness_mm": np.full(len(mesh.vertices), 1.5)})
+    write_json(tmp_path / "surface.json", REPORT | {"week": 24.0, "fissure_x_mm": 0.0})
+    write_json(tmp_path / "thickness.json", {"mean_mm": 1.5, "measured_area_share": 0.9})
+    write_text(tmp_path / "surface.log", "2026-01-01 10:00:00,000 WARNING root: it is crooked\n" * 2)
+    inputs = {"surface": "whole.surf.gii", "report": "surface.json", "image": [], "thickness": "thickness.shape.gii"}
+    inputs |= {"measured": "thickness.json", "hemispheres": [f"{side}.surf.gii" for side in sides]}
+    inputs |= {"maps": [f"{side}.shape.gii" for side in sides]}
+    pictures = {name: f"{name}.png" for name in ("quality", "maps", "small")}
+    outputs = pictures | {f"{name}_pdf": f"{name}.pdf" for name in pictures} | {"row": "row.json"}
+    params = {"columns": LABELS, "labels": None, "white_files": {}, "side": "left", "logs": [tmp_path / "surface.log"]}
+    run_script("brain_figures.py", tmp_path, inputs, outputs, params)
+    row = read_json(tmp_path / "row.json")
+    found = [row[name] for name in ("subject", "verdict", "warnings", "area_left_cm2", "mean_thickness_mm")]
+    assert found == ["a", "look", "it is crooked", 49.0, 1.5]
+    assert all((tmp_path / file).stat().st_size for file in outputs.values())
+    # all red, as ridges are
+    tones = [tone(np.asarray(Image.open(tmp_path / f"{name}.png"))[..., :3]) for name in ("maps", "small")]
+    assert all(red > blue + 20 for red, _, blue in tones)

@@ -110,8 +110,11 @@ def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_al
 
 
 def test_simulated_and_measured_brains_are_not_exchanged():
-    for rule in ("weekly_figure", "outlines_figure"):
-        ((row,),) = jobs_of(rule)
+    ((*rows, displacement),) = jobs_of("folding_figures")
+    assert displacement.inputs["frames"] == {
+        run: f"results/runs/{run}/a/folding/frames.h5" for run in ("thin", "thick")
+    }
+    for row in rows:
         real = {21.0: "results/brains/a/surface", 22.0: "results/brains/b/surface"}
         assert row.inputs["real"] == {week: f"{folder}/pial.surf.gii" for week, folder in real.items()}
         for run, surfaces in row.inputs["runs"].items():

@@ -14,9 +14,10 @@ from gyriflow.io.files import read_json, read_table, read_text, write_json, writ
 from gyriflow.io.frames import join_frames, write_frame
 from gyriflow.io.yaml_files import write_yaml
 
-from .test_page import BRAINS, MEASURES, PAGE, PARTS, PROVENANCE, RUNS, VALIDATION
+from .test_page import BRAINS, MEASURES, METRICS, PAGE, PARTS, PROVENANCE, RUNS, VALIDATION
 
 COLOURS = {"young": (200, 30, 30), "old": (30, 30, 200), "overview": (30, 160, 30)}
+NAMES = ("young", "old")
 FOLDED = [("thin", "young"), ("thick", "old")]
 GROWTH = ["own", "population P"]
 FIGURE = {"section": "Surfaces", "title": "Seen", "caption": "a picture", "technical": False, "names": {}}
@@ -31,6 +32,7 @@ def folder(tmp_path, monkeypatch):
     later = {"run": "thick", "start_week": 23.0}
     warnings = {"subject": ["young", "old"], "run": "", "step": "s", "level": "warning", "message": ["M1", "M2"]}
     tables = MEASURES | {
+        "metrics": pd.concat([METRICS, METRICS.assign(subject="old", week=23.0, value=[71.3, 120.0, 60.0])]),
         "warnings": pd.DataFrame(warnings),
         "runs": pd.concat([RUNS, RUNS.assign(subject="old", end_week=25.0, **later)]),
         "validation": pd.concat([VALIDATION, VALIDATION.assign(week=[24.0, 25.0], distance_mm=[0.2, 0.9], **later)]),
@@ -75,20 +77,27 @@ def pictured(text):
     return [name for name in COLOURS if picture_addresses([f"{name}.png"], 1e6)[0][0] in text]
 
 
-def html_report(folder, inputs, params):
-    inputs = inputs | {name: f"{name}.csv" for name in ("quality", "warnings", "metrics", "centiles")}
-    inputs |= {"provenance": "provenance.json", "methods": "methods.rst"}
-    inputs |= {name: PAGE / file for name, file in {"page": "page.html", **PARTS}.items()}
-    params = {"config": {"labels": "/data/Smith/young.nii.gz"}, "norm": "N", **params}
-    run_script("html_report.py", folder, inputs, {0: "page.html"}, params)
-    return read_text("page.html")
+def pages(folder):
+    """Return the report and the pages of both brains."""
+    tables = ("quality", "warnings", "metrics", "centiles", "runs", "validation")
+    inputs = {name: f"{name}.csv" for name in tables} | {name: PAGE / file for name, file in PARTS.items()}
+    inputs |= {
+        "page": PAGE / "page.html",
+        "provenance": "provenance.json",
+        "methods": "methods.rst",
+        "view": "view.json",
+    }
+    write_json("view.json", {"groups": []})
+    pictures = {name: FIGURE | {"name": "picture", "path": str(folder / f"{name}.png")} for name in COLOURS}
+    params = {"config": {"labels": "/data/Smith/young.nii.gz"}, "norm": "N", "brains": BRAINS, "prediction": None}
+    params |= {"figures": [pictures["overview"]], "brain_figures": {name: [pictures[name]] for name in NAMES}}
+    outputs = {"report": "report.html", "brains": [f"{name}.html" for name in NAMES]}
+    run_script("html_report.py", folder, inputs | {"small": [f"{name}.png" for name in NAMES]}, outputs, params)
+    return [read_text(path) for path in ("report.html", "young.html", "old.html")]
 
 
 def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder):
-    inputs = {"small": ["young.png", "old.png"], "runs": "runs.csv", "validation": "validation.csv"}
-    figures = [FIGURE | {"name": "weekly_figure", "path": str(folder / "overview.png")}]
-    params = {"brains": BRAINS, "pictured": ["young", "old"], "prediction": None, "figures": figures}
-    text = html_report(folder, inputs, params)
+    text, *_ = pages(folder)
     rows = [row_with(text, f'href="brains/{name}.html"') for name in ("young", "old")]
     assert [pictured(row) for row in rows] == [["young"], ["old"]]
     assert [("46.2" in row, "refused" in row, "CC0 1.0" in row) for row in rows] == [(1, 0, 1), (0, 1, 0)]
@@ -99,10 +108,12 @@ def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder
 
 
 def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
-    figures = [FIGURE | {"name": "quality_figure", "path": str(folder / "young.png")}]
-    text = html_report(folder, {}, {"brains": BRAINS[:1], "pictured": None, "figures": figures})
-    assert ("young</h1>" in text, pictured(text), "46.2" in text) == (True, ["young"], True)
-    assert [words for words in ("M1", "M2", "hash of young", "hash of old") if words in text] == ["M1", "hash of young"]
+    words = ("young</h1>", "old</h1>", "46.2", "71.3", "M1", "M2", "hash of young", "hash of old")
+    said = [(pictured(text), [found for found in words if found in text]) for text in pages(folder)[1:]]
+    assert said == [
+        (["young"], ["young</h1>", "46.2", "M1", "hash of young"]),
+        (["old"], ["old</h1>", "71.3", "M2", "hash of old"]),
+    ]  # fmt: skip
 
 
 def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(folder):

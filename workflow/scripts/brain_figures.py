@@ -1,4 +1,4 @@
-"""The page of a brain for quality control before the solve, and what its row of the study's table says."""
+"""What is drawn of a measured brain: the page of quality control with its row of the table, maps, small pictures."""
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.thickness import posed_whites
@@ -7,6 +7,7 @@ from gyriflow.io.figures import write_figure
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
+from gyriflow.report.pictures import ROUND_VIEWS, shape_maps, small_pictures
 from gyriflow.report.quality import Brain, quality_page, quality_row, tissue_groups
 from gyriflow.running.jobs import read_messages
 from gyriflow.step import step
@@ -30,5 +31,12 @@ with step(snakemake.log[0]):
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.columns, report, read_json(files.measured) if files.measured else {}, warnings, expected)
     brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
-    write_figure(output.png, output.pdf, quality_page(brain, row, warnings))
+    halves = [
+        (read_surface(hemisphere), read_vertex_maps(maps))
+        for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)
+    ]
+    maps = shape_maps({"": {report["week"]: halves}}, quantity="shape_index", views=ROUND_VIEWS)
+    write_figure(output.quality, output.quality_pdf, quality_page(brain, row, warnings))
+    write_figure(output.maps, output.maps_pdf, maps)
+    write_figure(output.small, output.small_pdf, small_pictures(halves, side=params.side))
     write_json(output.row, row)
