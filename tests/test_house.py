@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gyriflow.code_hash import imported_modules, room_of
-from gyriflow.running.launch import SETTINGS
+from gyriflow.running.launch import ENVIRONMENT_VARIABLES
 from gyriflow.version import RELEASE
 
 ROOT = Path(__file__).parents[1]
@@ -228,7 +228,7 @@ def test_conda_environment_sets_what_the_launcher_sets():
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     # what concerns the checkout and the user's Python is the launcher's own
     assert environment["variables"] == {name: exports[name] for name in exports if not name.startswith("PYTHON")}
-    assert environment["variables"] == SETTINGS
+    assert environment["variables"] == ENVIRONMENT_VARIABLES
 
 
 @pytest.mark.parametrize("recipe", ["Dockerfile", "gyriflow.def"])

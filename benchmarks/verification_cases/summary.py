@@ -8,7 +8,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from gyriflow.report.style import FULL_WIDTH_IN, MUTED_COLOUR, RUN_COLOURS, SETTINGS, new_figure
+from gyriflow.report.style import FULL_WIDTH_IN, MATPLOTLIB_SETTINGS, MUTED_COLOUR, RUN_COLOURS, new_figure
 
 from .closed_forms import short_wave_rate, thin_film
 from .modes import Slab, growth_rates
@@ -77,7 +77,7 @@ def plain(value, digits: int = 4):
 
 def draw(found: dict, slab_cells: tuple[int, ...], folder: Path) -> None:
     """Draw the rates of growth by wavelength where stress is forgotten into a folder, a panel for each contrast."""
-    with mpl.rc_context(SETTINGS):
+    with mpl.rc_context(MATPLOTLIB_SETTINGS):
         figure = new_figure(FULL_WIDTH_IN, 2.6)
         panels = figure.subplots(1, len(found))
         for axes, (contrast, case) in zip(panels, found.items(), strict=True):

@@ -191,7 +191,7 @@ _SIMULATION_MAPS = (
         colours=POSITIVE_COLOURS,
     ),
 )
-MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
+VERTEX_MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
 """The maps, by name."""
 COMPARED_MAPS = ("shape_index", "mean_curvature")
 """The maps by which a simulated brain is correlated with a real one."""

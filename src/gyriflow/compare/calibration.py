@@ -15,9 +15,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
+from ..quantities import COMPARED_MAPS
 from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
 from .distances import aligned_distances
-from .placement import MEASURES, correlation, interpolate_measures
+from .placement import correlation, interpolate_measures
 from .shapes import PreparedSurface, curvature_differences, prepare_for_comparison
 
 DIGITS = 6
@@ -106,7 +107,7 @@ def shape_scores(simulated: PreparedSurface, observed: PreparedSurface) -> dict[
     curvature_distance_per_mm of `shapes.curvature_differences`.
     """
     values, _ = interpolate_measures(simulated, observed)
-    r = {name: correlation(getattr(observed, name), values[name], observed.areas) for name in MEASURES}
+    r = {name: correlation(getattr(observed, name), values[name], observed.areas) for name in COMPARED_MAPS}
     return {
         "shape_index": 1 - r["shape_index"],
         "mean_curvature": 1 - r["mean_curvature"],

@@ -7,9 +7,8 @@ from scipy.spatial import cKDTree
 from ..geometry.alignment import MIRROR, align
 from ..geometry.matching import match_surface, nearest_on, values_at
 from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
+from ..quantities import COMPARED_MAPS
 from .shapes import PreparedSurface
-
-MEASURES = ("shape_index", "mean_curvature")
 
 PATCH_EDGE_MM = 20.0
 """Edge of the patches that the bootstrap draws: wider than a gyrus with its sulcus."""
@@ -45,7 +44,7 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
     of the observed area for which there is such a point.
     """
     match = match_surface(observed.mesh, surface.mesh)
-    values = {measure: values_at(match, getattr(surface, measure)) for measure in MEASURES}
+    values = {measure: values_at(match, getattr(surface, measure)) for measure in COMPARED_MAPS}
     return values, float(np.average(match.agrees, weights=observed.areas))
 
 
@@ -59,7 +58,7 @@ def score_placement(
 ) -> dict[str, float | bool]:
     """Score how well the folds of a simulated brain lie where the observed brain has its own.
 
-    Correlations r are weighted by area over the whole observed surface. For each of `MEASURES`: r_…, r_start_…,
+    Correlations r are weighted by area over the whole observed surface. For each of `COMPARED_MAPS`: r_…, r_start_…,
     r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… from patches drawn with
     replacement (Efron and Tibshirani 1993), and skill_…. Further matched_share, the share of the observed area with a
     matching point on the simulated brain, and asymmetry_mm and mirrored_patches of `make_patches`.
@@ -80,7 +79,7 @@ def score_placement(
     patch, symmetry = make_patches(observed)
     row = {"matched_share": matched_share} | symmetry
     areas = observed.areas
-    for measure in MEASURES:
+    for measure in COMPARED_MAPS:
         truth = getattr(observed, measure)
         r = correlation(truth, simulated_values[measure], areas)
         r_start = correlation(truth, start_values[measure], areas)

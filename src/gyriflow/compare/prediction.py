@@ -9,10 +9,10 @@ import pandas as pd
 from ..geometry.alignment import align
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, signed_volume, vertex_areas, vertex_normals
+from ..quantities import COMPARED_MAPS
 from .distances import drawn_distances, pairwise_distances, surface_distances
 from .placement import (
     INTERVAL,
-    MEASURES,
     correlation,
     draw_patches,
     drawn_correlations,
@@ -99,9 +99,10 @@ def prediction_row(
     -------
     dict
         `distances.surface_distances` and cortex_dice, aligned rigidly and not scaled; area_error and volume_error as
-        fractions of the observed; r_… of each of `MEASURES`; crossing_faces; roughness_ratio and curvature_rms_ratio
-        to the observed surface; …_low and …_high, the 95 % intervals of distance_mm and r_shape_index when patches are
-        drawn with replacement; drawn_mm, the mean distance in each draw, for `add_skill`.
+        fractions of the observed; r_… of each of `COMPARED_MAPS`; crossing_faces; roughness_ratio and
+        curvature_rms_ratio to the observed surface; …_low and …_high, the 95 % intervals of distance_mm and
+        r_shape_index when patches are drawn with replacement; drawn_mm, the mean distance in each draw, for
+        `add_skill`.
     """
     aligned = align(predicted, observed)
     pair, areas = pairwise_distances(aligned, observed, prepared.mesh), prepared.areas
@@ -113,7 +114,7 @@ def prediction_row(
         "cortex_dice": cortex_dice(aligned, observed),
         "area_error": area(predicted) / area(observed) - 1,
         "volume_error": signed_volume(predicted) / signed_volume(observed) - 1,
-        **{f"r_{name}": correlation(getattr(prepared, name), values[name], areas) for name in MEASURES},
+        **{f"r_{name}": correlation(getattr(prepared, name), values[name], areas) for name in COMPARED_MAPS},
         "crossing_faces": float(crossing_faces(predicted)),
         "roughness_ratio": roughness_mm(predicted_prepared.mesh) / roughness_mm(prepared.mesh),
         "curvature_rms_ratio": predicted_prepared.curvature_rms / prepared.curvature_rms,

@@ -11,7 +11,7 @@ from ..metrics.spangy import spectral_distances
 from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
 from .distances import aligned_distances
 
-SIZES = ("area", "volume", "gyrification_index")
+SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
 """The metric that gives the number of modes at which the spectrum of a hemisphere is cut."""
@@ -121,7 +121,7 @@ def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
 
 
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
-    pairs = _pairs(metrics[metrics["metric"].isin([*SIZES, WEYL_NUMBER])], observed, ["hemisphere", "metric"])
+    pairs = _pairs(metrics[metrics["metric"].isin([*SIZE_METRICS, WEYL_NUMBER])], observed, ["hemisphere", "metric"])
     for pair in pairs.to_dict("records"):
         # the number of modes is not a measure of similarity
         distance = np.nan if pair["metric"] == WEYL_NUMBER else abs(pair["value"] / pair["value_real"] - 1)

@@ -17,7 +17,7 @@ SMOOTHING_MM = 0.8
 MARGIN_MM = 6.0
 """Room round the cerebrum."""
 
-CEREBRUM, CORTEX = 1, 2
+CEREBRUM_BIT, CORTEX_BIT = 1, 2
 
 BRIGHT = 0.99
 """Quantile of the intensity inside the cerebrum that counts as 1."""
@@ -27,9 +27,9 @@ BRIGHT = 0.99
 class Channels:
     """A brain on a grid (i, j, k) of cubic voxels along the axes of RAS+.
 
-    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits of the masks as they are, `CEREBRUM` and
-    `CORTEX`; `cerebrum` and `cortex` are smoothed masks from 0 to 1, `intensity` is that of the image, about 1 where
-    the cerebrum is brightest.
+    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits of the masks as they are,
+    `CEREBRUM_BIT` and `CORTEX_BIT`; `cerebrum` and `cortex` are smoothed masks from 0 to 1, `intensity` is that of the
+    image, about 1 where the cerebrum is brightest.
     """
 
     affine: Floats
@@ -76,10 +76,10 @@ def channels(
     grid = np.diag([voxel, voxel, voxel, 1.0])
     grid[:3, 3] = low
 
-    masks = {CEREBRUM: inside}
+    masks = {CEREBRUM_BIT: inside}
     if cortex:
-        masks[CORTEX] = np.isin(labels, cortex)
-        if not masks[CORTEX].any():
+        masks[CORTEX_BIT] = np.isin(labels, cortex)
+        if not masks[CORTEX_BIT].any():
             raise InputError("no voxel belongs to the cortex", found="other labels only", expected=f"labels {cortex}")
     tissue = np.zeros(shape, dtype=np.uint8)
     smoothed = {}
@@ -87,8 +87,8 @@ def channels(
         solid = mask.astype(np.float32)
         tissue[_resample(solid, affine, grid, shape) > 0.5] |= bit
         smoothed[bit] = _resample(gaussian_filter(solid, SMOOTHING_MM / sizes), affine, grid, shape)
-    intensity = _intensity(image, grid, shape, tissue & CEREBRUM > 0) if image else None
-    return Channels(grid, tissue, smoothed[CEREBRUM], smoothed.get(CORTEX), intensity)
+    intensity = _intensity(image, grid, shape, tissue & CEREBRUM_BIT > 0) if image else None
+    return Channels(grid, tissue, smoothed[CEREBRUM_BIT], smoothed.get(CORTEX_BIT), intensity)
 
 
 def _require_whole(inside: NDArray[np.bool_]) -> None:

@@ -17,7 +17,7 @@ from ..geometry.alignment import CUBE_ROTATIONS
 from ..geometry.deformations import Deformation, transform_points
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats
-from .channels import CEREBRUM, Channels
+from .channels import CEREBRUM_BIT, Channels
 
 log = logging.getLogger(__name__)
 
@@ -104,7 +104,7 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
 
 def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
     rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
-    return binary_dilation(brain.tissue & CEREBRUM > 0, iterations=rounds).astype(np.float32)
+    return binary_dilation(brain.tissue & CEREBRUM_BIT > 0, iterations=rounds).astype(np.float32)
 
 
 def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
@@ -132,5 +132,5 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
 
 
 def _place(brain: Channels) -> tuple[Floats, float]:
-    index = np.argwhere(brain.tissue & CEREBRUM > 0)
+    index = np.argwhere(brain.tissue & CEREBRUM_BIT > 0)
     return transform_points(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3

@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 from ..errors import InputError
 from ..geometry.deformations import Deformation, carry, determinants, transform_points
 from ..geometry.triangles import Floats
-from .channels import CEREBRUM, CORTEX, Channels
+from .channels import CEREBRUM_BIT, CORTEX_BIT, Channels
 
 LEAST_DICE = {"cerebrum": 0.95, "cortex": 0.60}
 """Below these overlaps a registration is refused; that of the cortex is low where it is a voxel thick."""
@@ -45,7 +45,7 @@ def judge(earlier: Channels, later: Channels, deformation: Deformation) -> Quali
     """
     grid = transform_points(np.indices(earlier.tissue.shape).reshape(3, -1).T, earlier.affine)
     places = transform_points(carry(deformation, grid), np.linalg.inv(later.affine)).T
-    inside = earlier.tissue & CEREBRUM > 0
+    inside = earlier.tissue & CEREBRUM_BIT > 0
     with_cortex = earlier.cortex is not None and later.cortex is not None
     growth = determinants(deformation)
     at = transform_points(transform_points(np.argwhere(inside), earlier.affine), np.linalg.inv(deformation.affine))
@@ -54,8 +54,8 @@ def judge(earlier: Channels, later: Channels, deformation: Deformation) -> Quali
     rim = np.ones(lengths.shape, dtype=bool)
     rim[1:-1, 1:-1, 1:-1] = False
     return Quality(
-        dice_cerebrum=_dice(earlier, later, CEREBRUM, places),
-        dice_cortex=_dice(earlier, later, CORTEX, places) if with_cortex else float("nan"),
+        dice_cerebrum=_dice(earlier, later, CEREBRUM_BIT, places),
+        dice_cortex=_dice(earlier, later, CORTEX_BIT, places) if with_cortex else float("nan"),
         least_determinant=float(growth.min()),
         folded_share=float((growth <= 0).mean()),
         log_growth_sd=float(np.log(growth[growth > 0]).std()),

@@ -14,7 +14,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
-from ..quantities import MAPS, VertexMap
+from ..quantities import VERTEX_MAPS, VertexMap
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, write_json, write_text
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
@@ -54,12 +54,12 @@ PEOPLE = {
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
 }
 LABELS_FILE = "{}{}_dseg.nii.gz"
-TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
+EXPORTED_TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
 OF_INPUT = {"Description": "As in the tables of the input"}
 SESSION = re.compile(r"_ses-([A-Za-z0-9]+)")
 Place = tuple[Path, str]
 """What the paths of a brain's files begin with, and the entity `desc-` of simulated brains."""
-Names = Mapping[str, tuple[str, str | None]]
+BidsNames = Mapping[str, tuple[str, str | None]]
 """Subject and session of each measured brain, None where the study needs no sessions."""
 
 
@@ -114,7 +114,7 @@ def export_bids(
         sidecars |= _write_maps(place, brain, space, reference)
         if brain.volume and pose.together:
             write_label_volume(LABELS_FILE.format(*place), _labels(brain, pose.inverse))
-            _write_tsv(folder / "dseg.tsv", pd.DataFrame(TISSUES, columns=["index", "name"]))
+            _write_tsv(folder / "dseg.tsv", pd.DataFrame(EXPORTED_TISSUES, columns=["index", "name"]))
     for suffix, sidecar in sidecars.items():
         write_json(folder / f"{suffix}.json", sidecar)
     kinds = "\n".join(f"/{suffix}.json" for suffix in sorted(sidecars))
@@ -142,7 +142,7 @@ def labels_of(folder: AnyPath, one: ExportedBrain, brains: Sequence[ExportedBrai
     return LABELS_FILE.format(*_places(Path(folder), [one], names)[0])
 
 
-def _places(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> list[Place]:
+def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> list[Place]:
     taken: dict[Place, ExportedBrain] = {}
     places = []
     for brain in brains:
@@ -195,7 +195,7 @@ def _write_maps(
     for files, entity, desc, more in kinds:
         for side, path in files.items():
             for name, values in read_vertex_maps(path).items():
-                suffix, about = MAPS[name].bids_suffix, _described(MAPS[name])
+                suffix, about = VERTEX_MAPS[name].bids_suffix, _described(VERTEX_MAPS[name])
                 sidecars["_".join(filter(None, (entity, suffix)))] = {**about, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
@@ -203,7 +203,7 @@ def _write_maps(
     return sidecars
 
 
-def _template(measured: Sequence[ExportedBrain], names: Names) -> tuple[str, dict[str, Any]]:
+def _template(measured: Sequence[ExportedBrain], names: BidsNames) -> tuple[str, dict[str, Any]]:
     template = next((brain for brain in measured if brain.brain == brain.template), None)
     if template is None:
         return "", {}
@@ -253,7 +253,7 @@ def publish_derivatives(
     write_json(folder / "dataset_description.json", described | {"SourceDatasets": [{"URL": url}]})
 
 
-def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> Names:
+def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
     subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
     sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
     # two subjects whose names differ in other characters only are told by their equal sessions
@@ -262,7 +262,7 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> Names:
     return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}
 
 
-def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: Names) -> None:
+def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> None:
     # covariates that differ between a subject's brains are those of sessions
     first = ["participant_id", "session_id", "gestational_age", "brain"]
     people = pd.DataFrame(

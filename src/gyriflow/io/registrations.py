@@ -13,7 +13,7 @@ from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.triangles import Floats, TriangleMesh
 from .files import AnyPath, new_hdf5, reading_hdf5
 
-AGAIN = "Register the brains, or match their surfaces, again."
+REGISTER_AGAIN = "Register the brains, or match their surfaces, again."
 
 
 def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[str, Any]) -> None:
@@ -37,7 +37,7 @@ def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[st
 def read_correspondence(path: AnyPath) -> Correspondence:
     """Return what `write_correspondence` has written; InputError for other files."""
     expected = "an HDF5 file with matrix, displacement and affine, or with first, second and faces"
-    with reading_hdf5(path, "a correspondence of brains", expected, AGAIN) as file:
+    with reading_hdf5(path, "a correspondence of brains", expected, REGISTER_AGAIN) as file:
         if "faces" in file:
             return MatchedSurfaces(TriangleMesh(file["first"][:], file["faces"][:]), file["second"][:])
         return Deformation(file["matrix"][:], file["displacement"][:], file["affine"][:])
@@ -61,7 +61,9 @@ class WeeklyShapes:
         found = np.flatnonzero(self.weeks == week)
         if not len(found):
             weeks = ", ".join(f"{known:g}" for known in self.weeks)
-            raise InputError(f"the mesh has no shape at {week:g} GW", found=f"shapes at {weeks} GW", remedy=AGAIN)
+            raise InputError(
+                f"the mesh has no shape at {week:g} GW", found=f"shapes at {weeks} GW", remedy=REGISTER_AGAIN
+            )
         return int(found[0])
 
 

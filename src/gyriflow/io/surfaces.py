@@ -294,7 +294,7 @@ def write_vertex_labels(
 
 UNKNOWN = "NIFTI_XFORM_UNKNOWN"
 SCANNER = "NIFTI_XFORM_SCANNER_ANAT"
-SUBJECT = (SCANNER, "NIFTI_XFORM_ALIGNED_ANAT")
+SUBJECT_SPACES = (SCANNER, "NIFTI_XFORM_ALIGNED_ANAT")
 RIGID = 1e-3
 C_RAS = ("VolGeomC_R", "VolGeomC_A", "VolGeomC_S")
 """FreeSurfer's metadata of points in GIFTI: where the centre of their volume is in scanner space, in mm."""
@@ -327,13 +327,13 @@ def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str
     InputError for matrices into scanner space that change sizes.
     """
     moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
-    space = next((data for data, _, _ in systems if data in SUBJECT), None)
+    space = next((data for data, _, _ in systems if data in SUBJECT_SPACES), None)
     if space is not None:
         for _, to, _ in moving:
             log.warning("%s: the coordinates are in %s already; its matrix to %s was not applied", path, space, to)
         return np.eye(4), space
-    into_subject = (system for system in moving if system[1] in SUBJECT)
-    for data, to, matrix in sorted(into_subject, key=lambda system: SUBJECT.index(system[1])):
+    into_subject = (system for system in moving if system[1] in SUBJECT_SPACES)
+    for data, to, matrix in sorted(into_subject, key=lambda system: SUBJECT_SPACES.index(system[1])):
         rigid = np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=RIGID)
         if not rigid or np.linalg.det(matrix[:3, :3]) < 0:
             problem = f"has a coordinate-system matrix from {data} to {to} that changes sizes or mirrors"
@@ -347,7 +347,7 @@ def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str
     if moving:
         return np.eye(4), None
     named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
-    return np.eye(4), named or next((to for _, to, _ in systems if to in SUBJECT), None)
+    return np.eye(4), named or next((to for _, to, _ in systems if to in SUBJECT_SPACES), None)
 
 
 def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:

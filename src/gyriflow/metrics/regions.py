@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Ints, TriangleMesh, area, vertex_areas
-from ..quantities import MAPS
+from ..quantities import VERTEX_MAPS
 from ..settings.terms import NO_REGION
 from ..units import CM2_PER_MM2
 
@@ -45,9 +45,9 @@ def region_metrics(
             rows.append((side, name, "area", covered * CM2_PER_MM2, "cm2"))
             rows.append((side, name, "area_share", covered / total, "1"))
             for key, of_vertices in maps[side].items():
-                if MAPS[key].is_averaged:
+                if VERTEX_MAPS[key].is_averaged:
                     values = np.asarray(of_vertices, dtype=float)
                     used = inside & np.isfinite(values) & reliable
                     mean = float(np.average(values[used], weights=areas[used])) if areas[used].any() else np.nan
-                    rows.append((side, name, MAPS[key].mean_name, mean, MAPS[key].unit))
+                    rows.append((side, name, VERTEX_MAPS[key].mean_name, mean, VERTEX_MAPS[key].unit))
     return pd.DataFrame(rows, columns=["hemisphere", "region", "metric", "value", "unit"])

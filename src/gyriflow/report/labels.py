@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
-from ..quantities import MAPS, METRICS
+from ..quantities import METRICS, VERTEX_MAPS
 
 SIMPLER_WAYS = {
     "scaled": "start, scaled: no folding",
@@ -13,7 +13,7 @@ SIMPLER_WAYS = {
     "target": "what the run grows towards",
 }
 """Simpler ways to predict a brain, by the names of the study's table."""
-PARAMETERS = {
+PARAMETER_TITLES = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",
     "shear_modulus_core": "shear modulus of the core",
@@ -58,7 +58,7 @@ def metric_title(name: str) -> str:
 
 def map_title(name: str) -> str:
     """Return the title of the colour bar of a map, for example "sulcal depth (mm)"."""
-    return with_unit(MAPS[name].label, MAPS[name].ends or MAPS[name].unit)
+    return with_unit(VERTEX_MAPS[name].label, VERTEX_MAPS[name].ends or VERTEX_MAPS[name].unit)
 
 
 def plain(name: str) -> str:
@@ -86,7 +86,7 @@ def parameter_label(key: str) -> str:
     """Return what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
     ending = next((ending for ending in _ENDINGS if key.endswith(ending)), "")
     name, unit = key.removesuffix(ending), _ENDINGS.get(ending)
-    return with_unit(PARAMETERS.get(name, plain(name.replace(".", " "))), unit)
+    return with_unit(PARAMETER_TITLES.get(name, plain(name.replace(".", " "))), unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:

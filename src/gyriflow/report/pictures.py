@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
-from ..quantities import MAPS, SIGNED_COLOURS
+from ..quantities import SIGNED_COLOURS, VERTEX_MAPS
 from ..settings.folding import FoldingParameters
 from ..settings.terms import REAL_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2, SECONDS_PER_GW
@@ -179,12 +179,12 @@ def round_up(value: float) -> float:
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Return the colour scale of a map of `MAPS`: its own limits, or one that few vertices pass.
+    """Return the colour scale of a map of `VERTEX_MAPS`: its own limits, or one that few vertices pass.
 
     It begins at zero. Of signed maps, and where values are below zero, it is as wide on both sides, pale at zero.
     The end is a round value, so that no outlier sets it.
     """
-    record = MAPS[quantity]
+    record = VERTEX_MAPS[quantity]
     if record.limits is not None:
         return colour_scale(record.colours, *record.limits)
     finite = values[np.isfinite(values)]
@@ -244,7 +244,7 @@ def scalar_maps(
     ----------
     maps : {group: {week or run: (surface, values)}}
         For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
-    quantity : a name of `MAPS`
+    quantity : a name of `VERTEX_MAPS`
     directions : {week or run: (n, 3) vectors at the vertices}
         Drawn as lines in proportion to these, but for the longest tenth, which are alike.
     """
@@ -353,7 +353,7 @@ def small_pictures(halves: Halves, *, side: str) -> Figure:
     All brains have one scale.
     """
     mesh, maps = whole_maps(halves, ("shape_index", "sulcal_depth_mm"))
-    depth = colour_scale(MAPS["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
+    depth = colour_scale(VERTEX_MAPS["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
     shown = {side: ("shape_index", scale_of("shape_index", np.empty(0))), "top": ("sulcal_depth_mm", depth)}
     extents = {view: half_extents(mesh, VIEWS[view]) for view in shown}
     tall = 1.05 * max(height for _, height in extents.values())

@@ -17,7 +17,7 @@ from ..geometry.alignment import angle_deg
 from ..geometry.deformations import voxel_index
 from ..geometry.poses import pose_from
 from ..geometry.triangles import Floats, TriangleMesh
-from ..quantities import MAPS
+from ..quantities import VERTEX_MAPS
 from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
@@ -25,7 +25,7 @@ from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure,
 
 VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "look": ("Warnings:", "#E69F00")}
 """What stands above the warnings of a page, and the colour of the verdict."""
-TISSUES = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
+TISSUE_GROUPS = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
 """Groups of labels as they are coloured, in place of an image."""
 TISSUE_COLOURS = ("#FFFFFF", "#B7A58B", "#E9E4DA", "#9CC3E0", "#E6E6E6")
 PIAL_COLOUR, INNER_COLOUR = "#D55E00", "#0072B2"
@@ -55,8 +55,8 @@ class Brain:
     thickness_mm : (n,) at the vertices of the surface, NaN where it was not measured
     white : the white surface, in the same coordinates
     image, tissues
-        The (i, j, k) grey values and groups of labels (`TISSUES`), each with the (4, 4) affine from voxel index to the
-        surface's coordinates.
+        The (i, j, k) grey values and groups of labels (`TISSUE_GROUPS`), each with the (4, 4) affine from voxel index
+        to the surface's coordinates.
     """
 
     pial: TriangleMesh
@@ -68,7 +68,7 @@ class Brain:
 
 
 def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[np.uint8]:
-    """Return the (i, j, k) group of each voxel as in `TISSUES`; 0 is background."""
+    """Return the (i, j, k) group of each voxel as in `TISSUE_GROUPS`; 0 is background."""
     groups = np.where(labels > 0, 4, 0).astype(np.uint8)
     groups[np.isin(labels, scheme.cerebrum)] = 2
     groups[np.isin(labels, scheme.cortex)] = 1
@@ -108,7 +108,7 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     if brain.thickness_mm is None:
         _draw_views(thickness, brain, uniform, OTHER_VIEWS)
     else:
-        scale = colour_scale(MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
+        scale = colour_scale(VERTEX_MAPS["thickness_mm"].colours, *THICKNESS_LIMITS_MM, cut=True)
         panels = _draw_views(thickness, brain, paint(brain.thickness_mm, scale), THICKNESS_VIEWS)
         unknown = "" if np.isfinite(brain.thickness_mm).all() else "\ngrey: not measured"
         thickness.colorbar(scale, ax=panels).set_label(f"thickness (mm){unknown}", fontsize=6.5)
@@ -167,7 +167,7 @@ def _draw_planes(figure: SubFigure, brain: Brain) -> None:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
     if brain.tissues and not brain.image:
         there = np.unique(brain.tissues[0])
-        keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUES.items() if code in there]
+        keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUE_GROUPS.items() if code in there]
     figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=6, handlelength=1.0)
 
 

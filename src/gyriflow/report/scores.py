@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
-from ..quantities import COMPARED_MAPS, MAPS
+from ..quantities import COMPARED_MAPS, VERTEX_MAPS
 from ..settings.terms import MEASURED, SIDES
 from .labels import SIMPLER_WAYS, parameter_label, plain, with_unit
 from .style import (
@@ -74,7 +74,7 @@ def validation_chart(
                 begin, end = rows["week"].iloc[0] + ONE_WEEK
                 axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
-        axes.set_title(MAPS[measure].label)
+        axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
     extra: list[Artist] = [star("real brain of the week before", markersize=6)]

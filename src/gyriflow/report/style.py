@@ -33,7 +33,7 @@ REAL_SURFACE_COLOUR = "#EBD6B4"
 NEUTRAL_COLOUR = "#D9D9D9"
 """Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
 
-SETTINGS: dict[Any, Any] = {
+MATPLOTLIB_SETTINGS: dict[Any, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.0,
     "axes.linewidth": 0.6,
@@ -61,7 +61,7 @@ SETTINGS: dict[Any, Any] = {
 }
 
 
-styled = mpl.rc_context(SETTINGS)
+styled = mpl.rc_context(MATPLOTLIB_SETTINGS)
 """Makes a function draw its figure in the project's style; the settings outside stay as they are."""
 
 

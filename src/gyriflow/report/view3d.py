@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh
-from ..quantities import MAPS
+from ..quantities import VERTEX_MAPS
 from .labels import map_title
 from .pictures import Halves, scale_of, whole_maps
 from .style import REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
@@ -24,7 +24,7 @@ MOST_VERTICES = 8000
 FEWEST_VERTICES = 500
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
-_DRAWN = [name for name, record in MAPS.items() if record.colours]
+_DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
 # base64 writes three bytes as four letters; a vertex has about two triangles, of three indices of two bytes
 _LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(_DRAWN), 12
 
@@ -88,7 +88,7 @@ def surfaces_view(
 
 def _timed(week: float, halves: Halves) -> Timed:
     mesh, maps = whole_maps(halves)
-    return week, mesh, {name: values for name, values in maps.items() if MAPS[name].colours}
+    return week, mesh, {name: values for name, values in maps.items() if VERTEX_MAPS[name].colours}
 
 
 def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:

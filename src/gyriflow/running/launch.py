@@ -28,7 +28,7 @@ from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, INTERRUPTED, recorded_exit_code
 
-SETTINGS = {
+ENVIRONMENT_VARIABLES = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
     "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_btl": "self,sm",
@@ -201,7 +201,7 @@ def exit_code(code: int, recorded: int | None, directory: Path) -> int:
 
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
     """Set the environment variables that the Snakefile and the steps of the workflow read."""
-    os.environ |= SETTINGS | os.environ
+    os.environ |= ENVIRONMENT_VARIABLES | os.environ
     # steps call `python`; let it be this one
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ |= {name: "1" for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run)) if is_set}

@@ -27,7 +27,7 @@ KEY_SOURCES: dict[str, tuple[str, ...]] = {
 
 
 class HemisphereFiles(Settings):
-    """The pial surfaces of both hemispheres: GIFTI, FreeSurfer, VTK, STL, PLY or OBJ files."""
+    """The pial surfaces of both hemispheres, such as GIFTI or FreeSurfer files."""
 
     left: InputFile
     """File of the left hemisphere."""
@@ -59,7 +59,7 @@ class Brain(Settings):
     covariates: dict[str, str] = Field({})
     """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
     labels: InputFile | None = None
-    """Tissue label volume (NIfTI or MGZ)."""
+    """Tissue label volume, such as a NIfTI or MGZ file."""
     image: InputFile | None = None
     """T2-weighted volume (NIfTI) of the labels, shown in a figure."""
     scheme: str | None = None

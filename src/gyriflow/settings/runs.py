@@ -163,7 +163,7 @@ Value = Annotated[
 """A value of a parameter that a sweep varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
 """Keys that do not belong to the model of a run, or that the sweep sets."""
-CURVES = tuple(f"growth.{size}" for size in SIZES)
+CURVE_KEYS = tuple(f"growth.{size}" for size in SIZES)
 """Curves that may vary besides those of parameters."""
 MAX_PARAMETERS = 3
 MIN_FIRST_ROUND, MAX_RUNS = 3, 40

@@ -14,14 +14,14 @@ from .base import InputFile, KeyProblem, Settings
 
 Maps = Mapping[str, NDArray[np.float64]]
 """Values at the mesh vertices, by parameter name. They move with the tissue."""
-WEEKS = (15.0, 45.0)
+WEEK_RANGE = (15.0, 45.0)
 """First and last valid gestational week."""
-AnyWeek = Annotated[float, Field(ge=WEEKS[0], le=WEEKS[1])]
+AnyWeek = Annotated[float, Field(ge=WEEK_RANGE[0], le=WEEK_RANGE[1])]
 """A gestational week, such as one that a curve has a value at."""
 _two_decimals = AfterValidator(lambda week: round(week, 2))
 Week = Annotated[AnyWeek, _two_decimals]
 """The week of a brain, rounded to the two decimals of file names and tables: equal weeks are equal numbers."""
-EndWeek = Annotated[float, Field(gt=WEEKS[0], le=WEEKS[1]), _two_decimals]
+EndWeek = Annotated[float, Field(gt=WEEK_RANGE[0], le=WEEK_RANGE[1]), _two_decimals]
 """The last week of a simulation, rounded likewise."""
 FileOrPair = Annotated[
     Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],

@@ -11,7 +11,7 @@ from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
     ALL,
-    CURVES,
+    CURVE_KEYS,
     FIRST,
     NOT_VARIED,
     Compared,
@@ -268,4 +268,4 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
 
 def _is_curve(key: str, base: Run) -> bool:
     value = getattr(base, key) if key in VARYING else None
-    return base.growth.model == "sizes" if key in CURVES else isinstance(value, Varying) and bool(value.weeks)
+    return base.growth.model == "sizes" if key in CURVE_KEYS else isinstance(value, Varying) and bool(value.weeks)

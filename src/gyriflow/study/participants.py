@@ -14,7 +14,7 @@ from ..io.files import read_json, read_tab_separated
 from ..settings.base import located, path_in
 from ..settings.brains import SOURCES
 from ..settings.participants import ParticipantsSettings
-from ..settings.varying import WEEKS
+from ..settings.varying import WEEK_RANGE
 
 IDS = ("participant_id", "id")
 """Names of the column with the participants."""
@@ -28,7 +28,7 @@ UNIT_OF_AGE = {
 UNITS = ("weeks", "days")
 NOTHING = frozenset(("", "n/a"))
 """What stands for no value in BIDS."""
-SUBJECT = re.compile(r"sub-[A-Za-z0-9]{1,100}")
+SUBJECT_NAME = re.compile(r"sub-[A-Za-z0-9]{1,100}")
 WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d)")
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
@@ -74,7 +74,7 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Sca
         name, place = row[ids], path.parent / row[ids]
         file = place / f"{name}_sessions.tsv"
         # any other name leads elsewhere
-        sessions = _read(file) if SUBJECT.fullmatch(name) and file.is_file() else None
+        sessions = _read(file) if SUBJECT_NAME.fullmatch(name) and file.is_file() else None
         # sessions without ages say nothing that is asked here
         ages = sessions if sessions is not None and sessions.column else table
         if not ages.column:
@@ -104,8 +104,8 @@ def read_week(text: str, unit: str = "weeks") -> tuple[float | None, str]:
         week = float(text) / (7 if unit == "days" else 1)
     else:
         return None, f"found {text or 'n/a'}; expected the gestational age in weeks, such as 24.3, 24+2 or 24w2d"
-    if not WEEKS[0] <= week <= WEEKS[1]:
-        return None, f"found {text}; expected gestational weeks, {WEEKS[0]:g} to {WEEKS[1]:g}"
+    if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
+        return None, f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
     return round(week, 2), ""
 
 

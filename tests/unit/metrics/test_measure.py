@@ -14,7 +14,7 @@ from gyriflow.growth.carrying import maps_on_template
 from gyriflow.metrics.measure import BrainMetrics, area_ratio, measure_brain, measure_white, thickness_metrics
 from gyriflow.metrics.regions import region_metrics
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
-from gyriflow.quantities import MAPS, METRICS
+from gyriflow.quantities import METRICS, VERTEX_MAPS
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -121,13 +121,13 @@ def test_each_map_and_metric_has_a_record_and_each_record_is_written(apart: Brai
     deviations = {**deviation_maps(ball, ball), "thickness_difference_mm": np.zeros(len(ball.vertices))}
     at_template = maps_on_template({}, ball, ball, [])
     drawn_in_report = {"displacement_mm", "area_growth_percent_per_gw"}
-    assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report} == set(MAPS)
+    assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report} == set(VERTEX_MAPS)
     white, white_maps = measure_white({"left": ball})
     assert set(white_maps["left"]) <= set(thick.maps["left"])
     regions = region_metrics({"left": ball}, thick.maps, {"left": np.ones(len(ball.vertices))}, {1: "all"})
-    named = {f"{MAPS[name].mean_name.removeprefix('mean_')}" for name in deviations}
+    named = {f"{VERTEX_MAPS[name].mean_name.removeprefix('mean_')}" for name in deviations}
     assert {*thick.table["metric"], *white["metric"], *regions["metric"], *named} == set(METRICS)
-    for records in (MAPS, METRICS):
+    for records in (VERTEX_MAPS, METRICS):
         assert all(record.name == name for name, record in records.items())
         with pytest.raises(KeyError, match=r"quantities\.py"):
             records["unheard_of"]
