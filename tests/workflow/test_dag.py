@@ -11,7 +11,8 @@ EXAMPLES = CHECKOUT / "config" / "examples"
 def test_the_demo_is_planned_from_any_folder(workflow):
     jobs = workflow.jobs()
     assert jobs["pial_from_labels"] == jobs["cortical_thickness"] == 3
-    assert jobs["measure"] > 3
+    assert jobs["measure"] == 3
+    assert jobs["measure_simulated"] == 3 * jobs["simulate"]
     assert "atlas_file" not in jobs
     assert jobs["simulate"] >= 1
     assert jobs["html_report"] == 1
@@ -28,7 +29,10 @@ def test_a_registration_waits_for_the_images_that_it_reads(workflow):
 
 EXPECTED = {
     # a brain a week, of which eight are of an output week after the start
-    "spina-bifida-atlas": ("all", {"pial_from_labels": 5, "simulate": 2, "measure": 15, "register": 4}),
+    "spina-bifida-atlas": (
+        "all",
+        {"pial_from_labels": 5, "simulate": 2, "measure": 5, "measure_simulated": 10, "register": 4},
+    ),
     "simple-shapes": ("all", {"shape": 1, "pial_from_shape": 1, "simulate": 2}),
     # twelve members, of which one is the reference and one stands in both studies; the real brains of 28 and 29 GW
     "paper": (

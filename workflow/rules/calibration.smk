@@ -52,23 +52,18 @@ rule prepare_calibrated:
         "../scripts/prepare_calibrated.py"
 
 
-def calibrated_surfaces(wildcards):
-    """Return the surfaces of a run of the calibration, those of the brains where it has come to the week."""
-    week = CONFIG.calibrate.compare_week
-    return [
-        study.simulations[wildcards.run, base.start.id].at(week).parts["whole"]
-        for base in CALIBRATED.base
-        if reaches(wildcards.run, base.start.id, week)
-    ]
+def from_bases(pattern):
+    """Return an input function: a file of a run of the calibration from each brain that the base run folds."""
+    return lambda w: [pattern.format(run=w.run, brain=base.start.id) for base in CALIBRATED.base]
 
 
 rule calibration_score:
     input:
-        simulated=calibrated_surfaces,
+        frames=from_bases(FOLDING["frames"]),
+        regions=from_bases(REGIONS["mesh"]),
+        data=from_bases(REGIONS["data"]),
+        summaries=from_bases(FOLDING["summary"]),
         real=lambda w: [real.pial for brains in CALIBRATED.real.values() for real in brains],
-        summaries=lambda w: [
-            FOLDING["summary"].format(run=w.run, brain=base.start.id) for base in CALIBRATED.base
-        ],
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
@@ -83,6 +78,7 @@ rule calibration_score:
     params:
         # how many of the real brains belong to each of the simulated ones
         compared=lambda w: list(map(len, CALIBRATED.real.values())),
+        week=lambda w: CONFIG.calibrate.compare_week,
         weights=lambda w: CONFIG.calibrate.score,
         round=lambda w: CALIBRATED.rounds[w.run],
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,

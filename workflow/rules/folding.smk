@@ -155,29 +155,6 @@ def reaches(run, brain, week):
     return week in read_json(summary)["weeks"]
 
 
-for suffix, sides in PARTS_OF_BRAINS.items():
-
-    rule:
-        name:
-            f"folded_surface{suffix}"
-        input:
-            frames=FOLDING["frames"],
-            regions=REGIONS["mesh"],
-            data=REGIONS["data"],
-        output:
-            **folded_of(*sides),
-        log:
-            f"{RUN}/logs/folded_surface{suffix}.{WEEK}.log",
-        benchmark:
-            f"{RUN}/benchmarks/folded_surface{suffix}.{WEEK}.tsv"
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.sides == sides),
-        conda:
-            ENVIRONMENT
-        script:
-            "../scripts/folded_surface.py"
-
-
 rule folding:
     input:
         study.files(*FOLDING.values()),

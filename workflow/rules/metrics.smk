@@ -1,9 +1,5 @@
-# Metrics of brains, measured and simulated: one rule, so that both go through the same code with the same settings.
-
-
-def place_of(wildcards):
-    """Return the brain that is measured in the folder that the wildcards name."""
-    return study.places[wildcards.where]
+# Metrics of brains, measured and simulated, by one script: both go through the same code with the same settings.
+MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"})
 
 
 for suffix, sides in PARTS_OF_BRAINS.items():
@@ -12,23 +8,47 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         name:
             f"measure{suffix}"
         input:
-            unpack(lambda w: place_of(w).parts),
-            thickness=lambda w: place_of(w).thickness,
-            report=lambda w: place_of(w).report,
+            unpack(lambda w: brain_of(w).measured.parts),
+            thickness=lambda w: brain_of(w).measured.thickness,
+            report=PIAL["report"],
         output:
-            **MEASURES,
-            **maps_of(*sides),
+            **measures_in(f"{BRAIN}/metrics", *sides),
         log:
-            f"{PLACE}/logs/measure{suffix}.log",
+            f"{BRAIN}/logs/measure{suffix}.log",
         benchmark:
-            f"{PLACE}/benchmarks/measure{suffix}.tsv"
+            f"{BRAIN}/benchmarks/measure{suffix}.tsv"
         wildcard_constraints:
-            where=one_of(where for where, row in study.places.items() if row.sides == sides),
+            brain=brains_with(lambda brain: brain.sides == sides),
         conda:
             ENVIRONMENT
         params:
-            labels=lambda w: place_of(w).labels,
-            settings=CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"}),
+            labels=lambda w: brain_of(w).measured.labels,
+            settings=MEASURED_WITH,
+        script:
+            "../scripts/measure.py"
+
+    # with its surfaces, the facets that were those of the hemispheres at the start
+    rule:
+        name:
+            f"measure_simulated{suffix}"
+        input:
+            frames=FOLDING["frames"],
+            regions=REGIONS["mesh"],
+            data=REGIONS["data"],
+        output:
+            **folded_of(*sides),
+            **measures_in(f"{RUN}/metrics/{WEEK}", *sides),
+        log:
+            f"{RUN}/logs/measure_simulated{suffix}.{WEEK}.log",
+        benchmark:
+            f"{RUN}/benchmarks/measure_simulated{suffix}.{WEEK}.tsv"
+        wildcard_constraints:
+            brain=brains_with(lambda brain: brain.sides == sides),
+        conda:
+            ENVIRONMENT
+        params:
+            labels=lambda w: simulation_of(w).at(float(w.week)).labels,
+            settings=MEASURED_WITH,
         script:
             "../scripts/measure.py"
 

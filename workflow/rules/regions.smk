@@ -106,12 +106,17 @@ rule simulated_regions:
         "../scripts/simulated_regions.py"
 
 
+def place_of(wildcards):
+    """Return the brain that is measured in the folder that the wildcards name."""
+    return study.places[wildcards.where]
+
+
 rule region_metrics:
     input:
         unpack(lambda w: place_of(w).regions),
         unpack(lambda w: place_of(w).parts),
-        left_maps=maps_of("left")["left"],
-        right_maps=maps_of("right")["right"],
+        left_maps=f"{PLACE}/left.shape.gii",
+        right_maps=f"{PLACE}/right.shape.gii",
     output:
         f"{PLACE}/regions.csv",
     log:

@@ -1,21 +1,34 @@
-"""The metrics of one brain, measured or simulated, at one week."""
+"""The metrics of one brain, measured or simulated, at one week; of a simulated one its surfaces and thickness, too."""
 
+from gyriflow.folding.start_regions import folded_surfaces
 from gyriflow.io.files import read_json, write_table
-from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
+from gyriflow.io.frames import read_positions
+from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_brain, write_vertex_maps
+from gyriflow.io.tetmeshes import read_regions
 from gyriflow.metrics.measure import measure_brain
+from gyriflow.metrics.thickness import depth_of_weight, simulated_thickness
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 settings = dict(params.settings)
 with step(snakemake.log[0]):
-    if files.get("thickness"):
-        (settings["thickness_mm"],) = read_vertex_maps(files.thickness).values()
-    if files.report:
-        settings["label_volumes_ml"] = read_json(files.report).get("label_volumes_mL", {})
-    left, right = (read_surface(files[side]) if files.get(side) else None for side in SIDES)
-    brain = measure_brain(read_surface(files.whole), left, right, **settings)
-    for name, table in (("metrics", brain.table), ("spectra", brain.spectra), ("coefficients", brain.coefficients)):
+    brain = files
+    if files.get("frames"):
+        regions, brain = read_regions(files.regions), output
+        positions = read_positions(files.frames, params.labels["week"])
+        whole, left, right = folded_surfaces(regions, positions)
+        write_brain(output, whole, left, right)
+        depth = depth_of_weight(regions.fields["cortex_weight"])
+        thickness = simulated_thickness(regions.mesh, depth, positions, whole)
+        write_vertex_maps(output.thickness, {"thickness_mm": thickness})
+    if brain.get("thickness"):
+        (settings["thickness_mm"],) = read_vertex_maps(brain.thickness).values()
+    if brain.get("report"):
+        settings["label_volumes_ml"] = read_json(brain.report).get("label_volumes_mL", {})
+    left, right = (read_surface(brain[side]) if brain.get(side) else None for side in SIDES)
+    found = measure_brain(read_surface(brain.whole), left, right, **settings)
+    for name, table in (("metrics", found.table), ("spectra", found.spectra), ("coefficients", found.coefficients)):
         write_table(output[name], table.assign(**params.labels)[[*params.labels, *table.columns]])
-    for side, maps in brain.maps.items():
-        write_vertex_maps(output[side], maps, STRUCTURES[side])
+    for side, maps in found.maps.items():
+        write_vertex_maps(output[f"{side}_maps"], maps, STRUCTURES[side])

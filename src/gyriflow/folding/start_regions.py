@@ -1,4 +1,4 @@
-"""Zones, tags and fields of a run on its start mesh, for inspection before the solve."""
+"""Zones, tags and fields of a run on its start mesh, and the hemispheres of its folded brain that follow from them."""
 
 from collections.abc import Callable
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import TriangleMesh
+from ..geometry.triangles import Floats, TriangleMesh, submesh
 from ..io.tetmeshes import Regions
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.terms import REGION_FIELDS
+from ..settings.terms import LEFT, REGION_FIELDS
 from ..settings.varying import Maps
 from .checks import refuse_impossible
 from .growth import GrowthInputs, StepStart
@@ -42,3 +42,16 @@ def start_regions(
         on_left = np.full(len(zones.facets), parameters.side == "left")
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     return Regions(mesh, zones.facets, fields, *tags)
+
+
+def folded_surfaces(
+    regions: Regions, positions_mm: Floats
+) -> tuple[TriangleMesh, TriangleMesh | None, TriangleMesh | None]:
+    """Return the pial surface of a folded brain, and the left and the right facets of it, None where there are none.
+
+    `positions_mm` (n, 3) are those of the nodes of the start mesh, on whose facets the regions say which side is which.
+    """
+    surface = TriangleMesh(positions_mm, regions.facets)
+    on_left = regions.facet_tags["hemisphere"] == LEFT
+    left, right = (submesh(surface, side)[0] if side.any() else None for side in (on_left, ~on_left))
+    return submesh(surface, np.ones(len(on_left), dtype=bool))[0], left, right

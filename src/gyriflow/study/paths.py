@@ -42,9 +42,10 @@ def folded_of(*sides: Side) -> dict[str, str]:
     return {**surfaces_in(folder, sides), "thickness": f"{folder}/thickness.shape.gii"}
 
 
-def maps_of(*sides: Side) -> dict[str, str]:
-    """Return the files with maps on some hemispheres, beside the metrics of a brain."""
-    return {side: f"{PLACE}/{side}.shape.gii" for side in sides}
+def measures_in(folder: str, *sides: Side) -> dict[str, str]:
+    """Return the tables of a measured or simulated brain in a folder, and the maps on the hemispheres that it has."""
+    tables = {name: f"{folder}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
+    return {**tables, **{f"{side}_maps": f"{folder}/{side}.shape.gii" for side in sides}}
 
 
 TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
@@ -96,9 +97,6 @@ FOLDING = {
     "zones": f"{RUN}/folding/zones.json",
     "summary": f"{RUN}/folding/summary.json",
 }
-
-MEASURES = {name: f"{PLACE}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
-"""Tables that are made for every brain, whatever hemispheres it has."""
 
 PREPARED = {
     f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"

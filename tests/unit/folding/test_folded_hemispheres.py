@@ -1,7 +1,5 @@
 """Hemispheres of a folded brain whose fissure is bent: those of the measured brain, carried along by the scripts."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from ellipsoid import RUN, SEMI_AXES
@@ -10,12 +8,14 @@ from shapes import ellipsoid, ellipsoid_mesh
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.folding.start_regions import start_regions
-from gyriflow.geometry.triangles import corners, submesh
+from gyriflow.geometry.triangles import area, corners, submesh
+from gyriflow.io.files import read_table
 from gyriflow.io.frames import join_frames, write_frame
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions, write_regions
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import LEFT, RIGHT
+from gyriflow.units import CM2_PER_MM2
 
 
 def beyond_fissure(points):
@@ -25,7 +25,7 @@ def beyond_fissure(points):
 
 def folded(points):
     """Return points where a folded brain could have them: larger, and all to the right of the start's fissure."""
-    return 1.3 * points + [40.0, 0.0, 0.01] * (1 + points[:, 1:2] ** 2 / 100)
+    return 1.3 * points + [40.0, 0.0, 0.0] + [0.01, 0.0, 0.0] * points[:, 1:2] ** 2
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +45,12 @@ def made(tmp_path_factory):
     for week, positions in ((21.0, brain.vertices), (22.0, folded(brain.vertices))):
         write_frame(folder / f"{week}.h5", week, {"positions": positions})
     join_frames(folder / "frames.h5", brain.tets, [folder / "21.0.h5", folder / "22.0.h5"])
-    parts = {part: f"{part}.gii" for part in ("whole", "left", "right", "thickness")}
+    parts = {part: f"{part}.gii" for part in ("whole", "left", "right", "thickness", "left_maps", "right_maps")}
+    tables = {table: f"{table}.csv" for table in ("metrics", "spectra", "coefficients")}
     frames = {"frames": "frames.h5", "regions": "regions.xdmf"}
-    run_script("folded_surface.py", folder, frames, parts, wildcards=SimpleNamespace(week="22.00"))
+    labels = {"subject": "a", "run": "r", "week": 22.0}
+    params = {"labels": labels, "settings": {"curvature_radius_mm": 8.0, "spangy_modes": 30}}
+    run_script("measure.py", folder, frames, parts | tables, params)
     return folder
 
 
@@ -69,3 +72,16 @@ def test_the_folded_hemispheres_are_the_facets_that_were_theirs_at_the_start(mad
         theirs = positions[regions.facets[regions.facet_tags["hemisphere"] == tag]]
         np.testing.assert_allclose(corners(side), theirs, atol=1e-4)
     np.testing.assert_allclose(corners(whole), positions[regions.facets], atol=1e-4)
+
+
+def test_metrics_of_the_folded_brain_are_of_its_week_and_its_surfaces(made):
+    metrics = read_table(made / "metrics.csv").set_index(["hemisphere", "metric"])
+    assert set(metrics["run"]) == {"r"}
+    assert set(metrics["week"]) == {22.0}
+    for side in ("left", "right"):
+        surface = read_surface(made / f"{side}.gii")
+        assert metrics.loc[(side, "area"), "value"] == pytest.approx(area(surface) * CM2_PER_MM2, rel=1e-6)
+        assert len(read_vertex_maps(made / f"{side}_maps.gii")["thickness_mm"]) == len(surface.vertices)
+    # the cortex has grown with the rest
+    thickness = read_vertex_maps(made / "thickness.gii")["thickness_mm"]
+    assert np.nanmedian(thickness) == pytest.approx(1.3 * RUN["thickness_mm"], rel=0.1)
