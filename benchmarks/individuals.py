@@ -11,7 +11,7 @@ is `kept`; or it is `fading` as e^(−weeks/8), and another one of the same size
 The starts are predicted by the growth of the atlas as it is, and laid rigidly onto the invented later brains, which
 have no part in that. The last line is one JSON object: `scores`, rows with `law`, `individual`, `horizon` (GW),
 `model`, `distance_mm`, `r_shape_index`. Models are the `run`, the `atlas`' own brain of the week, and, for values of
-OWN_MM and FADING_GW, the shape that a run grows towards, as `8 mm 1 GW`.
+DIFFERENCE_SMOOTHING_MM and FADING_GW, the shape that a run grows towards, as `8 mm 1 GW`.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
-from gyriflow.growth.expected import FADING_GW, OWN_MM, carry_sharply, expected_positions
+from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, carry_sharply, expected_positions
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
@@ -43,7 +43,7 @@ WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
-ALL, HERE = "0 mm", f"{OWN_MM:g} mm {FADING_GW:g} GW"
+ALL, HERE = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # flat elements of a coarse mesh of a detailed surface are let through
@@ -101,7 +101,9 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
     ]
     surfaces = [read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]]
     carried, start = carry_sharply(mesh, pairs, surfaces)[1:], min(atlas)
-    places = {own: expected_positions(mesh, start, carried, list(atlas), own_mm=own) for own in (0.0, *dict(GRID))}
+    places = {
+        own: expected_positions(mesh, start, carried, list(atlas), smoothing_mm=own) for own in (0.0, *dict(GRID))
+    }
     (boundary, used), (weeks, everything) = boundary_surface(mesh), places[0.0]
     result: dict[float, dict[str, TriangleMesh]] = {}
     for number, week in enumerate(weeks):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
-from gyriflow.growth.carried_regions import PLACES_MM, find_places, regions_by_deformation
+from gyriflow.growth.carried_regions import PLACES_MM, regions_by_deformation, register_to_drawn_sulci
 from gyriflow.growth.channels import channels
 from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
 from gyriflow.io.volumes import LabelSource, read_label_volume
@@ -23,7 +23,7 @@ with step(snakemake.log[0], files.volume):
         volume, scheme = labels.read(), labels.scheme
         parts = {"cerebrum": scheme.cerebrum, "cortex": scheme.cortex}
         brains.append(channels(volume.labels, volume.affine, **parts, voxel_mm=PLACES_MM))
-    between = find_places(*brains, threads=snakemake.threads)
+    between = register_to_drawn_sulci(*brains, threads=snakemake.threads)
     back = np.eye(4) if params.posed else read_pose(files.report).inverse
     for side in SIDES:
         points = transform_points(read_surface(files[side]).vertices, back)

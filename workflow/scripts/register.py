@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from gyriflow.growth.channels import channels
 from gyriflow.growth.diffeomorphic import register
-from gyriflow.growth.registration_quality import judge, require_good
+from gyriflow.growth.registration_quality import measure_quality, require_good
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_values
 from gyriflow.step import step
@@ -19,7 +19,7 @@ with step(snakemake.log[0], *files.brains):
             channels(volume.labels, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity)
         )
     found = register(*brains, threads=snakemake.threads)
-    quality = judge(*brains, found.deformation)
+    quality = measure_quality(*brains, found.deformation)
     require_good(quality, pair=f"{names.earlier} to {names.later}")
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}
     write_correspondence(snakemake.output[0], found.deformation, report | asdict(quality))

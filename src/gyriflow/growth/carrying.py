@@ -1,4 +1,4 @@
-"""What is carried from brain to brain: points over the weeks, regions to another brain's surface.
+"""Carry points, surfaces, meshes and regions from brain to brain.
 
 Brains correspond by registration, which carries any point, or by surfaces with matched vertices, which carry surfaces
 and meshes.
@@ -17,14 +17,14 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed, vertex_normals
 from .matched_surfaces import follow_inside, follow_surfaces
 
-OUTSIDE = 0.001
-"""Largest share of points that may lie beyond the grid that a displacement is known on."""
+MAX_OUTSIDE = 0.001
+"""Largest share of points that may lie outside the grid of a displacement."""
 
 
 def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:
-    """Return the (w + 1, n, 3) positions of (n, 3) points, the first as given, carried through w deformations in turn.
+    """Return the (w + 1, n, 3) positions of (n, 3) points: the given ones, and carried through w deformations in turn.
 
-    InputError where points leave the grids that the deformations are known on.
+    InputError if points leave the grids of the deformations.
     """
     positions = [points]
     for number, deformation in enumerate(deformations):
@@ -34,9 +34,9 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
 
 
 def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a mesh's vertices: as given, and carried to the later weeks.
+    """Return the (w + 1, n, 3) positions of a mesh's vertices: the given ones, and carried to w later weeks.
 
-    Along matched surfaces its boundary follows them, and the inside harmonically.
+    With matched surfaces the boundary follows them and the inside is continued harmonically.
     """
     if matched := [pair for pair in later if isinstance(pair, MatchedSurfaces)]:
         return follow_inside(mesh, matched)
@@ -44,7 +44,7 @@ def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats
 
 
 def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
-    """Return the (n, 3) positions of a surface's vertices in the last brain, those given where there is no other."""
+    """Return the (n, 3) positions of a surface's vertices in the last brain; unchanged without correspondences."""
     if not between:
         return mesh.vertices
     matched = [pair for pair in between if isinstance(pair, MatchedSurfaces)]
@@ -54,9 +54,9 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
 
 
 def carry_to_pose(mesh: TriangleMesh, pose: Pose, between: Sequence[Correspondence], later_pose: Pose) -> TriangleMesh:
-    """Carry a brain's posed surface to a later brain, into the pose of that one's surface.
+    """Carry a brain's posed surface to a later brain, in the pose of the later brain's surface.
 
-    Brains correspond in the worlds of their files.
+    Correspondences refer to the worlds of the files.
     """
     world = transformed(mesh, pose.inverse)
     return transformed(TriangleMesh(carry_surface(world, between), mesh.faces), later_pose.world)
@@ -65,9 +65,9 @@ def carry_to_pose(mesh: TriangleMesh, pose: Pose, between: Sequence[Corresponden
 def carry_regions(
     labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
 ) -> Ints:
-    """Return the region labels of the (n,) vertices of `source` at those of `target`.
+    """Transfer the region labels of the (n,) vertices of `source` to those of `target`.
 
-    The source is carried into the target's space; each vertex of the target takes the label of the nearest point whose
+    The source is carried into the target's space. Each vertex of the target gets the label of the nearest point whose
     normal agrees.
     """
     if isinstance(between, Deformation):
@@ -79,11 +79,11 @@ def carry_regions(
 def maps_on_template(
     maps: Mapping[str, NDArray], surface: TriangleMesh, template: TriangleMesh, between: Sequence[Correspondence]
 ) -> dict[str, NDArray]:
-    """Return maps at the vertices of a brain's surface at the (n,) places of the vertices of a template.
+    """Resample maps at the vertices of a brain's surface to the (n,) vertices of a template.
 
-    The template is carried into the brain's space; each of its vertices takes the value at the nearest point whose
-    normal agrees, linear in between, and the nearest one of a map of whole numbers. `template_distance_mm` is how far
-    away that point is. `between` leads from the template to the brain; nothing where these are one.
+    The template is carried into the brain's space. Each of its vertices gets the value at the nearest point whose
+    normal agrees, interpolated linearly, or the nearest value of an integer map. `template_distance_mm` is the distance
+    of that point. `between` leads from the template to the brain; empty if these are the same.
     """
     for pair in between:
         if isinstance(pair, Deformation):
@@ -100,12 +100,12 @@ def maps_on_template(
 def _require_on_grid(deformation: Deformation, points: Floats, what: str) -> None:
     index = transform_points(points, np.linalg.inv(deformation.affine))
     last = np.array(deformation.displacement.shape[:3]) - 1
-    beyond = ((index < 0) | (index > last)).any(axis=1)
-    if beyond.mean() > OUTSIDE:
-        away = np.linalg.norm((index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1)
+    outside = ((index < 0) | (index > last)).any(axis=1)
+    if outside.mean() > MAX_OUTSIDE:
+        distance = np.linalg.norm((index - np.clip(index, 0, last)) @ deformation.affine[:3, :3].T, axis=1)
         raise InputError(
-            f"points lie beyond the grid that the registration knows ({what})",
-            found=f"{np.count_nonzero(beyond)} of {len(points)} points, up to {away.max():.3g} mm",
+            f"points lie outside the grid of the registration ({what})",
+            found=f"{np.count_nonzero(outside)} of {len(points)} points, up to {distance.max():.3g} mm",
             expected="points inside the brain that was registered",
-            remedy="The surface or mesh is not in the pose of the volume that was registered, or of another brain.",
+            remedy="The surface or mesh belongs to another brain, or is not in the pose of the registered volume.",
         )

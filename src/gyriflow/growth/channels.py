@@ -1,4 +1,4 @@
-"""What volumes of two brains are compared by: smoothed masks and intensities on a grid of their own."""
+"""Channels for registration: smoothed masks and intensities of a brain on a grid of cubic voxels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats
 
 SMOOTHING_MM = 0.8
-"""Standard deviation of the Gaussian that both masks are smoothed with."""
+"""Standard deviation of the Gaussian that smooths both masks."""
 
 MARGIN_MM = 6.0
-"""Room round the cerebrum."""
+"""Margin around the cerebrum."""
 
 CEREBRUM_BIT, CORTEX_BIT = 1, 2
 
@@ -27,9 +27,9 @@ BRIGHT = 0.99
 class Channels:
     """A brain on a grid (i, j, k) of cubic voxels along the axes of RAS+.
 
-    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits of the masks as they are,
-    `CEREBRUM_BIT` and `CORTEX_BIT`; `cerebrum` and `cortex` are smoothed masks from 0 to 1, `intensity` is that of the
-    image, about 1 where the cerebrum is brightest.
+    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits `CEREBRUM_BIT` and
+    `CORTEX_BIT` of the unsmoothed masks; `cerebrum` and `cortex` are smoothed masks from 0 to 1; `intensity` is that of the
+    image, scaled so that the brightest parts of the cerebrum are about 1.
     """
 
     affine: Floats
@@ -40,7 +40,7 @@ class Channels:
 
     @property
     def voxel_mm(self) -> float:
-        """Edge of a voxel."""
+        """Edge length of a voxel."""
         return float(self.affine[0, 0])
 
 
@@ -53,14 +53,14 @@ def channels(
     image: tuple[NDArray[np.number], Floats] | None = None,
     voxel_mm: float | None = None,
 ) -> Channels:
-    """Return the channels of a brain from its label volume, and from its image where there is one.
+    """Return the channels of a brain from its label volume and, if given, its image.
 
-    `labels` (i, j, k) are on any grid, turned or sheared, `affine` (4, 4) leads from index to RAS+ mm; `cerebrum` and
-    `cortex` are the numbers that make them. `image` has intensities and their own affine. `voxel_mm` is the edge of the
-    grid that is made, the volume's smallest one if None.
+    `labels` (i, j, k) are on any grid, rotated or sheared; `affine` (4, 4) leads from index to RAS+ mm; `cerebrum` and
+    `cortex` are their label numbers. `image` has intensities and their own affine. `voxel_mm` is the voxel size of the
+    new grid; by default the volume's smallest one.
 
-    InputError where no voxel belongs to the cerebrum, where the cortex is named and missing, where the cerebrum is cut
-    by the edge of the volume, and where the image does not reach over it.
+    InputError if no voxel belongs to the cerebrum or to a named cortex, if the edge of the volume cuts the cerebrum, or
+    if the image does not cover it.
     """
     inside = np.isin(labels, cerebrum)
     if not inside.any():
@@ -70,7 +70,7 @@ def channels(
     voxel = float(sizes.min()) if voxel_mm is None else voxel_mm
     centres = transform_points(np.argwhere(inside), affine)
     low, high = centres.min(axis=0) - MARGIN_MM, centres.max(axis=0) + MARGIN_MM
-    # on a voxel's centre, so that a grid that needs no resampling gets none
+    # start at a voxel's centre, so that a suitable grid is not resampled
     low = transform_points(np.rint(transform_points(low, np.linalg.inv(affine))), affine)
     shape = tuple((np.ceil((high - low) / voxel) + 1).astype(int))
     grid = np.diag([voxel, voxel, voxel, 1.0])
@@ -100,7 +100,7 @@ def _require_whole(inside: NDArray[np.bool_]) -> None:
     cut = {side: count for side, count in sides.items() if count > 0.02 * np.count_nonzero(inside) ** (2 / 3)}
     if cut:
         raise InputError(
-            "the cerebrum is cut by the edge of the volume, so that it cannot be registered",
+            "the edge of the volume cuts the cerebrum, so it cannot be registered",
             found=", ".join(f"{count} voxels at {side}" for side, count in cut.items()),
             expected="a whole cerebrum",
             remedy="Leave this brain out of the registration.",
@@ -117,9 +117,9 @@ def _intensity(
     covered = float((intensity[inside] != 0).mean())
     if bright <= 0 or covered < 0.9:
         raise InputError(
-            "the image does not show the cerebrum that the labels name",
+            "the image does not show the cerebrum of the labels",
             found=f"{covered:.0%} of the cerebrum with an intensity, 99 % quantile {bright:.3g}",
-            expected="positive intensities all over",
+            expected="positive intensities everywhere",
             remedy="Check that the image belongs to the labels, or register by the labels alone.",
         )
     return intensity / np.float32(bright)

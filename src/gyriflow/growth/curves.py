@@ -1,4 +1,4 @@
-"""Smooth curves of area, volume and thickness over gestational weeks, through measured weeks or from a table."""
+"""Smooth curves of area, volume and thickness over gestational weeks, fitted to brains or given as a table."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -17,32 +17,32 @@ from ..geometry.triangles import Floats
 log = logging.getLogger(__name__)
 
 DEGREES_OF_FREEDOM = 4.0
-"""Of a fitted curve: a size, a rate of growth, how that rate changes, and a little more."""
+"""Degrees of freedom of a fitted curve: a size, a growth rate, its change, and a little more."""
 
 SPACING_WEEKS = 0.1
-"""Of the points that a fitted curve is kept at."""
+"""Spacing of the points at which a fitted curve is stored."""
 
-LEAST_SCATTER = 0.005
-"""Scatter of measured sizes, as a fraction, that is not taken for a leap."""
+MIN_SCATTER = 0.005
+"""Relative scatter of measured sizes that is never taken for an outlier."""
 
 TUKEY = 4.685
-"""Residual over scatter beyond which a week does not count (Beaton and Tukey 1974)."""
+"""Residual over scatter beyond which a week has no weight (Beaton and Tukey 1974)."""
 
-TELLING = 2.0
-"""Weeks per degree of freedom from which on the others tell that one leaps."""
+MIN_WEEKS_PER_DEGREE = 2.0
+"""Weeks per degree of freedom that are needed to detect outliers."""
 
 ROUNDS = 50
 KNOT_INTERVALS = 12
-CERTAIN = 1.96
+Z_95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A positive quantity over the weeks.
 
-    Between its points, at ascending weeks (k,), the logarithm is a monotone cubic (Fritsch and Butland 1984); beyond
-    them the rate of growth of the end goes on. Values (k,) are in any unit; `sd` (k,) is the standard deviation of the
-    logarithm, NaN where the data do not tell, 0 for a given table.
+    Its logarithm is a monotone cubic (Fritsch and Butland 1984) through the points at ascending weeks (k,), and is
+    extrapolated with the growth rate at the ends. Values (k,) are in any unit; `sd` (k,) is the standard deviation of
+    the logarithm, NaN if it is unknown, 0 for a given table.
     """
 
     weeks: Floats
@@ -51,8 +51,8 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """A curve, the (n,) weeks and measured values that it was fitted to, and their weights: 0 for a week that leaps."""
+class CurveFit:
+    """A curve, the (n,) weeks and measured values that it was fitted to, and their weights: 0 for an outlier."""
 
     curve: Curve
     weeks: Floats
@@ -61,7 +61,7 @@ class Fit:
 
 
 def value(curve: Curve, week: ArrayLike) -> Floats:
-    """Return the quantity at weeks, in the curve's unit."""
+    """Return the values of a curve at weeks, in the curve's unit."""
     return np.exp(_log_and_rate(curve, week)[0])
 
 
@@ -71,19 +71,19 @@ def rate(curve: Curve, week: ArrayLike) -> Floats:
 
 
 def interval(curve: Curve, week: ArrayLike) -> tuple[Floats, Floats]:
-    """Return the bounds of the 95 % interval of the curve at weeks; beyond its ends as wide as there."""
+    """Return the bounds of the 95 % interval of a curve at weeks. Its width is constant beyond the ends."""
     sd = np.interp(np.asarray(week, dtype=float), curve.weeks, curve.sd)
     middle = value(curve, week)
-    return middle * np.exp(-CERTAIN * sd), middle * np.exp(CERTAIN * sd)
+    return middle * np.exp(-Z_95 * sd), middle * np.exp(Z_95 * sd)
 
 
 def tabulated(
     weeks: Sequence[float], values: Sequence[float], *, name: str = "curve", may_shrink: bool = False
 ) -> Curve:
-    """Return the curve of a given table, such as a norm; InputError where it is no table or shrinks unnamed."""
+    """Return the curve through a given table, such as a norm; InputError if a value is invalid or decreases."""
     weeks_, values_ = _checked(weeks, values, name)
     if len(np.unique(weeks_)) < len(weeks_):
-        raise InputError(f"a week of the {name} is there twice", found=weeks_.tolist(), expected="one value a week")
+        raise InputError(f"the {name} has a week twice", found=weeks_.tolist(), expected="one value for each week")
     if not may_shrink and (np.diff(values_) < 0).any():
         _refuse_shrinking(name, weeks_[1:][np.diff(values_) < 0])
     return Curve(weeks_, values_, np.zeros(len(weeks_)))
@@ -96,17 +96,17 @@ def fitted(
     name: str = "curve",
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
     may_shrink: bool = False,
-) -> Fit:
-    """Return a smooth curve through measured weeks that does not follow a single week that leaps.
+) -> CurveFit:
+    """Fit a smooth curve to measured weeks, robust against single outliers.
 
-    The rate of growth of the logarithm is a quadratic spline with a penalty on its second differences (on its first
-    ones below three degrees of freedom, P-splines of Eilers and Marx 1996), not negative unless `may_shrink`. The
-    penalty is that which leaves `degrees_of_freedom`, at most one less than there are weeks. Where there are twice as
-    many weeks, those far from the curve lose their weight (Tukey's biweight, begun from least absolute deviations).
-    The standard deviation is Bayesian (Wahba 1983), with the scatter of the weeks about the curve.
+    The growth rate (derivative of the logarithm) is a quadratic spline, not negative unless `may_shrink`, with a
+    penalty on its second differences (on its first ones below three degrees of freedom; P-splines, Eilers and Marx
+    1996). The penalty leaves `degrees_of_freedom`, at most one less than the number of weeks. With at least twice as
+    many weeks, outliers lose their weight (Tukey's biweight, started from least absolute deviations). The standard
+    deviation is Bayesian (Wahba 1983), from the scatter of the weeks about the curve.
 
-    Gestational weeks are at least two different ones, and sizes positive; several brains may share a week. InputError
-    for other values, and where the sizes shrink and that is not allowed.
+    At least two different weeks and positive sizes are needed; several brains may share a week. InputError for other
+    values, and if the sizes decrease without `may_shrink`.
     """
     weeks_, values_ = _checked(weeks, values, name)
     count = len(np.unique(weeks_))
@@ -116,12 +116,12 @@ def fitted(
     penalty = _penalty(*ends, order=2 if degrees >= 3 else 1)
     strength = _strength(design, penalty, degrees)
     weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
-    coefficients = _solved(design, logs, weights, strength * penalty, may_shrink)
+    coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
     if not may_shrink and coefficients[1:].max() < 1e-6:
         _refuse_shrinking(name, weeks_)
-    left = weights.sum() - degrees
+    residual_degrees = weights.sum() - degrees
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
-    spread = np.sqrt(squares / left) if left > 0.5 else np.nan
+    spread = np.sqrt(squares / residual_degrees) if residual_degrees > 0.5 else np.nan
     at = np.linspace(*ends, max(2, round((ends[1] - ends[0]) / SPACING_WEEKS) + 1))
     rows = _design(at, *ends)
     free = np.ones(len(coefficients), dtype=bool)
@@ -129,17 +129,17 @@ def fitted(
     normal = (design.T * weights) @ design + strength * penalty
     covariance = np.linalg.pinv(normal[np.ix_(free, free)])
     sd = spread * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows[:, free], covariance, rows[:, free]), 0.0))
-    leaping = weeks_[weights < 0.5]
-    if len(leaping):
-        log.warning("%s: weeks %s lie apart from the curve", name, ", ".join(f"{week:g}" for week in leaping))
-    return Fit(Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights)
+    outliers = weeks_[weights < 0.5]
+    if len(outliers):
+        log.warning("%s: weeks %s are outliers of the curve", name, ", ".join(f"{week:g}" for week in outliers))
+    return CurveFit(Curve(at, np.exp(rows @ coefficients), sd), weeks_, values_, weights)
 
 
-def errors(fits: Mapping[str, Fit]) -> pd.DataFrame:
-    """Return how far curves are from the weeks that they were fitted to, a row per quantity and measured value.
+def errors(fits: Mapping[str, CurveFit]) -> pd.DataFrame:
+    """Return the errors of curves at the weeks that they were fitted to, a row per quantity and measured value.
 
-    Columns quantity, week, measured, curve, low, high (95 % interval), error (the curve's, as a fraction of what was
-    measured), weight.
+    Columns are quantity, week, measured, curve, low, high (95 % interval), error (curve over measured value, minus 1)
+    and weight.
     """
     tables = []
     for name, fit in fits.items():
@@ -167,7 +167,7 @@ def _design(weeks: Floats, first: float, last: float) -> Floats:
 
 
 def _penalty(first: float, last: float, order: int) -> Floats:
-    # the end knots lie together, so differences are those of the splines' middles
+    # the end knots coincide, so differences are taken between the middles of the splines
     knots = _knots(first, last)
     middles = 0.5 * (knots[1:-2] + knots[2:-1])
     slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
@@ -181,7 +181,7 @@ def _knots(first: float, last: float) -> Floats:
 
 
 def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
-    # a trace of ridge keeps the matrix regular where weeks are fewer than splines
+    # a small ridge keeps the matrix regular if there are fewer weeks than splines
     ridge = 1e-10 * np.eye(len(penalty))
 
     def excess(exponent: float) -> float:
@@ -194,8 +194,8 @@ def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
     return float(10 ** brentq(excess, -8.0, 8.0))
 
 
-def _solved(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
-    # a strong penalty has eigenvalues that should be 0 and by round-off are not
+def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:
+    # eigenvalues of a strong penalty that should be 0 are not, because of round-off
     sizes, directions = np.linalg.eigh(penalty)
     root = (directions * np.sqrt(np.clip(sizes, 1e-10, None))).T
     rows = np.concatenate([np.sqrt(weights)[:, None] * design, root])
@@ -211,16 +211,16 @@ def _robust_weights(
 ) -> Floats:
     count = len(logs)
     weights = np.ones(count)
-    if count < TELLING * degrees:
+    if count < MIN_WEEKS_PER_DEGREE * degrees:
         return weights
     for _ in range(ROUNDS):
-        residuals = logs - design @ _solved(design, logs, weights, strength * penalty, may_shrink)
-        weights = 1.0 / np.maximum(np.abs(residuals), LEAST_SCATTER)
+        residuals = logs - design @ _solve(design, logs, weights, strength * penalty, may_shrink)
+        weights = 1.0 / np.maximum(np.abs(residuals), MIN_SCATTER)
         weights *= count / weights.sum()
     for _ in range(ROUNDS):
-        scale = max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(count / (count - degrees)), LEAST_SCATTER)
+        scale = max(1.4826 * float(np.median(np.abs(residuals))) * np.sqrt(count / (count - degrees)), MIN_SCATTER)
         weights = np.clip(1 - (residuals / (TUKEY * scale)) ** 2, 0, None) ** 2
-        residuals = logs - design @ _solved(design, logs, weights, strength * penalty, may_shrink)
+        residuals = logs - design @ _solve(design, logs, weights, strength * penalty, may_shrink)
     return weights
 
 
@@ -237,7 +237,7 @@ def _checked(weeks: Sequence[float], values: Sequence[float], name: str) -> tupl
     good = weeks_.shape == values_.shape and np.isfinite([*weeks_, *values_]).all() and (values_ > 0).all()
     if not good or len(np.unique(weeks_)) < 2:
         raise InputError(
-            f"no {name} goes through these weeks",
+            f"the {name} cannot be fitted to these weeks",
             found=f"weeks {weeks_.tolist()}, values {values_.tolist()}",
             expected="positive values at two or more weeks",
         )

@@ -26,21 +26,21 @@ WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
 DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -s 2.5vox 0.8vox -wp 0"
 
-CLEARLY_BETTER = 0.7
-"""A turned start has to have a smaller share of the difference of the start as given to be taken."""
+MAX_ROTATED_SHARE = 0.7
+"""A rotated start is taken if its difference is below this share of that without rotation."""
 
-POINTS = 20000
-"""Of the cerebrum, by which these starts are compared."""
+N_POINTS = 20000
+"""Number of points of the cerebrum at which starts are compared."""
 
 NEAR_MM = 3.0
-"""Round the cerebrum, what is compared for the deformation."""
+"""Margin around the cerebrum in which brains are compared for the deformation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """A deformation that takes points of the earlier brain to the later one, and how it was found.
+    """A deformation from the earlier brain to the later one.
 
-    `turned_deg` is by how much the later brain was turned before the affine registration began, `channels` are those
+    `turned_deg` is the angle by which the later brain was rotated before the affine registration; `channels` are those
     that were compared.
     """
 
@@ -51,37 +51,37 @@ class Registration:
 
 
 def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registration:
-    """Return the registration of an earlier brain with a later one.
+    """Register an earlier brain to a later one.
 
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
-    cross-correlation for the deformation. It begins where centroids and volumes of the cerebra match, turned by that
-    of the cube's rotations which fits clearly better than none. The same input gives the same result. InputError where
-    greedy fails; `quality.judge` says whether the result is good.
+    cross-correlation for the deformation. It starts with centroids and volumes of the cerebra matched, rotated by one
+    of the cube's rotations if this fits clearly better. The result is deterministic. InputError if greedy fails;
+    `registration_quality.measure_quality` measures how good the result is.
     """
     began = time.perf_counter()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
     turn, start = _find_start(earlier, later, names)
     images = {f"fixed_{name}": _image(getattr(earlier, name), earlier.affine) for name in names}
-    # greedy begins at the identity, so the later brain is handed over where the start puts it
+    # greedy starts at the identity, so the later brain is passed in its start position
     placed = np.linalg.inv(start) @ later.affine
     images |= {f"moving_{name}": _image(getattr(later, name), placed) for name in names}
     images["where"] = _image(_round_cerebrum(earlier), earlier.affine)
     pairs = " ".join(f"-w {WEIGHTS[name]:g} -i fixed_{name} moving_{name}" for name in names)
     common = f"-threads {threads} -seed 1 -V 0"
     greedy = Greedy3D()
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        greedy.execute(f"{AFFINE} {common} {pairs} -ia-identity -o found", out=said, err=said, found=None, **images)
-        greedy.execute(f"{DEFORMABLE} {common} {pairs} -gm where -it found -o warp", out=said, err=said, warp=None)
+        greedy.execute(f"{AFFINE} {common} {pairs} -ia-identity -o found", out=output, err=output, found=None, **images)
+        greedy.execute(f"{DEFORMABLE} {common} {pairs} -gm where -it found -o warp", out=output, err=output, warp=None)
     except RuntimeError as error:
         raise InputError(
             f"greedy cannot register the brains: {error}",
-            found=f"channels {', '.join(names)}" + said.getvalue()[-500:],
+            found=f"channels {', '.join(names)}" + output.getvalue()[-500:],
             remedy="Look at both label volumes: are they of the same kind of brain, whole and in mm?",
         ) from error
-    # greedy returns matrices in RAS, and works in LPS with all else
+    # greedy returns matrices in RAS; all else is in LPS
     matrix = start @ LPS_TO_RAS @ np.asarray(greedy["found"], dtype=float) @ LPS_TO_RAS
-    # images hold their axes the other way round in SimpleITK's arrays
+    # SimpleITK's arrays have reversed axes
     warp = SimpleITK.GetArrayFromImage(greedy["warp"]).transpose(2, 1, 0, 3).astype(np.float32)
     seconds = time.perf_counter() - began
     log.info("registered by %s in %.0f s", ", ".join(names), seconds)
@@ -108,12 +108,12 @@ def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
 
 
 def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:
-    (first, size), (second, other_size) = _place(earlier), _place(later)
-    scale = (other_size / size) ** (1 / 3)
+    (first, first_size), (second, second_size) = _place(earlier), _place(later)
+    scale = (second_size / first_size) ** (1 / 3)
     index = np.argwhere(earlier.cerebrum > 0.01)
-    index = index[:: max(1, len(index) // POINTS)]
+    index = index[:: max(1, len(index) // N_POINTS)]
     points = transform_points(index, earlier.affine)
-    tried, differences = [], []
+    starts, differences = [], []
     for turn in CUBE_ROTATIONS:
         matrix = np.eye(4)
         matrix[:3, :3] = scale * turn
@@ -124,11 +124,11 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
             * np.square(getattr(earlier, name)[tuple(index.T)] - map_coordinates(getattr(later, name), at, order=1))
             for name in names
         ]
-        tried.append(matrix)
+        starts.append(matrix)
         differences.append(float(np.sum([square.mean() for square in squares])))
     best = int(np.argmin(differences))
-    chosen = best if differences[best] < CLEARLY_BETTER * differences[0] else 0
-    return CUBE_ROTATIONS[chosen], tried[chosen]
+    selected = best if differences[best] < MAX_ROTATED_SHARE * differences[0] else 0
+    return CUBE_ROTATIONS[selected], starts[selected]
 
 
 def _place(brain: Channels) -> tuple[Floats, float]:

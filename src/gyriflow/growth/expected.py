@@ -1,4 +1,4 @@
-"""What is to be expected of a brain: its mesh carried sharply through an atlas' weeks, with what sets it apart kept."""
+"""Predict a brain's later shapes: carry its mesh through an atlas and keep its individual differences."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -17,43 +17,41 @@ from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
 
 PULL_MM = (4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0)
-"""Standard deviations that the pull towards a surface is smoothed with, round by round."""
+"""Smoothing (SD, mm) of the pull towards a surface, round by round."""
 REACH_MM = 4.0
 """Largest distance over which a surface pulls."""
-OWN_MM = 8.0
-"""Standard deviation of the Gaussian that what sets a brain apart from the atlas is smoothed with.
-
-What is smaller than a gyrus says nothing of folds that are still to come.
-"""
+DIFFERENCE_SMOOTHING_MM = 8.0
+"""Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""
 FADING_GW = 4.0
-"""Time in which what is smaller fades: of 1, 4 and 16 weeks the best for invented individuals, see docs/science.md."""
+"""Time constant with which finer differences fade: of 1, 4 and 16 weeks the best for synthetic individuals
+(docs/science.md)."""
 
 
 def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
-    """Return the (n, 3) vertices of a surface moved smoothly onto another one that lies near it, in mm.
+    """Deform a surface smoothly onto another one close to it; return its (n, 3) vertices in mm.
 
-    Each round pulls the vertices to the nearest points of the other surface whose normals agree, and to those vertices
-    of the other surface that find their nearest point beside them, so that the fundus of a sulcus pulls although no
-    vertex is nearest to it. The pull is smoothed along the moving surface.
+    Each round pulls the vertices to the nearest points of the other surface whose normals agree. Vertices of the other
+    surface also pull their nearest points, so that the fundus of a sulcus has an effect although it is nearest to no
+    vertex. The pull is smoothed along the moving surface.
     """
     vertices, faces = moving.vertices, moving.faces
     normals, areas = vertex_normals(surface), vertex_areas(surface)
     for spread in PULL_MM:
-        now = TriangleMesh(vertices, faces)
-        areas_now = vertex_areas(now)
-        there = match_points(vertices, vertex_normals(now), surface)
-        weight = areas_now * (there.agrees & (there.distance_mm < REACH_MM))
-        pull = (values_at(there, surface.vertices) - vertices) * weight[:, None]
-        back = match_points(surface.vertices, normals, now)
-        shares = back.weights * (areas * (back.agrees & (back.distance_mm < REACH_MM)))[:, None]
-        missing = surface.vertices - values_at(back, vertices)
-        np.add.at(weight, back.corners, shares)
-        np.add.at(pull, back.corners, shares[..., None] * missing[:, None])
+        moved = TriangleMesh(vertices, faces)
+        moved_areas = vertex_areas(moved)
+        forward = match_points(vertices, vertex_normals(moved), surface)
+        weight = moved_areas * (forward.agrees & (forward.distance_mm < REACH_MM))
+        pull = (values_at(forward, surface.vertices) - vertices) * weight[:, None]
+        backward = match_points(surface.vertices, normals, moved)
+        shares = backward.weights * (areas * (backward.agrees & (backward.distance_mm < REACH_MM)))[:, None]
+        misfit = surface.vertices - values_at(backward, vertices)
+        np.add.at(weight, backward.corners, shares)
+        np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
         smooth = diffuse(
-            vertices, faces, np.column_stack([pull, weight]) / np.maximum(areas_now, 1e-9)[:, None], spread
+            vertices, faces, np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None], spread
         )
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
-        # a mean of pulls is no longer than these; beside obtuse faces, smoothed weights may come out as zero or less
+        # a mean of pulls is at most as long as these; near obtuse faces smoothed weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
         vertices = vertices + move * np.minimum(1.0, REACH_MM / np.maximum(length, 1e-9))
     return np.asarray(vertices)
@@ -62,41 +60,42 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
 def carry_sharply(
     mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh] | None
 ) -> Floats:
-    """Return the (w + 1, n, 3) positions of a mesh's vertices carried through w brains, its boundary on theirs.
+    """Carry a mesh's vertices through w brains with its boundary fitted to theirs; return (w + 1, n, 3) positions.
 
-    Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds. So
-    the boundary is fitted onto that brain's surface week by week, and the inside goes along harmonically. Matched
-    surfaces need no fit: a run of them is followed from where the boundary lies on the first.
+    Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds.
+    Therefore the boundary is fitted to that brain's surface week by week, and the inside is continued harmonically.
+    Matched surfaces need no fit: the boundary keeps its place relative to them.
 
-    The mesh is of the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial ones of the
-    others, all in the spaces that these correspond in. Without surfaces nothing is fitted.
+    The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
+    of the later brains, all in the spaces of these correspondences. Without surfaces nothing is fitted.
 
-    InputError where points leave the grid of a registration, or the boundary lies beside matched surfaces.
+    InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
-    continued = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
+    extend = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
     positions = [mesh.vertices]
 
-    def go(places: Floats, moved: Floats) -> None:
-        positions.append(places + continued(moved - places[used]))
+    def move_boundary(places: Floats, moved: Floats) -> None:
+        positions.append(places + extend(moved - places[used]))
 
     for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
         numbered, before = list(group), positions[-1]
         if matched := [pair for _, pair in numbered if isinstance(pair, MatchedSurfaces)]:
             for moved in follow_surfaces(TriangleMesh(before[used], boundary.faces), matched)[1:]:
-                go(before, moved)
+                move_boundary(before, moved)
         for number, pair in numbered:
             if isinstance(pair, Deformation):
                 places = carry_over_weeks(positions[-1], [pair])[-1]
                 carried = TriangleMesh(places[used], boundary.faces)
-                go(places, carried.vertices if surfaces is None else fit_onto_surface(carried, surfaces[number]))
+                fitted = carried.vertices if surfaces is None else fit_onto_surface(carried, surfaces[number])
+                move_boundary(places, fitted)
     return np.stack(positions)
 
 
 def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
-    """Return the (n, 3) positions of an atlas at a week from its (k, n, 3) in k weeks, linear between two of them.
+    """Interpolate the (k, n, 3) positions of an atlas in k weeks linearly to a week; return (n, 3) positions.
 
-    The later one is laid onto the earlier rigidly, points counted by their (n,) sizes.
+    The later week is first aligned rigidly to the earlier one, with points weighted by their (n,) sizes.
     """
     first = int(np.clip(np.searchsorted(np.asarray(weeks), week, side="right") - 1, 0, len(weeks) - 2))
     part = (week - weeks[first]) / (weeks[first + 1] - weeks[first])
@@ -111,41 +110,42 @@ def expected_positions(
     weeks: Sequence[float],
     *,
     also: Sequence[float] = (),
-    own_mm: float = OWN_MM,
+    smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
 ) -> tuple[list[float], Floats]:
-    """Return the weeks from the start on, and the (w, n, 3) positions in which a mesh is expected then, in mm.
+    """Return the weeks from the start on, and the (w, n, 3) positions in mm that are predicted for a mesh.
 
-    A brain moves as the atlas does from where the atlas is at its week, and keeps what sets it apart from the atlas, in
-    proportion to the size, as far as that is smooth (`own_mm`, with 0 all of it); what is finer fades (`FADING_GW`).
+    The brain moves as the atlas does from the atlas' shape at the start week. Its individual difference from the atlas
+    grows in proportion to the size as far as it is smooth (SD `smoothing_mm`; all of it with 0); finer differences fade
+    (`FADING_GW`).
 
-    The mesh is the start brain's, in mm, `atlas` (k, n, 3) the positions of its vertices in the atlas' k ascending
-    `weeks`; `also` are further weeks that are wanted.
+    `mesh` is that of the start brain in mm, `atlas` (k, n, 3) the positions of its vertices in the atlas' k ascending
+    `weeks`; `also` are further weeks.
 
-    InputError where the start is long before the first week or not before the last one.
+    InputError if the start is long before the first week, or not before the last one.
     """
     if len(weeks) < 2 or not weeks[0] - BEFORE_GW <= start_week < weeks[-1]:
         raise InputError(
-            "the atlas does not tell how a brain of this week grows",
+            "the atlas does not cover the growth of a brain of this week",
             found=f"a start at {start_week:g} GW and an atlas of {weeks[0]:g} to {weeks[-1]:g} GW",
             expected=f"two weeks or more, and a start from {weeks[0] - BEFORE_GW:g} GW to before {weeks[-1]:g} GW",
         )
     pieces = linear_pieces(mesh)
     sizes = vertex_sizes(mesh.vertices, pieces)
 
-    def laid_onto(places: Floats, onto: Floats) -> Floats:
+    def aligned(places: Floats, onto: Floats) -> Floats:
         return transform_points(places, rigid_fit(places, onto, sizes))
 
-    now = laid_onto(positions_at(start_week, atlas, weeks, sizes), mesh.vertices)
-    apart = mesh.vertices - now
-    smooth = diffuse(mesh.vertices, pieces, apart, own_mm)
-    size = cell_sizes(now, pieces).sum()
+    start = aligned(positions_at(start_week, atlas, weeks, sizes), mesh.vertices)
+    difference = mesh.vertices - start
+    smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
+    size = cell_sizes(start, pieces).sum()
     by_week = {start_week: mesh.vertices}
     for week in sorted({*weeks, *also}):
         if week > start_week + 1e-6:
             places = positions_at(week, atlas, weeks, sizes)
             scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
             fading = np.exp((start_week - week) / FADING_GW)
-            by_week[float(week)] = laid_onto(places, now) + scale * (smooth + fading * (apart - smooth))
+            by_week[float(week)] = aligned(places, start) + scale * (smooth + fading * (difference - smooth))
     return list(by_week), np.stack(list(by_week.values()))
 
 
@@ -157,27 +157,27 @@ def predict_shapes(
     weeks: Sequence[float],
     also: Sequence[float] = (),
 ) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
-    """Return the weeks from the start on, the (w, n, 3) positions in which a mesh is expected, and its boundary's.
+    """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
-    The latter are where simpler ways put the boundary's vertices: `atlas`, the atlas' brain itself, `atlas_deformed`,
-    this brain with all that sets the start apart from it, and `displaced`, the start moved as registration alone sees
-    the atlas move.
+    The baselines are simpler predictions of the boundary's vertices: `atlas`, the atlas' own brain; `atlas_deformed`,
+    that brain with the whole individual difference; and `displaced`, the start moved by registration alone.
 
-    The mesh is the start brain's; `pairs` lead from the start to the atlas' first week, and from each of its `weeks` to
-    the next. `surfaces` are the atlas' pial ones, all in the spaces that they correspond in. `also` are further weeks.
+    `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
+    `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
+    further weeks.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces)[1:]
     shape_weeks, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
-    others = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
-    for name, way in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
-        _, places = expected_positions(mesh, start_week, way, weeks, also=also, own_mm=0)
-        others[name] = [at[used] for at in places]
-    return shape_weeks, positions, others
+    baselines = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
+    for name, path in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
+        _, places = expected_positions(mesh, start_week, path, weeks, also=also, smoothing_mm=0)
+        baselines[name] = [at[used] for at in places]
+    return shape_weeks, positions, baselines
 
 
 def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Floats]:
-    """Return the area_cm2 and volume_ml (w,) that a mesh's boundary has and encloses at w positions (n, 3)."""
+    """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
     return {

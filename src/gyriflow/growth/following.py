@@ -1,4 +1,4 @@
-"""Curves of area, volume and cortical thickness through series of brains, and those that a run is to follow."""
+"""Curves of area, volume and cortical thickness through series of brains, and those that a run follows."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,28 +9,28 @@ import pandas as pd
 from ..errors import InputError
 from ..settings.folding import target_map
 from ..settings.growth import SIZES
-from .curves import Curve, Fit, fitted, tabulated, value
+from .curves import Curve, CurveFit, fitted, tabulated, value
 
 THICKNESS = "thickness_mm"
-"""Column of the table of areas with the mean cortical thickness, where it is known; it may shrink."""
+"""Column of the table of areas with the mean cortical thickness, if known. Thickness may decrease."""
 SPACING_GW = 0.25
-"""Of the weeks that a run knows a curve at."""
+"""Spacing of the weeks at which a run stores a curve."""
 
 
-def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, Fit]]:
-    """Return the curves through the measured sizes of each series of brains, by series and quantity.
+def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:
+    """Fit curves to the measured sizes of each series of brains; return them by series and quantity.
 
-    Areas have the columns series, week, area_cm2, volume_ml, and `THICKNESS` where it is known; series of two weeks or
-    more. Where brains of less than two weeks have a thickness, no curve of it is fitted.
+    `areas` has the columns series, week, area_cm2, volume_ml and, if known, `THICKNESS`; each series has two weeks or
+    more. A curve of thickness needs brains of two weeks with a thickness.
     """
-    fits: dict[str, dict[str, Fit]] = {}
+    fits: dict[str, dict[str, CurveFit]] = {}
     for name, brains in areas.groupby("series", sort=False):
         fits[str(name)] = {}
         for quantity in (*SIZES, *([THICKNESS] if THICKNESS in brains else [])):
-            measured = brains.dropna(subset=quantity)
-            if quantity in SIZES or len(measured["week"].unique()) > 1:
+            complete = brains.dropna(subset=quantity)
+            if quantity in SIZES or len(complete["week"].unique()) > 1:
                 fits[str(name)][quantity] = fitted(
-                    *measured[["week", quantity]].to_numpy().T, name=quantity, may_shrink=quantity == THICKNESS
+                    *complete[["week", quantity]].to_numpy().T, name=quantity, may_shrink=quantity == THICKNESS
                 )
     return fits
 
@@ -38,20 +38,20 @@ def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, Fit]]:
 def followed_sizes(
     growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float], shrink: bool
 ) -> dict[str, dict[float, float]]:
-    """Return the sizes that a run is to have, {quantity: {week: value}}, every quarter of a week.
+    """Return the sizes that a run follows, {quantity: {week: value}}, every quarter of a week.
 
-    `growth` has for those of `SIZES` and the thickness that it follows `measured` or a table of values by week, which
-    may decrease with `shrink`. Where one is `measured`, `curves` has the columns series, quantity, week and value;
-    InputError where the start brain's `series` is not among them. `weeks` are the output weeks of the run.
+    For each of `SIZES` and the thickness that the run follows, `growth` has `measured` or a table of values by week,
+    which may decrease if `shrink`. `curves`, with the columns series, quantity, week and value, are needed for
+    `measured`; InputError if the start brain's `series` is not in them. `weeks` are the output weeks of the run.
     """
     at = np.arange(weeks[0], weeks[-1] + 1e-9 + SPACING_GW, SPACING_GW)
     tables = {}
     for quantity in [name for name in (*SIZES, THICKNESS) if growth.get(name) is not None]:
-        given = growth[quantity]
-        if given == "measured":
-            curve = _measured(curves, series, quantity)
+        source = growth[quantity]
+        if source == "measured":
+            curve = _measured_curve(curves, series, quantity)
         else:
-            by_week = {float(week): number for week, number in given.items()}
+            by_week = {float(week): number for week, number in source.items()}
             shrinks = shrink or quantity == THICKNESS
             curve = tabulated(list(by_week), list(by_week.values()), name=quantity, may_shrink=shrinks)
         sizes = value(curve, at)
@@ -85,7 +85,7 @@ def run_parameters(
 def sizes_on_curves(
     growth: Mapping[str, Any], curves: pd.DataFrame | None, series: str | None, weeks: Sequence[float]
 ) -> dict[float, dict[str, float]]:
-    """Return by week the `SIZES` that a run was to have, or those of the measured brains; empty where neither is known.
+    """Return by week the `SIZES` that a run should have had, or those of the observed brains; empty if unknown.
 
     `growth` is the section of the run's parameters, with tables of the sizes if it followed any. `curves` has the
     columns series, quantity, week and value; InputError where it is given without the start brain's `series`.
@@ -93,24 +93,24 @@ def sizes_on_curves(
     if SIZES[0] in growth:
         found = [tabulated(list(growth[name]), list(growth[name].values()), may_shrink=True) for name in SIZES]
     elif curves is not None:
-        found = [_measured(curves, series, name) for name in SIZES]
+        found = [_measured_curve(curves, series, name) for name in SIZES]
     else:
         found = []
     by_name = dict(zip(SIZES, found, strict=False))
     return {week: {name: float(value(curve, week)) for name, curve in by_name.items()} for week in weeks}
 
 
-def _measured(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
+def _measured_curve(curves: pd.DataFrame | None, series: str | None, quantity: str) -> Curve:
     table = pd.DataFrame(columns=["series", "quantity", "week", "value"]) if curves is None else curves
-    of_series = table[table["series"] == series]
-    rows = of_series[of_series["quantity"] == quantity]
+    series_rows = table[table["series"] == series]
+    rows = series_rows[series_rows["quantity"] == quantity]
     if not len(rows):
         reason = (
             f"its brains have no {quantity} in two weeks or more"
-            if len(of_series)
+            if len(series_rows)
             else "the start brain is in no series of brains of two weeks or more"
         )
         remedy = "List brains of other weeks, or give growth a table such as {area_cm2: {21: 99, 30: 252}}"
-        raise InputError(f"no measured curve of {quantity} can be followed", found=reason, remedy=remedy)
+        raise InputError(f"there is no measured curve of {quantity} to follow", found=reason, remedy=remedy)
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

@@ -13,31 +13,31 @@ from ..geometry.matching import match_points, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, vertex_areas, vertex_normals
 
-AWAY_MM = 2.0
-"""Largest mean distance of a mesh's surface from the matched surface that it is to follow."""
-MOST_TURN_DEG = 30.0
-"""Largest turn between the matched vertices of two posed brains."""
-MOST_SCATTER = 0.3
-"""Largest root mean square distance of matched vertices, laid onto each other and scaled, as a share of the size."""
+MAX_DISTANCE_MM = 2.0
+"""Largest mean distance of a mesh's surface from the matched surface that it follows."""
+MAX_TURN_DEG = 30.0
+"""Largest rotation between the matched vertices of two posed brains."""
+MAX_SCATTER = 0.3
+"""Largest root mean square distance of matched vertices after alignment and scaling, as a share of the size."""
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a surface whose triangles are seen counter-clockwise from outside, whatever their order was."""
+    """Return a surface with its triangles oriented outward."""
     return flipped(mesh) if signed_volume(mesh) < 0 else mesh
 
 
 def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSurfaces, dict[str, float]]:
-    """Return the surfaces of two posed brains as matched, and how far their vertices are from being the same places.
+    """Match the surfaces of two posed brains by vertex number; return the match and measures of its quality.
 
-    Triangles may be listed in any order and seen from either side. The numbers are vertices, turn_deg, scatter (root
-    mean square distance of the vertices after a similarity, as a share of the root mean square radius) and area_ratio.
+    Triangles may be in any order and orientation. The measures are vertices, turn_deg, scatter (root mean square
+    distance of the vertices after a similarity transform, as a share of the root mean square radius) and area_ratio.
 
-    InputError where vertices or triangles differ, and where the vertices with the same number are other places: equal
-    triangles alone are no correspondence.
+    InputError if vertices or triangles differ, or if vertices with the same number are different places: equal
+    triangles alone do not imply correspondence.
     """
     if len(first.vertices) != len(second.vertices) or not np.array_equal(_triangles(first), _triangles(second)):
         raise InputError(
-            "the surfaces have other vertices or triangles",
+            "the surfaces have different vertices or triangles",
             found=f"{len(second.vertices)} vertices and {len(second.faces)} triangles",
             expected=f"the same {len(first.vertices)} vertices and {len(first.faces)} triangles in both",
             remedy="Set growth.matched_surfaces to false, or leave out the brain that differs.",
@@ -45,43 +45,43 @@ def match_surfaces(first: TriangleMesh, second: TriangleMesh) -> tuple[MatchedSu
     first = outward(first)
     weights = vertex_areas(first)
     motion = rigid_fit(first.vertices, second.vertices, weights)
-    one = (first.vertices - np.average(first.vertices, axis=0, weights=weights)) @ motion[:3, :3].T
-    other = second.vertices - np.average(second.vertices, axis=0, weights=weights)
-    sizes = [np.sqrt(np.average((places**2).sum(axis=1), weights=weights)) for places in (one, other)]
-    away = np.average(((one / sizes[0] - other / sizes[1]) ** 2).sum(axis=1), weights=weights)
+    aligned = (first.vertices - np.average(first.vertices, axis=0, weights=weights)) @ motion[:3, :3].T
+    target = second.vertices - np.average(second.vertices, axis=0, weights=weights)
+    sizes = [np.sqrt(np.average((places**2).sum(axis=1), weights=weights)) for places in (aligned, target)]
+    variance = np.average(((aligned / sizes[0] - target / sizes[1]) ** 2).sum(axis=1), weights=weights)
     numbers = {
         "vertices": float(len(first.vertices)),
         "turn_deg": angle_deg(motion[:3, :3]),
-        "scatter": float(np.sqrt(away)),
+        "scatter": float(np.sqrt(variance)),
         "area_ratio": float(vertex_areas(TriangleMesh(second.vertices, first.faces)).sum() / weights.sum()),
     }
-    if numbers["turn_deg"] > MOST_TURN_DEG or numbers["scatter"] > MOST_SCATTER:
+    if numbers["turn_deg"] > MAX_TURN_DEG or numbers["scatter"] > MAX_SCATTER:
         raise InputError(
-            "the surfaces have the same triangles, but vertices of one number are not the same place in both",
-            found=f"a turn of {numbers['turn_deg']:.0f}° between them, and a scatter of {numbers['scatter']:.2f}",
-            expected=f"at most {MOST_TURN_DEG:g}° between posed brains, and {MOST_SCATTER:g} of the size",
+            "the surfaces have the same triangles, but their vertices do not correspond",
+            found=f"a rotation of {numbers['turn_deg']:.0f}° between them, and a scatter of {numbers['scatter']:.2f}",
+            expected=f"at most {MAX_TURN_DEG:g}° between posed brains, and {MAX_SCATTER:g} of the size",
             remedy="Set growth.matched_surfaces to false, or give surfaces whose vertices are matched.",
         )
     return MatchedSurfaces(first, second.vertices), numbers
 
 
 def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a surface's vertices that go along w pairs of matched surfaces.
+    """Return the (w + 1, n, 3) positions of a surface's vertices that follow w pairs of matched surfaces.
 
-    Each vertex keeps its place beside the point of the first matched surface that is nearest with an agreeing
-    normal, turned as the whole surface is, and moves as that point does. The surface is of the first week: of the same
-    brain, with other triangles. InputError where it lies elsewhere.
+    Each vertex keeps its offset from the nearest point of the first matched surface with an agreeing normal; offsets
+    rotate with the whole surface. The surface is that of the same brain in the first week, with other triangles.
+    InputError if it is far from the first matched surface.
     """
     faces = chain[0].first.faces
     surfaces = np.stack([chain[0].first.vertices, *(pair.second for pair in chain)])
     start = TriangleMesh(surfaces[0], faces)
     match = match_points(mesh.vertices, vertex_normals(mesh), start)
-    if match.distance_mm.mean() > AWAY_MM:
+    if match.distance_mm.mean() > MAX_DISTANCE_MM:
         raise InputError(
-            "the surface is not that of the first matched surface",
+            "the surface does not belong to the first matched surface",
             found=f"{match.distance_mm.mean():.2f} mm from it on average, {match.distance_mm.max():.2f} mm at most",
-            expected=f"at most {AWAY_MM:g} mm on average",
-            remedy="Both must be in one pose and of one week.",
+            expected=f"at most {MAX_DISTANCE_MM:g} mm on average",
+            remedy="Both must have the same pose and week.",
         )
     offsets, weights = mesh.vertices - values_at(match, start.vertices), vertex_areas(start)
     turns = [rigid_fit(start.vertices, surface, weights)[:3, :3] for surface in surfaces]
@@ -91,15 +91,15 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
 
 
 def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that go along matched surfaces.
+    """Return the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that follow matched surfaces.
 
-    Its boundary follows them; the displacement inside is harmonic, as smooth as the boundary allows.
+    The boundary follows them, and the displacement inside is harmonic.
     """
     boundary, used = boundary_surface(mesh)
-    along = follow_surfaces(boundary, chain)
-    moves = (along - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
+    followed = follow_surfaces(boundary, chain)
+    moves = (followed - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
     inside = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(moves)
-    return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(along), 3).transpose(1, 0, 2))
+    return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(followed), 3).transpose(1, 0, 2))
 
 
 def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:

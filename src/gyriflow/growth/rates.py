@@ -8,13 +8,13 @@ import pandas as pd
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
 TISSUES = ("tissue", "ventricles", "cortex")
-"""What labels know of the volume inside the pial surface; the volume itself contains the ventricles."""
+"""Parts of the volume inside the pial surface that labels distinguish; the volume includes the ventricles."""
 
 
 def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3: Sequence[float]) -> pd.DataFrame:
-    """Return the growth rates between successive weeks, at least two different ones in any order, with positive sizes.
+    """Return the growth rates between successive weeks, given sizes at two or more weeks in any order.
 
-    The cortex grows in its surface: α = (θ^(1/2) − 1)/Δt with the growth multiplier θ = A₂/A₁ (the paper's equation,
+    The cortex grows in area: α = (θ^(1/2) − 1)/Δt with the growth multiplier θ = A₂/A₁ (the paper's equation,
     dim = 2), the core in volume: ((V₂/V₁)^(1/3) − 1)/Δt (dim = 3), with Δt the true time between the two weeks. These
     rates refer to the size at the start of the interval. The folding model grows by (1 + rate·dt) in every step: rates
     for it, which reproduce the ratios as long as steps are short, are ln(θ)/(2Δt) and ln(V₂/V₁)/(3Δt).
@@ -44,11 +44,11 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
 
 
 def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
-    """Return the growth rates of each series of brains: the table of `growth_rates` under its name, in `series`.
+    """Return the growth rates of each series of brains: tables of `growth_rates` with the column `series`.
 
-    Areas have the columns series, week, area_cm2, volume_ml; brains of one week and series count as their mean. Where
-    they have tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
-    tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), too; NaN where they are not known.
+    `areas` has the columns series, week, area_cm2 and volume_ml; brains of the same week and series are averaged. If it
+    also has tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
+    tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), NaN where unknown.
     """
     tables = []
     for name, brains in areas.groupby("series", sort=False):

@@ -88,7 +88,7 @@ def test_shrinking_is_refused_unless_named():
     ("weeks", "values"), [([21], [1.0]), ([21, 21], [1.0, 2.0]), ([21, 22], [1.0, -1.0]), ([21, 22], [1.0, np.nan])]
 )
 def test_what_is_no_curve_is_refused(weeks, values):
-    with pytest.raises(InputError, match="no volume goes through"):
+    with pytest.raises(InputError, match="volume cannot be fitted"):
         fitted(weeks, values, name="volume")
 
 

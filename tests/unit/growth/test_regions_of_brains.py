@@ -14,11 +14,11 @@ from gyriflow.geometry.matching import surface_mask
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.growth.carried_regions import (
     PLACES_MM,
-    find_places,
     number_regions,
     regions_by_deformation,
     regions_from_surface,
     regions_from_volume,
+    register_to_drawn_sulci,
     renumber,
 )
 from gyriflow.growth.carrying import carry_regions
@@ -52,7 +52,7 @@ def test_vertices_take_the_region_of_the_nearest_voxel_in_reach():
     clear = (np.abs(y) > 1.0) & (z > -5.0)
     np.testing.assert_array_equal(found[clear], np.where(y[clear] > 0, 1, 2))
     assert (found[z < -12.0] == 0).all()
-    with pytest.raises(InputError, match="no region is near"):
+    with pytest.raises(InputError, match="no region is close"):
         regions_from_volume({"left": BRAIN.vertices, "right": BRAIN.vertices + 500.0}, regions, affine)
 
 
@@ -75,7 +75,7 @@ def test_regions_beside_the_surface_are_refused_few_regions_are_not(caplog):
     with pytest.raises(InputError, match=r"do not lie along the pial surface; found 24 % within 4 mm.*mris_convert"):
         found(shell, 25.0)
     assert found(shell, 12.0)
-    assert "are they of one space?" in caplog.text
+    assert "are they in one space?" in caplog.text
 
 
 def test_another_mesh_of_the_surface_has_the_same_regions_and_no_other():
@@ -152,7 +152,7 @@ def test_every_sulcus_is_drawn_on_both_sides_and_in_a_valley():
 def test_in_the_brain_of_the_week_before_named_sulci_are_concave():
     week = DRAWING["week"] - 1
     before = read_label_volume(SULCI / Path(DRAWING["labels"].replace(str(DRAWING["week"]), str(week))))
-    between = find_places(coarse(before), coarse(DRAWN_BRAIN))
+    between = register_to_drawn_sulci(coarse(before), coarse(DRAWN_BRAIN))
     assert between is not None
     for mesh, points in hemispheres(before, week):
         found = regions_by_deformation(points, between, DRAWN.labels, DRAWN.affine)
@@ -167,5 +167,5 @@ def test_a_body_that_is_no_brain_has_no_named_sulci(caplog):
     box = (np.abs(centres).max(axis=0) < 18).astype(np.int32)
     box[(np.abs(centres).max(axis=0) < 15)] = 2
     body = channels(box, np.diag([1.6, 1.6, 1.6, 1.0]), cerebrum=[1, 2], cortex=[1], voxel_mm=2.4)
-    assert find_places(body, coarse(DRAWN_BRAIN)) is None
+    assert register_to_drawn_sulci(body, coarse(DRAWN_BRAIN)) is None
     assert "sulci have no names" in caplog.text
