@@ -44,9 +44,9 @@ def region_metrics(
             covered = float(areas[inside].sum())
             rows.append((side, name, "area", covered * CM2_PER_MM2, "cm2"))
             rows.append((side, name, "area_share", covered / total, "1"))
-            for key, of_vertices in maps[side].items():
+            for key, vertex_values in maps[side].items():
                 if VERTEX_MAPS[key].is_averaged:
-                    values = np.asarray(of_vertices, dtype=float)
+                    values = np.asarray(vertex_values, dtype=float)
                     used = inside & np.isfinite(values) & reliable
                     mean = float(np.average(values[used], weights=areas[used])) if areas[used].any() else np.nan
                     rows.append((side, name, VERTEX_MAPS[key].mean_name, mean, VERTEX_MAPS[key].unit))

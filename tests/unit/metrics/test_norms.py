@@ -93,6 +93,15 @@ def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     np.testing.assert_allclose(both[0][["low", "high"]], both[1][["low", "high"]])
 
 
+@pytest.mark.parametrize("metric", "crossing_faces curvature_radius weyl_number spangy_modes area_ratio".split())
+def test_properties_of_the_mesh_and_of_the_analysis_have_no_norm(metric: str) -> None:
+    weeks = np.arange(21.0, 29.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4))
+    assert len(norm_curves(metrics, reference))
+    assert norm_curves(metrics.assign(metric=metric), reference).empty
+    assert measured_scores(metrics.assign(metric=metric), reference).empty
+
+
 def test_few_brains_make_centiles_cautious() -> None:
     weeks = np.array([21.0, 23.0, 25.0, 27.0, 29.0, 31.0] * 2)
     values = 10 * weeks + np.tile([1.0, -1.0], 6)
