@@ -10,21 +10,21 @@ IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^
 """An import: the dots and the module that it is from, and what it names. Parsing all files would take half a second."""
 
 
-def code_hash(program: Path, *modules: Path, function: str | None = None) -> str:
+def code_hash(program: Path, *modules: Path) -> str:
     """Return a hash of all modules of this package that a Python program imports.
 
-    Further `modules` are those that the program imports by a name that it is given. Of its functions, a single one
-    counts where each job calls another one. A parameter of a rule, it reruns what depends on a change of the code.
+    Further `modules` are those that the program imports by a name that it is given. A parameter of a rule, it reruns
+    what depends on a change of the code.
     """
-    files = modules_behind(program, function).union(modules, *map(modules_behind, modules))
+    files = modules_behind(program).union(modules, *map(modules_behind, modules))
     named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
     return hashlib.sha256(repr(named).encode()).hexdigest()[:12]
 
 
-def modules_behind(program: Path, function: str | None = None) -> set[Path]:
+def modules_behind(program: Path) -> set[Path]:
     """Return the files of all modules of this package that a Python program imports, directly or through others."""
     reached: set[Path] = set()
-    waiting = set(imported_modules(program, function))
+    waiting = set(imported_modules(program))
     while waiting:
         module = waiting.pop()
         reached.add(module)
@@ -33,19 +33,12 @@ def modules_behind(program: Path, function: str | None = None) -> set[Path]:
 
 
 @cache
-def imported_modules(source: Path, function: str | None = None) -> frozenset[Path]:
-    """Return the files of the modules of this package that a source file imports, at the top or inside functions.
-
-    With a `function`, other functions of the file do not count.
-    """
+def imported_modules(source: Path) -> frozenset[Path]:
+    """Return the files of the modules of this package that a source file imports, at the top or inside functions."""
     inside = source.resolve().is_relative_to(PACKAGE)
     here = [PACKAGE.name, *source.resolve().relative_to(PACKAGE).parts[:-1]] if inside else []
-    code = source.read_text()
-    if function is not None:
-        blocks = re.split(r"\n(?=[\w@])", code)
-        code = "\n".join(block for block in blocks if not re.match(rf"(?:def|class) (?!{function}\b)", block))
     names: list[str] = []
-    for dots, module, imported in IMPORT.findall(code):
+    for dots, module, imported in IMPORT.findall(source.read_text()):
         base = here[: len(here) - len(dots) + 1] if dots else []
         start = ".".join([*base, module] if module else base)
         names += [start, *(f"{start}.{name}" if start else name for name in re.findall(r"[\w.]+", imported))]

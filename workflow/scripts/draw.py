@@ -11,7 +11,6 @@ from gyriflow.io.frames import read_pial_frames
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.report.tables import html_table
 from gyriflow.settings.folding import parameters_from
 from gyriflow.step import step
 
@@ -50,11 +49,11 @@ def read(inputs):
 
 with step(snakemake.log[0]):
     for figure in snakemake.params.figures:
-        module, _, function = figure["draw"].partition(":")
-        draw = getattr(import_module(f"gyriflow.report.{module}"), function)
-        drawn = draw(**read(dict(figure["inputs"])), **figure["options"])
+        name, _, function = figure["draw"].partition(":")
+        module = import_module(f"gyriflow.report.{name}")
+        drawn = getattr(module, function)(**read(dict(figure["inputs"])), **figure["options"])
         if isinstance(drawn, pd.DataFrame):
-            write_html(*figure["files"], html_table(drawn))
+            write_html(*figure["files"], module.html_table(drawn))
         elif isinstance(drawn, dict):
             write_json(*figure["files"], drawn)
         else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gyriflow import code_hash as sources
-from gyriflow.code_hash import code_hash, imported_modules, modules_behind, room_of
+from gyriflow.code_hash import code_hash, modules_behind
 from gyriflow.running.jobs import OUT_OF_MEMORY, cause, gather_messages, read_benchmarks, read_messages
 
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time"
@@ -165,16 +165,6 @@ def test_modules_behind_a_program_are_followed_through_others(package, tmp_path)
     program.write_text("from gyriflow.surface.labels import read")
     names = {path.relative_to(package).as_posix() for path in modules_behind(program)}
     assert names == {"__init__.py", "surface/__init__.py", "surface/labels.py", "surface/repair.py", "units.py"}
-
-
-def test_imports_of_other_functions_do_not_count_where_one_is_named(package, tmp_path):
-    program = tmp_path / "draw.py"
-    program.write_text(
-        "import gyriflow.units\n\n\ndef one(\n    a,\n) -> None:\n    from gyriflow.mesh import quality\n\n\n"
-        "def one_more():\n    import gyriflow.unused\n"
-    )
-    for function, rooms in (("one", {"units", "mesh"}), ("one_more", {"units", "unused"})):
-        assert {room_of(path) for path in imported_modules(program, function)} - {"__init__"} == rooms
 
 
 def test_a_change_of_a_module_changes_the_hash(package, tmp_path):
