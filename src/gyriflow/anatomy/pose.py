@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.alignment import MIRROR, Fit, angle_deg, motion
+from ..geometry.alignment import MIRROR, RigidFit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
@@ -167,7 +167,7 @@ def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[Shape], what: str) ->
     return Pose(by="default", warnings=(doubt,))
 
 
-def _motions(left: Hemisphere, right: Hemisphere, fit: Fit) -> tuple[Floats, Floats]:
+def _motions(left: Hemisphere, right: Hemisphere, fit: RigidFit) -> tuple[Floats, Floats]:
     # offset between the centres of volume of both posed hemispheres, the left one mirrored
     offset = right.rotation @ fit.shift * right.shape.size_mm
     posed = []

@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Fit, Planes, fits_from_all_sides, follow_planes, residual_ratio
+from ..geometry.alignment import (
+    CUBE_ROTATIONS,
+    MIRROR,
+    Planes,
+    RigidFit,
+    fits_from_all_sides,
+    follow_planes,
+    residual_ratio,
+)
 from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
@@ -100,14 +108,14 @@ def _surfaces() -> list[TriangleMesh]:
     return [read_surface(folder / f"right.week{week}.surf.gii") for week in WEEKS]
 
 
-def register(shape: Shape, targets: Sequence[Shape], rotation: Floats, shift: Floats | None = None) -> Fit:
+def register(shape: Shape, targets: Sequence[Shape], rotation: Floats, shift: Floats | None = None) -> RigidFit:
     """Return the best fit of a shape on one of several, from a (3, 3) rotation near it."""
     return min(
         (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets), key=lambda fit: fit.residual
     )
 
 
-def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Fit, float]:
+def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[RigidFit, float]:
     """Return the best fit of a shape on one of several, from 24 starts, and how many times worse the next pose is.
 
     The next pose is more than 40° away. Near 1, as for a body of revolution, the shape says no pose.
@@ -128,7 +136,7 @@ def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Fit
 
 def _descend(
     shape: Shape, target: Shape, rotation: Floats, shift: Floats | None, scale: float, rounds: int, every: int
-) -> Fit:
+) -> RigidFit:
     """Return the fit after rounds of iterative closest points, with every so many of the points.
 
     Steps follow the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037), with
@@ -152,7 +160,7 @@ def _descend(
     theirs, facing = target.points[::every], target.normals[::every]
     back, _ = shape.tree.query(shape.features((theirs - shift) @ rotation, facing @ rotation))
     squares = [np.mean(np.minimum(distance, FURTHEST) ** 2) for distance in (there, back)]
-    return Fit(rotation, shift, float(np.sqrt(np.mean(squares))))
+    return RigidFit(rotation, shift, float(np.sqrt(np.mean(squares))))
 
 
 def medial_wall(shape: Shape, normal: Floats) -> tuple[Floats, float]:

@@ -21,7 +21,7 @@ Planes = tuple[Floats, Floats, Floats, Floats | None]
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RigidFit:
     """A rigid motion p → rotation p + shift that registers a shape to another, and the residual distance."""
 
     rotation: Floats
@@ -156,11 +156,11 @@ def align(mesh: TriangleMesh, onto: TriangleMesh) -> TriangleMesh:
 
 def fits_from_all_sides(
     starts: Iterable[Floats],
-    coarse_fit: Callable[[Floats], Fit],
-    refine: Callable[[Fit], Fit],
+    coarse_fit: Callable[[Floats], RigidFit],
+    refine: Callable[[RigidFit], RigidFit],
     candidates: int,
     distinct_deg: float,
-) -> list[Fit]:
+) -> list[RigidFit]:
     """Return refined fits of an alignment whose initial rotation is unknown, that from the first start first.
 
     An iteration converges to a local minimum. A coarse fit is therefore made from each of the (3, 3) rotations
@@ -175,7 +175,7 @@ def fits_from_all_sides(
     return [refine(coarse[i]) for i in dict.fromkeys([0, *distinct[:candidates]])]
 
 
-def residual_ratio(fits: Iterable[Fit], best: Fit, distinct_deg: float) -> float:
+def residual_ratio(fits: Iterable[RigidFit], best: RigidFit, distinct_deg: float) -> float:
     """Return the smallest residual in another pose over that of the best fit; infinity without another pose.
 
     A ratio close to 1 means that the pose is ambiguous.

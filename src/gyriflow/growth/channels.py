@@ -27,9 +27,9 @@ BRIGHT = 0.99
 class Channels:
     """A brain on a grid (i, j, k) of cubic voxels along the axes of RAS+.
 
-    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits `CEREBRUM_BIT` and
-    `CORTEX_BIT` of the unsmoothed masks; `cerebrum` and `cortex` are smoothed masks from 0 to 1; `intensity` is that of the
-    image, scaled so that the brightest parts of the cerebrum are about 1.
+    `affine` (4, 4) leads from index to position in mm. `tissue` has the bits `CEREBRUM_BIT` and `CORTEX_BIT` of the
+    unsmoothed masks; `cerebrum` and `cortex` are smoothed masks from 0 to 1; `intensity` is that of the image, scaled
+    so that the brightest parts of the cerebrum are about 1.
     """
 
     affine: Floats

@@ -295,7 +295,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class CalibrationRuns:
     """Rounds of runs that differ from those of `base`, each round's parameters chosen from the scores of earlier ones.
 
     `rounds` has the round of each run, `real` the brains to be met by the id of the start.

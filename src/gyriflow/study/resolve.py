@@ -17,7 +17,7 @@ from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
 from .atlases import known_checksums
 from .paths import CURVES
-from .records import Brain, Calibration, Chain, Comparison, Origin, Simulation
+from .records import Brain, CalibrationRuns, Chain, Comparison, Origin, Simulation
 from .series import Series, series_of, several_subjects
 from .study import Study
 
@@ -47,7 +47,7 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     if (asked := config.calibrate) is not None:
         base = tuple(one for one in simulations.values() if one.run == asked.base)
         real = {one.start.id: _compared_with(asked, one.start, accepted) for one in base}
-        calibration = Calibration(base, asked.runs, real) if base else None
+        calibration = CalibrationRuns(base, asked.runs, real) if base else None
     return Study(
         config=config,
         brains=brains,

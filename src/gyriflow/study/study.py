@@ -13,7 +13,7 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import used_atlases
-from .records import Brain, Calibration, Chain, Comparison, Measured, Origin, Simulation
+from .records import Brain, CalibrationRuns, Chain, Comparison, Measured, Origin, Simulation
 from .series import Series, several_subjects
 
 
@@ -32,7 +32,7 @@ class Study:
     simulations: Mapping[tuple[str, str], Simulation]
     chains: Mapping[tuple[str, Origin], Chain]
     comparisons: Mapping[str, Comparison]
-    calibration: Calibration | None
+    calibration: CalibrationRuns | None
     unreachable: Mapping[str, InputError]
 
     @cached_property

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from shapes import LPS, rigid
 
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import Fit, angle_deg, fits_from_all_sides, residual_ratio, step_towards_planes
+from gyriflow.geometry.alignment import RigidFit, angle_deg, fits_from_all_sides, residual_ratio, step_towards_planes
 from gyriflow.geometry.poses import Pose, pose_from, turned
 
 TURN = rigid(10, 20, 30, shift=(4.0, -3.0, 2.0))
@@ -71,11 +71,11 @@ def test_the_best_poses_that_differ_are_compared_and_the_first_start_always():
     asked = []
 
     def roughly(start):
-        return Fit(start, np.zeros(3), rough[round(float(np.degrees(np.arctan2(start[1, 0], start[0, 0])) % 360))])
+        return RigidFit(start, np.zeros(3), rough[round(float(np.degrees(np.arctan2(start[1, 0], start[0, 0])) % 360))])
 
     def better(fit):
         asked.append(fit.residual)
-        return Fit(fit.rotation, fit.shift, {3.0: 1.5, 1.0: 0.9, 2.0: 0.6}[fit.residual])
+        return RigidFit(fit.rotation, fit.shift, {3.0: 1.5, 1.0: 0.9, 2.0: 0.6}[fit.residual])
 
     fits = fits_from_all_sides([about(angle) for angle in rough], roughly, better, candidates=2, distinct_deg=30.0)
     assert asked == [3.0, 1.0, 2.0]

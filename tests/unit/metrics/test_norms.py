@@ -93,7 +93,7 @@ def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     np.testing.assert_allclose(both[0][["low", "high"]], both[1][["low", "high"]])
 
 
-@pytest.mark.parametrize("metric", "crossing_faces curvature_radius weyl_number spangy_modes area_ratio".split())
+@pytest.mark.parametrize("metric", ["crossing_faces", "curvature_radius", "weyl_number", "spangy_modes", "area_ratio"])
 def test_properties_of_the_mesh_and_of_the_analysis_have_no_norm(metric: str) -> None:
     weeks = np.arange(21.0, 29.0)
     metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4))
