@@ -8,6 +8,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from configurations import touched
+from facts import Facts
 from shapes import sphere
 
 from gyriflow.cli.commands import main
@@ -84,14 +85,14 @@ def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
     saved(tmp_path / "two", a=either)
     (brain,) = recognise(tmp_path / "two")
     assert brain.entry["scheme"] == UNSET
-    assert brain.notes == ["scheme: drawem-9 or feta-7, which the labels fit both"]
+    assert brain.notes == [Facts("scheme:", "drawem-9", "feta-7")]
     (brain,) = recognise(tmp_path / "two", scheme="feta-7")
     assert (brain.entry["scheme"], brain.notes) == ("feta-7", [])
     # a folder may hold two data sets, but a subject is of one
     mixed = {"sub-01_ses-1": labels, "sub-01_ses-2": sided(labels), "sub-02_ses-1": labels}
     saved(tmp_path / "mixed", **mixed)
     first, second, other = sorted(recognise(tmp_path / "mixed"), key=lambda brain: brain.entry["id"])
-    assert first.notes == second.notes == ["scheme: scans of sub-01 fit dhcp-19 and spina-bifida-atlas"]
+    assert first.notes == second.notes == [Facts("scheme:", "sub-01", "dhcp-19", "spina-bifida-atlas")]
     assert (first.entry["scheme"], other.entry["scheme"], other.notes) == (UNSET, "spina-bifida-atlas", [])
 
 
@@ -136,18 +137,18 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
         (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
     path = tmp_path / "gyriflow.yaml"
     said = list(write_configuration(tmp_path, path, force=False))
-    assert said[:2] == [f"{name}: labels, spina-bifida-atlas, week {name[2:]}.0" for name in ("GA21", "GA22")]
-    assert said[2] == "scheme spina-bifida-atlas: 2 label volumes"
+    assert said[:2] == [Facts(f"{name}:", "spina-bifida-atlas", int(name[2:])) for name in ("GA21", "GA22")]
+    assert said[2] == Facts("spina-bifida-atlas", 2)
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
     assert config.start == "GA21"
     assert list(config.runs) == ["reference", "measured"]
     assert config.mesh.order == 2
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, check=Facts(path, "--force")):
         list(write_configuration(tmp_path, path, force=False))
     assert list(write_configuration(tmp_path, path, force=True)) == said
     done = CliRunner().invoke(main, ["init", str(tmp_path), "--force", "--scheme", "feta-7"])
-    assert "scheme feta-7: 2 label volumes" in done.output
+    assert Facts("feta-7", 2) in done.output.splitlines()
     written = yaml.safe_load(path.read_text())
     assert ([brain["scheme"] for brain in written["brains"]], written["start"]) == (["feta-7"] * 2, "GA21")
 
@@ -165,7 +166,7 @@ def test_surfaces_lead_a_run_only_where_their_vertices_match(tmp_path, finer, ru
 
 def test_a_folder_without_brains_says_what_is_expected(tmp_path):
     touched(tmp_path, "notes.txt")
-    with pytest.raises(InputError, match="no brain was recognised; found 1 files; expected tissue label volumes"):
+    with pytest.raises(InputError, check=Facts(tmp_path, 1, ".nii.gz")):
         recognise(tmp_path)
 
 
@@ -244,7 +245,7 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
     assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
     assert written["folding"] == {"end_week": 25.43, "poisson_ratio": 0.4}
-    assert "no such participants and sessions" in app("participant", "--participant-label", "07", code=2)
+    assert app("participant", "--participant-label", "07", code=2) == Facts(tmp_path / "data", "sub-07")
     # all that participants had is known to the group
     assert app("group")[1] == written
     app("participant", "--session-label", "1")

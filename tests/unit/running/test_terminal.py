@@ -5,9 +5,11 @@ import logging
 
 import pytest
 from configurations import LABELLED
+from facts import Facts
 
 from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
+from gyriflow.running.jobs import OUT_OF_MEMORY
 from gyriflow.running.launch import hold_lock
 from gyriflow.running.provenance import check_results_belong_to
 from gyriflow.running.status import STATE, status
@@ -67,11 +69,11 @@ def test_a_quiet_log_has_a_line_each_few_percent_and_the_end(run):
         run.end(number, number + 1, 100)
     run.tell(text="a warning of Snakemake's", level=logging.WARNING)
     run.display.end()
-    assert run.lines[0].startswith("gyriflow: 100 steps to run; log: ")
+    assert run.lines[0] == Facts("gyriflow:", 100, ".snakemake/log/x.log")
     assert run.lines[1] == "  0 %  measure b0"
-    assert run.lines[11] == " 50 %  2 min left  measure b50"
+    assert run.lines[11] == Facts("50 %", "2 min", "measure b50")
     assert run.lines[-2] == "a warning of Snakemake's"
-    assert run.lines[-1].startswith("gyriflow: done in ")
+    assert run.lines[-1] == Facts("gyriflow:", "5 s")
     assert len(run.lines) == 23
     assert "\x1b" not in "".join(run.lines)
     assert (run.state["done"], run.state["total"], run.state["running"]) == (100, 100, [])
@@ -88,12 +90,12 @@ def test_a_folding_tells_its_size_weeks_and_warnings(run):
     run.display.tick()
     run.end()
     assert run.lines[1:] == [
-        "       simulate r a: 12 elements, 1 rank, about 70 MiB",
-        "warning simulate r a: coarse",
+        Facts("simulate r a:", 12, 1, "70 MiB"),
+        Facts("simulate r a: coarse"),
         # a quarter of its time has passed
-        " 25 %  simulate r a: GW 21.50 of 23",
+        Facts("25 %", "simulate r a:", "GW", 21.5, 23),
     ]
-    assert run.state["running"] == ["simulate r a: GW 21.50 of 23"]
+    assert run.state["running"] == [Facts("simulate r a:", "GW", 21.5, 23)]
 
 
 def test_a_failure_begins_with_its_cause_after_the_warnings(run):
@@ -105,32 +107,33 @@ def test_a_failure_begins_with_its_cause_after_the_warnings(run):
     run.tell(text="Exiting because a job execution failed. Look below", level=logging.ERROR)
     run.display.end()
     assert run.lines[1:] == [
-        "warning pial_from_labels a: thin cortex",
-        "failed  pial_from_labels a: a.nii: is no image",
-        f"        log: {log}",
-        "gyriflow: finished after 5 s with 1 failed, 0 of 2 steps done; run the same command again to resume",
+        Facts("pial_from_labels a: thin cortex"),
+        Facts("pial_from_labels a: a.nii: is no image"),
+        Facts(log),
+        Facts("gyriflow:", "5 s", 1, 0, 2),
     ]
     assert run.state["failed"] == [{"job": "pial_from_labels a", "cause": "a.nii: is no image", "logs": [str(log)]}]
 
 
 @pytest.mark.fault(38)
 @pytest.mark.parametrize(
-    ("message", "cause", "code"),
+    ("message", "facts", "code"),
     [
-        ("died with <Signals.SIGKILL: 9>.", "it was killed, most probably because memory ran out", 137),
-        ("died with <Signals.SIGSEGV: 11>.", "it crashed (SIGSEGV)", None),
-        ("died with <Signals.SIGTERM: 15>.", "it was stopped", None),
+        ("died with <Signals.SIGKILL: 9>.", [OUT_OF_MEMORY], 137),
+        ("died with <Signals.SIGSEGV: 11>.", ["SIGSEGV"], None),
+        ("died with <Signals.SIGTERM: 15>.", [], None),
         # as snakemake-executor-plugin-slurm 2.8 puts it
-        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", "Slurm ended job 12: CANCELLED", None),
-        ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", "a.nii: is no image", None),
+        ("SLURM-job '12' failed, SLURM status is: 'CANCELLED'. Reason: x", [12, "CANCELLED"], None),
+        ("SLURM-job '12' failed, SLURM status is: 'FAILED'. Reason: x", ["a.nii: is no image"], None),
     ],
 )
-def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message, cause, code):
+def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message, facts, code):
     monkeypatch.setenv(EXIT_FILE, str(run.folder / "code"))
     log = run.begin("measure", brain="a")
     log.write_text("2026-11-22 00:54:58,001 ERROR root: a.nii: is no image\n")
     run.fail("measure", f"CalledProcessError in file x:\n'python x.py' {message}", [str(log)])
-    assert run.lines[0].startswith(f"failed  measure a: {cause}")
+    assert run.lines[0] == Facts("measure a:", *facts)
+    assert ("a.nii" in run.lines[0]) == ("'FAILED'" in message)
     assert recorded_exit_code(run.folder / "code") == code
 
 
@@ -140,7 +143,7 @@ def test_what_was_stopped_is_no_failure(run):
     run.tell(text="Terminating processes on user request, this might take some time.", level=logging.WARNING)
     run.fail("simulate")
     run.display.end()
-    assert run.lines[-1] == "gyriflow: interrupted after 5 s, 0 of 2 steps done"
+    assert run.lines[-1] == Facts("gyriflow:", "5 s", 0, 2)
     assert run.state["interrupted"]
     assert run.state["failed"] == []
 
@@ -156,7 +159,7 @@ RUNNING = {
     "began": "2026-01-01 10:00:00",
     "ended": None,
     "done": 3,
-    "total": 10,
+    "total": 12,
     "left_s": 240.0,
     "running": ["folding, run r, brain a: GW 21.50 of 23"],
     "failed": [],
@@ -181,32 +184,31 @@ def text(folder):
 def test_a_live_run_tells_what_it_is_at_and_the_time_left(study):
     with hold_lock(study):
         said = text(study)
-    assert "running since 2026-01-01 10:00:00: 3 of 10 steps done, about 4 min left" in said
-    assert "running: folding, run r, brain a: GW 21.50 of 23" in said
+    assert said == Facts("2026-01-01 10:00:00", 3, 12, "4 min", *RUNNING["running"])
 
 
 def test_a_run_that_was_killed_is_called_interrupted(study):
-    assert "interrupted: the run of 2026-01-01 10:00:00 ended abruptly, 3 of 10 steps done" in text(study)
-    assert "now:" not in text(study)
+    assert text(study) == Facts("2026-01-01 10:00:00", 3, 12) != Facts("4 min")
+    assert text(study) != Facts(*RUNNING["running"])
     write_json(study / STATE, RUNNING | {"ended": "2026-01-01 10:05:00", "interrupted": True})
-    assert "interrupted at 2026-01-01 10:05:00, 3 of 10 steps done" in text(study)
+    assert text(study) == Facts("2026-01-01 10:05:00", 3, 12) != Facts("2026-01-01 10:00:00")
 
 
 def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     rows = [line.split() for line in text(study).splitlines()]
-    assert ["a", "done", "-", "-"] in rows
+    assert [row[2:] for row in rows if row[:1] == ["a"] and row[1] != "-"] == [["-", "-"]]
     assert ["b", "-", "-", "-"] in rows
     assert ["r", "a", "-", "-", "-", "-"] in rows
     progress = study / "results/runs/r/a/logs/simulate.jsonl"
     progress.write_text('{"event": "size"}\n{"event": "step", "week": 21.5, "end_week": 23.0, "left_s": 142.0}\n')
-    assert "GW 21.50 of 23 " in text(study)
+    assert Facts("r", "a", "GW 21.50", 23) in text(study).splitlines()
     write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
-    assert "done, GW 23.00 " in text(study)
-    assert "report:" not in text(study)
+    assert Facts("r", "a", "GW 23.00") in text(study).splitlines()
+    assert "report.html" not in text(study)
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):
-    with pytest.raises(InputError, match=f"{tmp_path}: contains no study"):
+    with pytest.raises(InputError, check=Facts(f"{tmp_path}:", "gyriflow.yaml")):
         text(tmp_path)
 
 
@@ -224,10 +226,12 @@ def made(tmp_path):
 
 
 def test_another_study_is_refused_with_what_to_do(made):
-    with pytest.raises(InputError, match=r"found a of .*one\.yaml; expected c of .*two\.yaml\. Choose .*--directory"):
+    with pytest.raises(
+        InputError, check=Facts(made / "results", "a", made / "one.yaml", "c", made / "two.yaml", "--directory")
+    ):
         check_results_belong_to(made, [made / "two.yaml"], configured("c"), record=True)
     # a brain of the same name may be another one
-    with pytest.raises(InputError, match="another study"):
+    with pytest.raises(InputError, check=Facts(made / "one.yaml", made / "two.yaml")):
         check_results_belong_to(made, [made / "two.yaml"], configured("a", week=25), record=False)
 
 
