@@ -3,6 +3,7 @@
 import numpy as np
 import odd_brains
 import pytest
+from facts import Facts
 from phantoms import CENTRE_MM
 from shapes import phantom, sphere
 
@@ -42,7 +43,7 @@ def test_a_side_of_a_few_voxels_is_no_hemisphere():
     # all but the 40 voxels farthest to the left become the right hemisphere's
     outermost = left[np.argsort(left @ affine[0, :3])][40:]
     sided[tuple(outermost.T)] = dict(zip(scheme.left, scheme.right, strict=True))[3]
-    with pytest.raises(InputError, match=r"too small to be one; found areas of \d\.\d\d and \d\d\.\d\d cm²"):
+    with pytest.raises(InputError, match=r"\d\.\d\d .*\d\d\.\d\d cm²", check=Facts(15)):
         from_labels(sided, affine, scheme, week=21.0, edge_length_mm=3.0)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from facts import Facts
 
 from gyriflow.anatomy.pial import from_shape
 from gyriflow.anatomy.shapes import shape_surface
@@ -62,7 +63,7 @@ def test_bumps_have_the_height_asked_for_and_the_pattern_of_their_seed_at_any_ed
 
 
 def test_edges_too_long_for_the_shape_are_refused_with_the_bound():
-    with pytest.raises(InputError, match=r"at most 2\.46 mm"):
+    with pytest.raises(InputError, check=Facts("2.5 mm", "2.46 mm")):
         shape_surface(AXES, edge_length_mm=2.5)
 
 
@@ -81,9 +82,9 @@ def test_a_shape_is_left_as_it_is_and_cut_at_x_0():
 def test_a_shape_that_is_not_closed_or_cuts_itself_is_refused():
     mesh = shape_surface((15.0, 15.0, 15.0), edge_length_mm=1.5, noise_mm=0.0)
     holed, _ = submesh(mesh, np.arange(len(mesh.faces)) > 0)
-    with pytest.raises(MeshError, match="without two faces"):
+    with pytest.raises(MeshError, check=Facts("[1]", 2)):
         from_shape(holed, week=21.0)
     vertices = mesh.vertices.copy()
     vertices[0] *= -1.2
-    with pytest.raises(MeshError, match="cut others"):
+    with pytest.raises(MeshError, check=Facts(8, 2)):
         from_shape(TriangleMesh(vertices, mesh.faces), week=21.0)

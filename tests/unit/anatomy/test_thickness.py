@@ -3,6 +3,7 @@
 import igl
 import numpy as np
 import pytest
+from facts import Facts
 from shapes import rigid, scaling
 from skimage.measure import marching_cubes
 
@@ -99,19 +100,14 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
 
 
 @pytest.mark.parametrize(
-    ("thickness_mm", "message", "told"),
-    [
-        (1.7, "is it cortex that the scheme calls so?", False),
-        (8.0, "is it cortex that the scheme calls so?", True),
-        (0.9, "voxels thick", True),
-        (1.7, "voxels thick", False),
-    ],
+    ("thickness_mm", "messages"),
+    [(1.7, []), (8.0, [Facts("cortex", "8.0 mm")]), (0.9, [Facts("cortex", "1.1 voxels")])],
 )
-def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog, thickness_mm, message, told):
+def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog, thickness_mm, messages):
     pial, depth, inside, affine = ball
     labels = np.where(inside, np.where(depth < thickness_mm, 5, 1), 0)
     thickness_from_labels(labels, affine, LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,)), pial, Pose())
-    assert (message in caplog.text) == told
+    assert caplog.messages == messages
 
 
 @pytest.mark.parametrize(("shut_mm", "ratio"), [(0.0, 1.11), (26.0, 0.86), (40.0, 0.78)])
@@ -124,7 +120,7 @@ def test_area_that_shut_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, sh
     scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
     found = thickness_from_labels(labels, affine, scheme, pial, Pose())
     assert found.report["area_ratio"] == pytest.approx(ratio, abs=0.04)
-    assert ("hidden in shut sulci" in caplog.text) == (ratio < 0.95)
+    assert caplog.messages == [Facts("cortex", f"{found.report['area_ratio']:.2f}")] * (ratio < 0.95)
 
 
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
@@ -132,5 +128,5 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     # the voxels go on beyond the surface, as where a fissure was opened
     larger = np.ones_like(inside)
     larger[:3] = False
-    with pytest.raises(InputError, match="nowhere at the surface"):
+    with pytest.raises(InputError, check=Facts((larger & (depth < 3.0)).sum())):
         cortical_thickness(pial, larger, larger & (depth < 3.0), affine)
