@@ -102,25 +102,3 @@ rule targets:
         posed=lambda w: chain_of(w).posed,
     script:
         "../scripts/targets.py"
-
-
-rule carried_mesh:
-    input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
-        report=PIAL["report"],
-        later=lambda w: study.chains[w.brain, "self"].correspondences,
-    output:
-        CARRIED_MESH,
-    log:
-        f"{BRAIN}/logs/carried_mesh.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/carried_mesh.tsv"
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=8000,
-    params:
-        weeks=lambda w: study.chains[w.brain, "self"].weeks,
-    script:
-        "../scripts/carried_mesh.py"

@@ -33,7 +33,7 @@ rule validation:
         # what the errors of runs that follow no curve are errors against
         curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
     output:
-        VALIDATION,
+        table=VALIDATION,
     log:
         f"{RUN}/logs/validation.log",
     benchmark:
@@ -120,6 +120,7 @@ rule deviation:
         "../scripts/deviation.py"
 
 
+# the start brain's mesh as registration alone carries it to later weeks: no run can come much nearer
 rule registration_ceiling:
     input:
         unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
@@ -127,16 +128,20 @@ rule registration_ceiling:
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
-        carried=CARRIED_MESH,
+        correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
-        CEILING,
+        table=CEILING,
+        carried=CARRIED_MESH,
     log:
         f"{STUDY}/logs/registration_ceiling.{{brain}}.log",
     benchmark:
         f"{STUDY}/benchmarks/registration_ceiling.{{brain}}.tsv"
     conda:
         ENVIRONMENT
+    resources:
+        mem_mb=8000,
     params:
+        carried_weeks=lambda w: study.chains[w.brain, "self"].weeks,
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: study.ceiling_weeks(w.brain),
         run="registration",
@@ -145,28 +150,6 @@ rule registration_ceiling:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
-
-
-rule displacement_agreement:
-    input:
-        frames=FOLDING["frames"],
-        carried=CARRIED_MESH,
-    output:
-        AGREEMENT,
-    log:
-        f"{RUN}/logs/displacement_agreement.log",
-    benchmark:
-        f"{RUN}/benchmarks/displacement_agreement.tsv"
-    conda:
-        ENVIRONMENT
-    params:
-        labels=lambda w: {
-            "run": w.run,
-            "start_week": brain_of(w).week,
-        },
-        registered=lambda w: simulation_of(w).follows_registration,
-    script:
-        "../scripts/displacement_agreement.py"
 
 
 def onset_surfaces(wildcards):
@@ -203,25 +186,27 @@ rule onset:
 
 
 # the tables of validation, and the files that each is joined from
-VALIDATION_TABLES = {
+JOINED = {
     "prediction": [one.file(PREDICTION) for one in study.predictions],
     "deviation": [one.file(DEVIATION["table"], week=week) for one in study.expected for week in one.real],
     "validation": [one.file(VALIDATION) for one in study.validated],
-    "displacement_agreement": [one.file(AGREEMENT) for one in study.validated_carried],
     "registration_ceiling": expand(CEILING, brain=study.carried),
     "onset": [one.file(ONSET) for one in study.validated_carried],
 }
-
-
-WITH_ROWS = [name for name, files in VALIDATION_TABLES.items() if files]
+VALIDATION_TABLES = [
+    *(name for name, files in JOINED.items() if files),
+    *(["deviation_centiles"] if study.expected else []),
+    *(["displacement_agreement"] if study.carried else []),
+]
 
 
 rule validation_tables:
     input:
-        **VALIDATION_TABLES,
+        **JOINED,
+        frames=[one.file(FOLDING["frames"]) for one in study.validated_carried],
+        carried=[one.file(CARRIED_MESH) for one in study.validated_carried],
     output:
-        **{name: f"{STUDY}/{name}.csv" for name in WITH_ROWS},
-        **({"deviation_centiles": f"{STUDY}/deviation_centiles.csv"} if study.expected else {}),
+        **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     log:
         f"{STUDY}/logs/validation_tables.log",
     benchmark:
@@ -230,6 +215,8 @@ rule validation_tables:
         ENVIRONMENT
     params:
         individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
+        # whether the growth of a run came from the same registrations
+        carried=[(one.run, one.follows_registration) for one in study.validated_carried],
     script:
         "../scripts/validation_tables.py"
 

@@ -1,18 +1,22 @@
-"""Validation of a run, or of the start brain's mesh carried by registration, week by week."""
+"""Validation of a run, or of the start brain's mesh, which is carried by registration, week by week."""
+
+import numpy as np
 
 from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.compare.validation import ObservedWeek, validation_table
-from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.growth.carrying import carry_mesh
 from gyriflow.growth.following import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.registrations import read_weekly_shapes
+from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
-files, params = snakemake.input, snakemake.params
+files, params, output = snakemake.input, snakemake.params, snakemake.output
 
 
 def prepared(name, number):
@@ -29,9 +33,13 @@ with step(snakemake.log[0]):
         )
         for number, week in enumerate(params.weeks)
     }
-    if files.get("carried"):
-        boundary, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
-        pose, carried, sizes = read_pose(files.report), read_weekly_shapes(files.carried), {}
+    if files.get("correspondences"):
+        mesh, pose, sizes = read_tetrahedral_mesh(files.mesh), read_pose(files.report), {}
+        # brains correspond in the world of their files, the mesh has a pose
+        start = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
+        positions = carry_mesh(start, [read_correspondence(path) for path in files.correspondences])
+        write_weekly_shapes(output.carried, WeeklyShapes(np.array(params.carried_weeks), positions))
+        carried, (boundary, used) = read_weekly_shapes(output.carried), boundary_surface(mesh)
         places = [carried.positions[carried.index(week)][used] for week in params.weeks]
         surfaces = [transformed(TriangleMesh(points, boundary.faces), pose.world) for points in places]
     else:
@@ -41,4 +49,4 @@ with step(snakemake.log[0]):
     simulated = dict(zip(params.weeks, surfaces, strict=True))
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {"start": snakemake.wildcards.brain}
     table = validation_table(labels, simulated, observed, sizes, radius_mm=params.curvature_radius_mm)
-    write_table(snakemake.output[0], table)
+    write_table(output.table, table)

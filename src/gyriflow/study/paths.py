@@ -107,7 +107,6 @@ PREPARED = {
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
-AGREEMENT = f"{RUN}/metrics/displacement_agreement.csv"
 ONSET = f"{RUN}/metrics/onset.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}.csv"
 CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
