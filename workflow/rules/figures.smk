@@ -1,4 +1,4 @@
-# Figures and tables of the registry, `gyriflow.study.figures`: each kind has a rule, but for those of one job.
+# Figures and tables of the registry, `gyriflow.study.figures`: each kind has a rule; kinds with the same `job` share one.
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 

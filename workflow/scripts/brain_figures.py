@@ -1,4 +1,4 @@
-"""What is drawn of a measured brain: the page of quality control with its row of the table, maps, small pictures."""
+"""Draw a measured brain: its page of quality control, with its row of the table, its maps and its small pictures."""
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.thickness import posed_whites

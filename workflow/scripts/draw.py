@@ -1,4 +1,4 @@
-"""Figures and tables of the registry: their files are read, functions of the report draw them."""
+"""Draw figures and tables of the registry: read their input files and call their functions."""
 
 from importlib import import_module
 
@@ -36,7 +36,7 @@ READERS = {
 
 
 def read(inputs):
-    """Return dictionaries and lists of files with the files' content."""
+    """Return nested dictionaries and lists of files with the content of the files."""
     match inputs:
         case str():
             return next(reader for end, reader in READERS.items() if inputs.endswith(end))(inputs)

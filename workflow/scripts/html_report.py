@@ -1,4 +1,4 @@
-"""The report of a study and the pages of its brains: HTML pages that need nothing else."""
+"""Write the report of a study and the pages of its brains, each a single HTML file."""
 
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_text
@@ -13,7 +13,7 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
 def shown(figures):
-    """Return figures and tables with their content, as pages show them."""
+    """Return figures and tables with their content, as a page shows them."""
     paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))

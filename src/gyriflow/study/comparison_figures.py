@@ -10,7 +10,7 @@ from .study import Study
 
 RUN_FIGURES, STUDY_FIGURES, SWEEP_FIGURES = f"{RUN}/figures", f"{STUDY}/figures", f"{STUDY}/{{study}}/figures"
 MAX_DEVIATIONS = 4
-"""Weeks whose deviations from the expected brain are shown."""
+"""Weeks for which the deviation from the expected brain is shown."""
 
 Given = dict[str, Any]
 

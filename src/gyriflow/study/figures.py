@@ -1,4 +1,4 @@
-"""The figures and tables of a study: of each kind what draws it and what it shows, beside what it is made from."""
+"""The figures and tables of a study: each kind with its function and its text, and the files it is drawn from."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -21,7 +21,7 @@ from .study import Study
 
 BRAIN_FIGURES, RUN_FIGURES, STUDY_FIGURES = f"{BRAIN}/figures", f"{RUN}/figures", f"{STUDY}/figures"
 ZONES = {"contact", "no_growth", "support"}
-"""Settings of a run that decide its zones: runs alike in them have one figure of these."""
+"""Settings that determine the zones of a run. Runs with equal ones share a figure of the zones."""
 MIN_NORM_SUBJECTS, MAX_SERIES = 5, 4
 
 Given = dict[str, Any]
@@ -112,6 +112,7 @@ MESH_QUALITY = Kind(
         "as the fissure, is open, with the limits of the configuration."
     ),
     technical=True,
+    job="html_tables",
 )
 
 
@@ -407,6 +408,7 @@ METRICS_TABLE = Kind(
         "than the curvature wavelength is flattened, and with it the mean curvature norm. All weeks, and the "
         "hemispheres, are in ``results/study/metrics.csv``."
     ),
+    job="html_tables",
 )
 SPECTRA = Kind(
     "spectra_figure",

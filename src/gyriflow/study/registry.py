@@ -1,4 +1,4 @@
-"""Figures and tables of a study as records: what draws each, from which files, and what the report says of it."""
+"""Records of the figures and tables of a study: the function that draws each, its files, and its text in the report."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,21 +13,20 @@ THREE_SIDES = ["left", "top", "bottom"]
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A kind of figure or table: what draws it, and what the report says of it.
+    """A kind of figure or table: the function that draws it and its text in the report.
 
     Attributes
     ----------
-    name : of its log, and of the rule that draws it where `job` names no other
-    pattern : the file with wildcards: a PNG, which a PDF stands beside, an HTML page, or JSON
-    draw
-        The function that draws it, as `module:function` of `gyriflow.report`; empty if a rule of its own makes it.
+    name : name of the kind, and of its rule unless `job` is given
+    pattern : path with wildcards: a PNG (a PDF is written with it), an HTML page, or JSON
+    draw : the function, as `module:function` of `gyriflow.report`; empty if the file has a rule of its own
     section, title, caption
-        Where and how the report shows it, the caption in reStructuredText. Names of a figure stand in braces. Without
-        a section it is no part of the text.
+        Text of the report, the caption in reStructuredText, with the names of a figure in braces. Kinds without a
+        section are not in the report.
     technical : whether the report collapses it
-    target : the target that asks for it; empty if only the target `paper` does
-    paper : whether the target `paper` asks for it
-    job : the rule that draws several kinds at once
+    target : the target that includes it; empty if only the target `paper` does
+    paper : whether the target `paper` includes it
+    job : name of the rule, if one job draws several kinds
     """
 
     name: str
@@ -58,11 +57,12 @@ class Figure:
 
     Attributes
     ----------
-    inputs : the files that the function draws, by its parameters: a file, or lists and dictionaries of files
-    options : what else the function takes
-    names : its wildcards, and what else its title and caption name
+    inputs : files by parameter of the function: a file, or lists and dictionaries of files
+    options : the other arguments of the function
+    names : values of the wildcards, and other names in the title and the caption
     may_end
-        Run, start and week of simulations that may have ended before: `inputs["members"]` has none of theirs then.
+        Run, start and week of simulations that may end before that week; their files in `inputs["members"]` are then
+        left out.
     """
 
     kind: Kind
@@ -81,11 +81,11 @@ class Figure:
 
     @property
     def wildcards(self) -> dict[str, str]:
-        """Those of its names that its path has."""
+        """The names that occur in the path."""
         return {key: name for key, name in self.names.items() if f"{{{key}}}" in self.kind.pattern}
 
     def inputs_without(self, runs: Iterable[str]) -> Mapping[str, Any]:
-        """Return the inputs, None for those of members that have ended."""
+        """Return the inputs, with None for members that have ended before."""
         if "members" not in self.inputs:
             return self.inputs
         ended = set(runs)
@@ -94,13 +94,13 @@ class Figure:
 
     @property
     def described(self) -> dict[str, Any]:
-        """What the report says of it, with its file."""
+        """The text of the report, with the path."""
         keys = ("name", "section", "title", "caption", "technical")
         return {**{key: getattr(self.kind, key) for key in keys}, "path": self.path, "names": dict(self.names)}
 
 
 def files_in(inputs: Any) -> list[str]:
-    """Return the files in lists and dictionaries, each once."""
+    """Return all files in nested lists and dictionaries, each once."""
     if isinstance(inputs, str):
         return [inputs]
     if not isinstance(inputs, Mapping | list):
@@ -110,7 +110,7 @@ def files_in(inputs: Any) -> list[str]:
 
 
 def asked_for(figures: Iterable[Figure], *targets: str) -> list[str]:
-    """Return the files that targets ask for, those of the paper for "paper"."""
+    """Return the files that targets include."""
     return [
         file
         for figure in figures
@@ -120,7 +120,7 @@ def asked_for(figures: Iterable[Figure], *targets: str) -> list[str]:
 
 
 def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
-    """Return what is drawn by each rule, job by job: figures of one job have the same wildcards."""
+    """Return the figures by rule and job; those of one job have the same wildcards."""
     rules: dict[str, dict[tuple[tuple[str, str], ...], list[Figure]]] = {}
     for figure in figures:
         if figure.kind.draw:
@@ -130,7 +130,7 @@ def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
 
 
 def measured_name(brains: Iterable[Brain]) -> str:
-    """Return the name of measured brains in figures and tables: their populations if known.
+    """Return the name of measured brains in figures and tables, their populations if known.
 
     Several populations are listed with their weeks. Real brains of unknown population are called "real brain"; shapes
     are called by their kind if they share one.
@@ -167,5 +167,5 @@ def surfaces_by_week(simulation: Simulation) -> dict[float, str]:
 
 
 def measured_by_week(*simulations: Simulation) -> dict[float, Brain]:
-    """Return the measured brains that simulations are shown beside, by week."""
+    """Return the measured brains that are shown with simulations, by week."""
     return {week: brain for simulation in simulations for week, brain in simulation.measured_by_week.items()}
