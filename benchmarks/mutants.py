@@ -105,8 +105,8 @@ def failure(folder: Path, *tests: str) -> str:
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     outcome = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     said = f"{outcome.stdout[-2000:]}{outcome.stderr[-2000:]}"
-    # other exit codes of pytest: it could not run the tests
-    if outcome.returncode not in (0, 1):
+    # pytest ends with 1 for tests that fail, and for files of tests that cannot be imported
+    if outcome.returncode not in (0, 1) or "ERROR collecting" in outcome.stdout:
         raise RuntimeError(f"{', '.join(tests)} could not be run:\n{said}")
     return said if outcome.returncode else ""
 
@@ -128,7 +128,7 @@ def main() -> None:
             killed = bool(failure(folder, mutant.tests))
             path.write_text(original)
             survivors += [] if killed else [mutant]
-            print(f"{'killed' if killed else 'SURVIVED'}: {mutant.file}: {mutant.old} -> {mutant.new}", flush=True)
+            print(f"{'killed' if killed else 'SURVIVED'}: {mutant.file}: {mutant.old!r} -> {mutant.new!r}", flush=True)
     counts = {"mutants": len(mutants), "killed": len(mutants) - len(survivors)}
     print(json.dumps(counts | {"survived": survivors, "seconds": round(time.monotonic() - began)}))
     sys.exit(bool(survivors))
