@@ -13,9 +13,9 @@ files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     sweeps = {
         name: SweepTables(
-            **asked, **{table: read_table(files[table][number]) for table in ("members", "comparison", "nearest")}
+            **settings, **{table: read_table(files[table][number]) for table in ("members", "comparison", "nearest")}
         )
-        for number, (name, asked) in enumerate(params.studies.items())
+        for number, (name, settings) in enumerate(params.studies.items())
     }
     published = read_yaml(files.published)
     displacement, summary = read_table(files.displacement), read_json(files.summary[0])

@@ -29,7 +29,7 @@ with step(snakemake.log[0]):
     if "deviation" in tables:
         tables["deviation_centiles"] = deviation_scores(tables["deviation"], individuals=params.individuals)
     if params.carried:
-        of_runs = zip(*zip(*params.carried, strict=True), files.frames, files.carried, strict=True)
-        tables["displacement_agreement"] = pd.concat([agreement(*of_run) for of_run in of_runs], ignore_index=True)
+        runs = zip(*zip(*params.carried, strict=True), files.frames, files.carried, strict=True)
+        tables["displacement_agreement"] = pd.concat([agreement(*run) for run in runs], ignore_index=True)
     for name, path in output.items():
         write_table(path, tables[name])

@@ -205,16 +205,16 @@ def propose_runs(surrogate: Surrogate, count: int) -> pd.DataFrame:
     of Ginsbourger, Le Riche and Carraro 2010).
     """
     process, points, scores = surrogate.process, surrogate.points, surrogate.scores
-    candidates, chosen = _candidates(surrogate), []
+    candidates, proposed = _candidates(surrogate), []
     for _ in range(count):
         free = np.linalg.norm(candidates[:, None] - points[None], axis=2).min(axis=1) >= MIN_SPACING
         candidates = candidates[free] if free.any() else candidates
         best = candidates[int(expected_improvement(process, candidates, float(scores.min())).argmax())]
-        chosen.append(best)
+        proposed.append(best)
         points, scores = np.vstack([points, best]), np.append(scores, process.predict(best[None]))
         believer = GaussianProcessRegressor(surrogate.process.kernel_, optimizer=None, normalize_y=True)
         process = believer.fit(points, scores)
-    return from_unit_box(np.array(chosen), surrogate.bounds)
+    return from_unit_box(np.array(proposed), surrogate.bounds)
 
 
 def expected_improvement(process: GaussianProcessRegressor, points: Floats, best: float) -> Floats:

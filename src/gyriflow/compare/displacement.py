@@ -56,9 +56,8 @@ def displacement_table(
         displacement_r_scaling, displacement_slope_scaling, rms_mm, measured_rms_mm (root mean square by area).
     """
     if len(weeks) < 2:
-        raise InputError(
-            "no displacement to compare", found=f"{len(weeks)} weeks that both have", expected="two or more weeks"
-        )
+        found = f"{len(weeks)} weeks shared by the run and the registration"
+        raise InputError("no displacement to compare", found=found, expected="two or more weeks")
     component = face_components(TriangleMesh(measured[0], faces))
     parts = [np.unique(faces[component == number]) for number in range(component.max() + 1)]
     rows = []

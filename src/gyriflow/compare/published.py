@@ -45,9 +45,9 @@ def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str
         return f"No run of the sweep {sweep} has reached {week:g} GW."
     names = ", ".join(f"{row.real} ({row.real_population})" for row in observed.itertuples())
     text = f"The sweep {sweep} at {week:g} GW, compared with {names}."
-    others = sorted(set(observed.loc[~observed["same_population"].astype(bool), "real_population"]))
-    if others:
-        text += f" Note that {' and '.join(others)} is another population than that of the start brain."
+    populations = sorted(set(observed.loc[~observed["same_population"].astype(bool), "real_population"]))
+    if populations:
+        text += f" Note that {' and '.join(populations)} is another population than that of the start brain."
     return text
 
 

@@ -129,9 +129,9 @@ def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
 
 
 def _pairs(table: pd.DataFrame, observed: str, keys: list[str]) -> pd.DataFrame:
-    measured = table["run"] == MEASURED
-    observed_rows = table[measured & (table["subject"] == observed)]
-    return table[~measured].merge(observed_rows, on=keys, suffixes=("", "_real"))
+    is_real = table["run"] == MEASURED
+    observed_rows = table[is_real & (table["subject"] == observed)]
+    return table[~is_real].merge(observed_rows, on=keys, suffixes=("", "_real"))
 
 
 def member_row(
@@ -185,10 +185,10 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     )
     rows = []
     for _, group in table.groupby(keys, sort=False):
-        best, *others = group.sort_values("distance", kind="stable").to_dict("records")
+        best, *further = group.sort_values("distance", kind="stable").to_dict("records")
         row = {name: best[name] for name in (*keys, *varied, "run", "distance")}
-        if others:
-            row |= {f"next_{name}": others[0][name] for name in (*varied, "distance")}
+        if further:
+            row |= {f"next_{name}": further[0][name] for name in (*varied, "distance")}
         rows.append(row | {"flag": _flags(best, members[members["subject"] == best["subject"]], varied)})
     return pd.DataFrame(rows).reindex(columns=columns)
 

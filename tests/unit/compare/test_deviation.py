@@ -24,7 +24,7 @@ def test_a_larger_ball_lies_outside_and_has_more_area():
     assert (smaller["log_area"] < 0).all()
 
 
-def test_what_deviates_in_one_place_does_so_there_alone():
+def test_a_deviation_in_one_place_is_found_there_alone():
     top = np.linalg.norm(BALL.vertices - [0, 0, 20], axis=1) < 12
     maps = deviation_maps(BALL, scaled(np.where(top, 1.1, 1.0)[:, None]))
     assert maps["distance_mm"][top] == pytest.approx(2.0, abs=0.05)

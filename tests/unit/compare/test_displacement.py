@@ -42,7 +42,7 @@ def test_displacement_agrees_whatever_pose_the_run_is_in():
     assert half["displacement_slope"].iloc[0] == pytest.approx(0.5)
 
 
-def test_uniform_scaling_stands_beside_it():
+def test_uniform_scaling_is_the_baseline():
     measured = np.stack([POINTS, POINTS * [1.1, 1.05, 1.0]])
     table = displacement_table([21, 22], measured, measured, FACES)
     # on a sphere, Σ x² = Σ y² = Σ z²: (0.1 + 0.05)/√(3 (0.1² + 0.05²))
@@ -55,7 +55,7 @@ def test_uniform_scaling_stands_beside_it():
     assert alike["displacement_slope_scaling"].iloc[0] == pytest.approx(1.0)
 
 
-def test_bodies_that_nothing_joins_may_move_apart():
+def test_separate_bodies_may_move_relative_to_each_other():
     faces = np.concatenate([FACES, FACES + len(POINTS)])
     measured = np.stack(
         [np.concatenate([stretched(week) - [22, 0, 0], stretched(week) + [22, 0, 0]]) for week in (21, 22)]

@@ -24,7 +24,7 @@ def test_spheres_of_different_radius():
     )
 
 
-def test_the_quantile_sees_what_the_mean_does_not():
+def test_a_small_cap_changes_the_quantile_more_than_the_mean():
     smooth = sphere(25.0)
     tall = smooth.vertices.copy()
     cap = tall[:, 2] > 25.0 * np.cos(np.arccos(1 - 2 * 0.08))  # 8 % of the sphere's area

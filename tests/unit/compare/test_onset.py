@@ -1,4 +1,4 @@
-"""Sulci found, named, and the week in which they appear, in grooves of known depth."""
+"""Sulci, their names and the week when they appear, in grooves of known depth."""
 
 import numpy as np
 import pandas as pd

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from shapes import rigid
+from shapes import moved, rigid
 
 from gyriflow.compare.placement import correlation, gain_interval, make_patches, number_patches, score_placement, skill
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
-from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
+from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 
 from .bumpy import RADIUS, bumpy, field, shaped
 
@@ -44,7 +44,7 @@ def test_a_brain_moved_and_scaled_back_has_its_folds_in_place():
     assert abs(rotated["r_mean_curvature"]) < 0.25
 
 
-def test_noise_has_the_correlation_that_it_leaves():
+def test_noise_lowers_the_correlation_by_its_variance():
     pattern = TRUTH.mean_curvature
     added = pattern + pattern.std() * noise(4)
     row = score_placement(PreparedSurface(REAL, added, added), TRUTH, shaped(SMOOTH, noise(2)), TRUTH, horizon=3)
@@ -71,24 +71,20 @@ def test_interval_is_as_wide_as_gains_scatter_from_surface_to_surface():
 
 
 def two_sided(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the surface beside its mirror image."""
-    away = mesh.vertices + [1.5 * RADIUS, 0, 0]
-    return TriangleMesh(
-        np.concatenate([away, away * [-1, 1, 1]]),
-        np.concatenate([mesh.faces, flipped(mesh).faces + len(away)]),
-    )
+    """Return a brain of the surface on the right and its mirror image on the left."""
+    return merged(right := moved(mesh, 1.5 * RADIUS), transformed(right, np.diag([-1.0, 1.0, 1.0, 1.0])))
 
 
 def test_mirror_patches_are_drawn_together_where_the_brain_is_its_mirror_image():
     brain = two_sided(bumpy(1))
     half = len(REAL.vertices)
-    # wherever the brain lies
-    laid = transformed(brain, rigid(0, 0, 8, shift=(5, -3, 2)))
-    patch, drawn = make_patches(shaped(laid, np.zeros(2 * half)))
+    # in any pose
+    posed = transformed(brain, rigid(0, 0, 8, shift=(5, -3, 2)))
+    patch, drawn = make_patches(shaped(posed, np.zeros(2 * half)))
     assert drawn["mirrored_patches"] is True
     assert drawn["asymmetry_mm"] == pytest.approx(0, abs=0.02)
     assert np.mean(patch[:half] == patch[half:]) > 0.98
-    assert patch.max() + 1 == round(shaped(laid, np.zeros(2 * half)).areas.sum() / 20**2 / 2)
+    assert patch.max() + 1 == round(shaped(posed, np.zeros(2 * half)).areas.sum() / 20**2 / 2)
     # another brain on the other side: only on demand
     other = bumpy(5).vertices - [1.5 * RADIUS, 0, 0]
     both = np.concatenate([REAL.faces, REAL.faces + half])

@@ -22,7 +22,7 @@ def test_jagged_vertices_are_rough_and_even_ones_are_not():
     assert roughness_mm(jagged) == pytest.approx(0.1 * np.sqrt(1 + 1 / 6), rel=0.1)
 
 
-def test_a_surface_is_worth_most_against_itself():
+def test_an_exact_prediction_has_no_error():
     real = bumpy(1, height=1.0)
     shape = shaped(real)
     patch = number_patches(shape.mesh.vertices, shape.areas, 5.0)
@@ -45,14 +45,14 @@ def test_a_surface_is_worth_most_against_itself():
         assert unlike[f"{name}_low"] < unlike[name] < unlike[f"{name}_high"]
 
 
-def test_skill_is_against_the_best_simple_way_of_the_week():
+def test_skill_is_against_the_best_baseline_of_the_week():
     names = ["run", *SIMPLER_WAYS]
     away = {22: [0.3, 0.6, 0.8, 0.9, 1.2, 0.1], 23: [0.9, 0.9, 0.8, 0.45, 1.2, 0.2]}
     rows = pd.DataFrame(
         [(week, name, value) for week, values in away.items() for name, value in zip(names, values, strict=True)],
         columns=["week", "model", "distance_mm"],
     )
-    # draws that are as far apart as the means, or twice as far for all alike, do not change the skill
+    # the skill is the same in every draw if all distances are multiplied by one factor
     rows["drawn_mm"] = [value * np.array([1.0, 2.0]) for value in rows["distance_mm"]]
     table = add_skill(rows).set_index(["week", "model"])
     assert "drawn_mm" not in table

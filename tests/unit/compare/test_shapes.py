@@ -36,7 +36,7 @@ def test_a_prepared_surface_has_its_curvature_by_the_radius_that_is_asked_for():
     assert coarse < 0.9 * fine
 
 
-def test_open_or_turned_surfaces_are_refused():
+def test_surfaces_without_a_volume_are_refused():
     with pytest.raises(InputError, match="encloses no volume"):
         prepare_for_comparison(flipped(REAL), REAL)
 
@@ -48,7 +48,7 @@ def test_size_and_distance_of_curvature():
     assert against["curvature_distance_per_mm"] == pytest.approx(0.1, rel=0.02)
 
 
-def test_cortices_overlap_as_far_as_their_surfaces_are_the_same():
+def test_cortices_of_two_balls_overlap_by_their_common_shell():
     # the outer 2 mm of balls of 20 and 21 mm share those from 19 to 20 mm
     shared, *whole = ((far**3 - near**3) for near, far in ((19, 20), (18, 20), (19, 21)))
     larger = TriangleMesh(SMOOTH.vertices * 21 / 20, SMOOTH.faces)

@@ -66,7 +66,7 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
     assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
-    # where a spectrum is cut is told, and is no likeness
+    # the number of modes has no distance
     assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
 
 
@@ -135,7 +135,7 @@ def compared(**distances):
     return pd.DataFrame(rows)
 
 
-def test_the_nearest_run_is_named_with_the_next_and_what_stands_against_it():
+def test_the_nearest_run_has_the_second_nearest_and_flags():
     (row,) = nearest_runs(compared(t1=0.3, t2=0.1, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert (row["thickness_mm"], row["distance"], row["next_thickness_mm"], row["next_distance"]) == (2, 0.1, 3, 0.2)
     assert row["flag"] == "ok"
@@ -200,7 +200,7 @@ def test_energy_and_emissions_are_those_of_a_week_of_the_run():
     assert found["emissions (g CO2e) a gestational week"][0] == "5.7 (9 elements, 2 ranks)"
 
 
-def test_findings_of_a_study_are_checked_one_by_one():
+def test_findings_of_a_sweep_are_checked_one_by_one():
     found = verdicts(moves(), sweep(SHARES, (0.4, 0.35), 0.2))
     assert found["all thicknesses come to 28 GW"] == ("1 of 2 runs", "in part")
     here, verdict = found["nearest thickness_mm by relative_power_B4, 28 GW"]
@@ -219,13 +219,13 @@ def test_findings_of_a_study_are_checked_one_by_one():
 
 
 @pytest.mark.parametrize(("week", "varied"), [(27, ["thickness_mm"]), (28, ["thickness_mm", "poisson_ratio"])])
-def test_another_study_is_not_the_papers(week, varied):
+def test_another_sweep_is_not_the_papers(week, varied):
     own = sweep(SHARES, (0.4, 0.35), 0.01)
     other = SweepTables(varied, week, own.members, own.comparison, own.nearest)
     assert {verdict for _, verdict in verdicts(moves(), other).values()} == {"not run", NOT_COMPARABLE}
 
 
-def test_nearest_runs_stand_with_the_papers_value_where_it_reports_one():
+def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     nearest = nearest_runs(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
     nearest = pd.concat([nearest, nearest.assign(measure="relative_power_B5_weyl"), nearest.assign(measure="area")])
     tables = {"members": MEMBERS, "comparison": compared(t1=0.3, t2=0.1), "nearest": nearest}
