@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.growth import layered_inverse
-from gyriflow.folding.problem import Problem
+from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
@@ -36,22 +36,21 @@ def _shaken(mesh: TetrahedralMesh, by: float) -> TetrahedralMesh:
     return TetrahedralMesh(vertices, mesh.tets)
 
 
-def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> Problem:
+def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> NonlinearProblem:
     """Return a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
     mesh = cube(order)
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
     domain = Domain(comm, mesh)
-    problem = Problem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5, remembers_stress=True)
+    problem = NonlinearProblem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5, remembers_stress=True)
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
     mu, dg, dr = (
         nodal[domain.cells] @ problem.points.smooth.T for nodal in (1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones)
     )
     normals = np.tile([1 / 3, 2 / 3, 2 / 3], (*mu.shape, 1))
-    problem.set_shear_modulus(mu)
-    problem.set_growth(layered_inverse(dg, dr, np.ones(cells, bool), normals))
-    problem.set_stretch(np.tile(STRETCH, (cells, len(problem.points.weights), 1, 1)))
+    V = np.tile(STRETCH, (cells, len(problem.points.weights), 1, 1))
+    problem.set_step(mu, layered_inverse(dg, dr, np.ones(cells, bool), normals), V)
     return problem
 
 
@@ -76,20 +75,16 @@ def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Flo
     u = 2e-4 * np.stack([np.sin(0.3 * x[:, 1]), np.cos(0.25 * x[:, 2]), np.sin(0.05 * x[:, 0] * x[:, 1])], axis=1)
     v = np.ascontiguousarray(u[:, [2, 0, 1]]) / 2
     v[x[:, 2] < -0.499 * SIDE_MM] = 0.0
-    direction, residual, other, change = (problem.new_vector() for _ in range(4))
-    direction.array[:] = v[: domain.owned].ravel()
-    problem.set_displacement(u)
-    energy = problem.energy()
-    problem.residual(residual)
-    problem.tangent().matrix.mult(direction, change)
+    energy, residual, owned = problem.energy(u), problem.residual(u), v[: domain.owned].ravel()
+    tangent = problem.tangent(residual).matrix
+    direction, change = tangent.createVecs()
+    direction.array[:] = owned
+    tangent.mult(direction, change)
     remainders = []
     for h in LENGTHS:
-        problem.set_displacement(u + h * v)
-        of_energy = abs(problem.energy() - energy - h * residual.dot(direction))
-        problem.residual(other)
-        other.axpy(-1.0, residual)
-        other.axpy(-h, change)
-        remainders.append([of_energy, other.norm()])
+        of_energy = abs(problem.energy(u + h * v) - energy - h * domain.dot(residual.owned, owned))
+        of_forces = domain.norm(problem.residual(u + h * v).owned - residual.owned - h * change.array_r)
+        remainders.append([of_energy, of_forces])
     return np.diff(np.log(remainders), axis=0) / np.diff(np.log(LENGTHS))[:, None]
 
 
@@ -98,6 +93,5 @@ def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> float:
     norms = []
     for zone in (CLAMPED, FREE):
         problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True, order=order)
-        problem.set_displacement(problem.domain.local(problem.domain.positions) @ AFFINE.T)
-        norms.append(problem.residual(problem.new_vector()))
+        norms.append(problem.residual(problem.domain.local(problem.domain.positions) @ AFFINE.T).norm)
     return float(norms[0] / norms[1])

@@ -6,18 +6,16 @@ The stress is written out by hand, so that a wrong energy in the solver would no
 from dataclasses import dataclass
 
 import dolfinx
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.growth import layered_inverse
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.problem import Problem
+from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid, quadratic
 from gyriflow.mechanics.materials import NeoHookean
@@ -56,28 +54,27 @@ def cube(cells: int, order: int) -> TetrahedralMesh:
 class BodyForce:
     """A force f per volume of the updated reference as a part of the energy, −∫ f·u dV."""
 
-    def __init__(self, problem: Problem, density) -> None:
+    def __init__(self, problem: NonlinearProblem, density) -> None:
         self.problem = problem
         dx = ufl.dx(metadata={"quadrature_degree": QUADRATURE})
         form = ufl.inner(density, ufl.TestFunction(problem.domain.space)) * dx
         with form_compiler(problem.domain.comm) as options:
             compiled = dolfinx.fem.form(form, jit_options=options)
-        self.load = problem.new_vector()
-        with self.load.localForm() as local:
-            local.set(0.0)
-        dolfinx.fem.petsc.assemble_vector(self.load, compiled)
-        self.load.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        load = dolfinx.fem.assemble_vector(compiled)
+        load.scatter_reverse(dolfinx.la.InsertMode.add)
+        self.load = load.array[: 3 * problem.domain.owned]
 
-    def energy(self) -> float:
-        return -self.load.dot(self.problem.vector)
+    def energy(self, u: Floats) -> float:
+        domain = self.problem.domain
+        return -domain.dot(self.load, u[: domain.owned].ravel())
 
-    def add_residual(self, out: PETSc.Vec) -> None:
-        out.array[:] -= self.load.array
+    def add_forces(self, u: Floats, out: Floats) -> None:
+        out -= self.load
 
-    def stiffness(self, *, convex: bool = False) -> None:
+    def stiffness(self, u: Floats, *, convex: bool = False) -> None:
         return None
 
-    def largest_step(self, direction: Floats) -> float:
+    def max_step(self, u: Floats, direction: Floats) -> float:
         return 1.0
 
 
@@ -120,7 +117,7 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     domain = Domain(comm, mesh)
     kept = case == STRETCHED
-    problem = Problem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=kept)
+    problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=kept)
 
     side = SIDE_MM * 1e-3
     nodes, to_points = domain.local(domain.positions) / side, problem.points.smooth.T
@@ -129,10 +126,8 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     angle = np.broadcast_to(layers(case, np.moveaxis(points, 2, 0), np.sin)[3], points.shape[:2])
     normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(angle.shape, 0.8)], axis=2)
     mu, dg, dr = (values[domain.cells] @ to_points for values in (mu, dg, dr))
-    problem.set_shear_modulus(mu)
-    problem.set_growth(layered_inverse(dg, dr, np.ones(len(mu), bool), normals))
-    if kept:
-        problem.set_stretch(np.tile(STRETCH, (*points.shape[:2], 1, 1)))
+    V = np.tile(STRETCH, (*points.shape[:2], 1, 1))
+    problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), normals), V if kept else None)
 
     x = ufl.SpatialCoordinate(domain.mesh) / side
     exact = side * exact_displacement(x)
@@ -141,10 +136,11 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     stress = first_piola_stress(exact, mu, dg, dr, normal_at(angle), V)
     problem.contributions.append(BodyForce(problem, -ufl.div(stress)))
     solver = NewtonSolver(problem, NewtonSettings(1e-10, krylov_tolerance=1e-6), residual_floor=0.0)
-    solver.solve(np.zeros_like(problem.displacement))
+    found = dolfinx.fem.Function(domain.space)
+    found.x.array[:] = solver.solve().displacement.ravel()
 
     dx = ufl.dx(metadata={"quadrature_degree": QUADRATURE})
-    gap, norms = problem.u - exact, []
+    gap, norms = found - exact, []
     with form_compiler(comm) as options:
         for field in (gap, exact, ufl.grad(gap), ufl.grad(exact)):
             form = dolfinx.fem.form(ufl.inner(field, field) * dx, jit_options=options)

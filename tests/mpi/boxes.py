@@ -9,7 +9,7 @@ from shapes import box_mesh
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.growth import Growth, layered_inverse
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
-from gyriflow.folding.problem import Problem
+from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import NeoHookean
@@ -55,13 +55,12 @@ def at_the_bottom(centre):
     return centre[:, 2] < -2.99
 
 
-def set_layers(problem, mu, dg, dr, normals):
+def set_layers(problem, mu, dg, dr, normals, V=None):
     """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
     points = problem.points
     mu, dg, dr = (nodal[problem.domain.cells] @ points.smooth.T for nodal in (mu, dg, dr))
     repeated = np.repeat(normals[:, None], len(points.weights), axis=1)
-    problem.set_shear_modulus(mu)
-    problem.set_growth(layered_inverse(dg, dr, np.ones(len(mu), bool), repeated))
+    problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), repeated), V)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ class EvenGrowth(Growth):
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):
     """Return a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(comm, mesh)
-    problem = Problem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
+    problem = NonlinearProblem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
     x = domain.local(domain.positions)
 
     def nodal(value):
@@ -98,8 +97,8 @@ def solver_of(problem, **settings):
 
 
 def solved(problem, **settings):
-    """Return what Newton's method has taken from the start to the end, where the displacement then is."""
-    return solver_of(problem, **settings).solve(np.zeros_like(problem.displacement))
+    """Return the solution of Newton's method from rest."""
+    return solver_of(problem, **settings).solve()
 
 
 def smooth_displacement(domain, size=1e-3):
@@ -111,6 +110,6 @@ def smooth_displacement(domain, size=1e-3):
     )
 
 
-def everywhere_known(problem):
+def gathered(domain, u):
     """Return the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
-    return problem.domain.gathered(problem.displacement[: problem.domain.owned])
+    return domain.gathered(u[: domain.owned])

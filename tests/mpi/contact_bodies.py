@@ -7,7 +7,7 @@ from shapes import box_mesh
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.problem import Problem
+from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, grid
@@ -40,11 +40,11 @@ def in_a_tube(mesh):
 
 def problem_with_contact(mesh, zones, distance, stiffness=2 * MU, growth_along_z=0.0):
     domain = Domain(COMM, mesh)
-    problem = Problem(domain, zones, MATERIAL)
+    problem = NonlinearProblem(domain, zones, MATERIAL)
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     normal = np.tile([0.0, 0.0, 1.0], (cells, 1))
     set_layers(problem, np.full(nodes, MU), np.zeros(nodes), np.full(nodes, growth_along_z), normal)
-    contact = SelfContact(domain, problem.displacement, zones.facets, stiffness, distance)
+    contact = SelfContact(domain, zones.facets, stiffness, distance)
     problem.contributions.append(contact)
     return problem, contact
 

@@ -87,7 +87,7 @@ def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
     if support == "box":
         mesh = two_blocks(gap=0.1)
         folding = Folding(COMM, mesh, in_a_tube(mesh), folding.parameters)
-    assert folding.contact.distance_mm < 0.1
+    assert folding.contact.barrier.distance_mm < 0.1
     after = folding.step(state, state.step_s)
     assert (after.positions == state.positions).all()
     assert after.rows[-1]["newton"] == 0
@@ -107,6 +107,23 @@ def test_parts_that_touch_move_as_one():
     assert after.rows[-1]["contact_pairs"] > 0
 
 
+@pytest.mark.parametrize("support", ["free", "box"])
+def test_each_guess_is_swept_for_crossings_from_rest(support, monkeypatch):
+    folding, state = closing_sulcus("global", support=support)
+    folding.begin(state, state.step_s)
+    problem, x = folding.problem, folding.domain.local(state.positions)
+    # the groove's walls are pushed through each other
+    push = np.sin(np.pi * x[:, 0] / 12e-3) * np.exp(-((x[:, 0] / 3e-3) ** 2)) * x[:, 2]
+    guesses = [-size * push[:, None] * [1.0, 0.0, 0.0] for size in (0.8, 1.0)]
+    tried, residual = [], problem.residual
+    monkeypatch.setattr(problem, "residual", lambda u: tried.append(u) or residual(u))
+    folding.solver.solve(*guesses)
+    for guess, u in zip(map(problem.without_rigid_motion, guesses), tried[1:], strict=False):
+        part = problem.max_step(problem.rest(), guess)
+        assert 0.3 < part < 0.9
+        assert u == pytest.approx(part * guess, rel=1e-9, abs=1e-12)
+
+
 def pressed(step_s, days=4, **changes):
     """Return what has folded two blocks that grow evenly against each other in a tube, and the last state."""
     mesh = two_blocks(other=(4, 3, 3))
@@ -116,8 +133,8 @@ def pressed(step_s, days=4, **changes):
     state = State.at_start(mesh.vertices * M_PER_MM, step_s)
     folding.model = EvenGrowth(folding.parameters, None, GROWTH * step_s).growth
     # the barrier goes by the parameters
-    honest = folding.problem.set_shear_modulus
-    folding.problem.set_shear_modulus = lambda mu: honest(np.full_like(mu, MU))
+    honest = folding.problem.set_step
+    folding.problem.set_step = lambda mu, *others: honest(np.full_like(mu, MU), *others)
     for _ in range(round(days * 86400 / step_s)):
         state = folding.step(state, step_s)
     return folding, state
@@ -129,7 +146,8 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
     rates = []
     for step_s in (86400.0, 43200.0, 21600.0):
         folding, state = pressed(step_s)
-        fields = folding.fields.of_elements(["stress", "strain"]) | folding.fields.of_contact(["contact_pressure"])
+        fields = folding.fields.elements(["stress", "strain"], folding.solved)
+        fields |= folding.fields.contact_pressure(["contact_pressure"], folding.solved)
         at = two_blocks(other=(4, 3, 3)).vertices
         inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
         contact = fields["contact_pressure_pa_per_gw"][inside].mean()

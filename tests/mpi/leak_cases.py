@@ -19,7 +19,7 @@ def alive(folding, path):
     """Return how many objects of each class PETSc has made and not destroyed, so far."""
     # what was let go of waits for the next clean-up, and how much that is differs from step to step
     gc.collect()
-    folding.problem.tangent()
+    folding.problem.tangent(folding.problem.residual(folding.problem.rest()))
     viewer = PETSc.Viewer().createASCII(str(path), comm=COMM)
     PETSc.Log.view(viewer)
     viewer.destroy()

@@ -13,11 +13,9 @@ from gyriflow.units import M_PER_MM
 
 
 def contact_in(comm, mesh, distance=0.15):
-    """Return a domain, an array for the displacement of its nodes, and the contact of the mesh with itself."""
+    """Return a domain, and the contact of the mesh with itself."""
     domain = Domain(comm, mesh)
-    displacement = np.zeros((len(domain.vertex_of_node), 3))
-    contact = SelfContact(domain, displacement, boundary_faces(mesh)[0], 2 * MU, distance)
-    return domain, displacement, contact
+    return domain, SelfContact(domain, boundary_faces(mesh)[0], 2 * MU, distance)
 
 
 def blocks(order):
@@ -34,28 +32,25 @@ def blocks(order):
 
 def what_is_found(comm, mesh, moved_mm, further_mm):
     """Return what contact says of a displaced body: numbers, fields on all vertices, and a product's."""
-    domain, displacement, contact = contact_in(comm, mesh)
-    displacement[:] = domain.local(moved_mm) * M_PER_MM
+    domain, contact = contact_in(comm, mesh)
+    u = domain.local(moved_mm) * M_PER_MM
     x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)
-    stiffness = contact.stiffness()
+    stiffness = contact.stiffness(u)
     product, other = stiffness.createVecs()
     product.array[:] = domain.local(x)[: domain.owned].ravel()
     stiffness.mult(product, other)
-    forces = np.zeros((domain.owned, 3))
-    vector = other.duplicate()
-    vector.set(0.0)
-    contact.add_residual(vector)
-    forces[:] = vector.array_r.reshape(-1, 3)
+    forces = np.zeros(3 * domain.owned)
+    contact.add_forces(u, forces)
     return {
-        "pairs": contact.pair_count(),
-        "energy": contact.energy(),
-        "smallest": contact.smallest_distance_mm(),
-        "step": contact.largest_step(domain.local(further_mm) * M_PER_MM),
-        "forces": contact.forces(),
-        "residual": domain.gathered(forces),
+        "pairs": contact.pair_count(u),
+        "energy": contact.energy(u),
+        "smallest": contact.smallest_distance_mm(u),
+        "step": contact.max_step(u, domain.local(further_mm) * M_PER_MM),
+        "forces": contact.forces(u),
+        "residual": domain.gathered(forces.reshape(-1, 3)),
         "product": domain.gathered(other.array_r.reshape(-1, 3)),
-        "pressure": contact.pressure(),
-    }, contact
+        "pressure": contact.pressure(u),
+    }, contact.near_pairs(u).pairs
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -63,13 +58,12 @@ def test_all_ranks_together_find_what_one_finds_alone(order):
     mesh, moved = blocks(order)
     closer = np.zeros_like(moved)
     closer[:, 2] = -np.sign(mesh.vertices[:, 2]) * GAP_MM
-    found, contact = what_is_found(COMM, mesh, moved, closer)
-    alone, whole = what_is_found(MPI.COMM_SELF, mesh, moved, closer)
+    found, own = what_is_found(COMM, mesh, moved, closer)
+    alone, kinds = what_is_found(MPI.COMM_SELF, mesh, moved, closer)
     pairs = alone["pairs"]
     assert pairs > 100
     # none does all of it
-    assert len(contact._state().pairs) <= (1 if COMM.size == 1 else 0.8) * pairs
-    kinds = whole._state().pairs
+    assert len(own) <= (1 if COMM.size == 1 else 0.8) * pairs
     assert min(len(kinds.ev_collisions), len(kinds.ee_collisions), len(kinds.fv_collisions)) > 5
     assert found["pairs"] == pairs
     assert 0 < alone["step"] < 1
@@ -84,14 +78,14 @@ def test_all_ranks_together_find_what_one_finds_alone(order):
 @pytest.mark.parametrize("order", [1, 2])
 def test_parts_of_the_ranks_follow_a_surface_that_moves_far(order):
     mesh, moved = blocks(order)
-    domain, displacement, contact = contact_in(COMM, mesh)
+    domain, contact = contact_in(COMM, mesh)
     found = []
     for shift in (0.0, 30.0, -4.0):
-        displacement[:] = domain.local(moved + [shift, -shift / 2, 0.0]) * M_PER_MM
+        u = domain.local(moved + [shift, -shift / 2, 0.0]) * M_PER_MM
         # a way longer than the part has room for
-        aside = np.tile([0.0, 0.0, 7.0], (len(displacement), 1)) * M_PER_MM
-        assert contact.largest_step(aside) == 1.0
-        found.append([contact.pair_count(), contact.energy(), np.abs(contact.forces()).sum()])
+        aside = np.tile([0.0, 0.0, 7.0], (len(u), 1)) * M_PER_MM
+        assert contact.max_step(u, aside) == 1.0
+        found.append([contact.pair_count(u), contact.energy(u), np.abs(contact.forces(u)).sum()])
     assert found[0][0] > 100
     assert found[1] == pytest.approx(found[0], rel=1e-9)
     assert found[2] == pytest.approx(found[0], rel=1e-9)
@@ -104,6 +98,6 @@ def test_parts_that_touch_are_joined_wherever_a_rank_sees_it():
     lifted = mesh.vertices.copy()
     lifted[:, 2] += np.where(z > 0, -0.4 * np.exp(-((x - 3) ** 2) - (y - 3) ** 2), 0.0)
     for vertices, parts in ((mesh.vertices, 2), (lifted, 1)):
-        domain, _, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
+        domain, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
         assert domain.part.max() == 1
         assert len(np.unique(contact.joined(domain.part))) == parts

@@ -137,7 +137,7 @@ def test_a_way_of_contact_that_is_far_too_long_is_shortened():
     apart = problem.domain.local(problem.domain.positions).copy()
     apart[:, :2], apart[:, 2] = 0.0, np.sign(apart[:, 2])
     for way_mm, part in ((100.0, 0.08), (4.0, 1.0)):
-        assert contact.largest_step(apart * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)
+        assert contact.max_step(problem.rest(), apart * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)
 
 
 def following(growth):

@@ -53,28 +53,27 @@ def unconverged_warning(row: dict) -> str:
     )
 
 
-def contact_row(contact: SelfContact | None, zones: Zones, positions: Floats) -> dict[str, float]:
-    """Return what the step table says of contact right after a solve that led to (n, 3) positions in m."""
+def contact_row(contact: SelfContact | None, zones: Zones, u: Floats, positions: Floats) -> dict[str, float]:
+    """Return the columns of contact for a step's displacement u (k, 3) in m that led to (n, 3) positions in m."""
     if contact is None:
         return {"plane_penetration_mm": zones.penetration_mm(positions * MM_PER_M)}
-    distance = contact.smallest_distance_mm()
+    distance = contact.smallest_distance_mm(u)
     return {
-        "contact_distance_mm": contact.distance_mm,
-        "contact_stiffness_pa": contact.stiffness_pa,
-        "contact_pairs": contact.pair_count(),
-        # what is farther apart than the barrier reaches is not looked for
+        "contact_distance_mm": contact.barrier.distance_mm,
+        "contact_stiffness_pa": contact.barrier.stiffness_pa,
+        "contact_pairs": contact.pair_count(u),
+        # pairs farther apart than the barrier reaches are not searched for
         "min_distance_mm": distance if distance < math.inf else math.nan,
     }
 
 
 def worst_places(solver: NewtonSolver) -> str:
-    """Return where the last solve stood worst: the most compressed element and the largest residual, in mm."""
-    problem, domain = solver.problem, solver.problem.domain
+    """Return where the last solve ended worst: the most compressed element and the largest residual, in mm."""
+    problem, domain, last = solver.problem, solver.problem.domain, solver.last
+    assert last is not None
     before = domain.local(domain.positions)
-    ratios = problem.volume_ratios() if solver.inverting is None else solver.inverting
-    residual = problem.new_vector()
-    problem.residual(residual)
-    forces = -np.linalg.norm(residual.array_r.reshape(-1, 3), axis=1)
+    ratios = problem.volume_ratios(last.displacement) if solver.inverted is None else solver.inverted
+    forces = -np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
     centres = before[domain.corners].mean(axis=1) * MM_PER_M
     ratio, tet, centre = domain.least(ratios.min(axis=1), domain.tet_of_cell, centres)
     force, vertex, place = domain.least(forces, domain.vertex_of_node, before * MM_PER_M)

@@ -79,6 +79,7 @@ class Domain:
         geometry_nodes = by_cell_type[0] if isinstance(by_cell_type, list) else self.mesh.geometry.dofmap
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
+        self._shared = dolfinx.la.vector(self.space.dofmap.index_map, 3)
         self.part = connected_parts(mesh)
         self._measure(self.local(self.positions))
         self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
@@ -100,6 +101,20 @@ class Domain:
         total = np.empty_like(values, order="C")
         self.comm.Allreduce(np.ascontiguousarray(values), total)
         return total
+
+    def with_ghosts(self, owned: Floats) -> Floats:
+        """Return the (k, 3) vectors of the local nodes from the components (3 · owned,) of the owned ones."""
+        self._shared.array[: len(owned)] = owned
+        self._shared.scatter_forward()
+        return self._shared.array.reshape(-1, 3).copy()
+
+    def dot(self, a: Floats, b: Floats) -> float:
+        """Return the product of two vectors of which each rank has its owned components (3 · owned,)."""
+        return self.comm.allreduce(float(a @ b))
+
+    def norm(self, owned: Floats) -> float:
+        """Return the Euclidean norm of such a vector."""
+        return float(np.sqrt(self.dot(owned, owned)))
 
     def local(self, values: NDArray) -> NDArray:
         """Return the values of the local nodes from those of all vertices."""

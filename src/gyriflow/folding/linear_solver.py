@@ -5,7 +5,7 @@ costs more than that. So the preconditioner is one that is set up in the time of
 the diagonal, and the rigid motions of some hundred parts of the mesh as the coarse level.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -15,10 +15,10 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from ..errors import SolverError
 from ..geometry.triangles import Floats
 from .domain import Domain
-from .problem import Problem
+from .problem import NonlinearProblem
 from .products import PartMotions, multiply_blocks
-from .surface_parts import shared_out
-from .tangent import Tangent, part_arms, rigid_motions
+from .surface_parts import bisected
+from .tangent import Residual, Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
 PLAIN, SHIFTED = range(2)
@@ -39,10 +39,15 @@ class NotConvergedError(SolverError):
     """The step was not solved; a smaller one may be."""
 
 
-@dataclass(frozen=True)
-class LinearCount:
-    """What a linear solve took, and whether the tangent was positive definite as it was."""
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """A descent direction (k, 3) of the local nodes in m, and its slope: the residual's product with it, in J.
 
+    With the iterations and the rung of the linear solve, and whether the tangent was positive definite as it was.
+    """
+
+    values: Floats
+    slope: float
     iterations: int
     rung: int = PLAIN
     convex: bool = True
@@ -60,7 +65,7 @@ class TwoLevelPreconditioner:
         owned_vertices = domain.vertex_of_node[: domain.owned]
         # by global nodes, as the matrix' columns are
         self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
-        self._part_of_vertex = shared_out(domain.positions, count)
+        self._part_of_vertex = bisected(domain.positions, count)
         self._part = self._part_of_vertex[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
         self._parts = int(self._part.max()) + 1
@@ -145,7 +150,7 @@ class LinearSolver:
     What it keeps from one solve to the next decides how a direction is found. A solve fails after `max_iterations`.
     """
 
-    def __init__(self, problem: Problem, max_iterations: int) -> None:
+    def __init__(self, problem: NonlinearProblem, max_iterations: int) -> None:
         self._problem = problem
         self._preconditioner: TwoLevelPreconditioner | None = None
         self._level = 0  # of the shift that the last tangent needed
@@ -155,10 +160,8 @@ class LinearSolver:
         self._cg.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._cg.setTolerances(atol=0.0, max_it=max_iterations)
 
-    def solve(
-        self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec, reduction: float, *, convexify: bool
-    ) -> LinearCount:
-        """Leave in `direction` a solution of J d = −r that descends, with the tangent J and the residual r.
+    def solve(self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool) -> Direction:
+        """Return a solution of J d = −r that descends, with the tangent J and the residual r at one displacement.
 
         `reduction` is the part of the right-hand side that may be left. Where J is indefinite, it is shifted; with
         `convexify` its further parts are made convex before that. NotConvergedError where no shift helps.
@@ -171,34 +174,38 @@ class LinearSolver:
             # parts that are pressed together tend to slide aside, which makes the tangent indefinite; made convex, it
             # rarely is, but it is no longer exact
             if first == 0:
-                reason, iterations = self._run(tangent, residual, direction)
+                reason, direction = self._run(tangent, residual)
+                iterations += direction.iterations
                 if reason > 0:
                     self._level = 0
-                    return LinearCount(iterations)
-            self._problem.convexify()
+                    return direction
+            self._problem.convexify(tangent, residual.displacement)
         for level in range(first, len(SHIFTS)):
             tangent.raise_diagonal(SHIFTS[level])
-            reason, taken = self._run(tangent, residual, direction)
+            reason, direction = self._run(tangent, residual)
             tangent.raise_diagonal(0.0)
-            iterations += taken
+            iterations += direction.iterations
             if reason > 0:
                 self._level = level
-                return LinearCount(iterations, SHIFTED if level else PLAIN, level == 0)
+                return replace(direction, iterations=iterations, rung=SHIFTED if level else PLAIN, convex=level == 0)
             if reason not in INDEFINITE:
                 break
         raise NotConvergedError("the linear solver found no descent direction")
 
-    def _run(self, tangent: Tangent, residual: PETSc.Vec, direction: PETSc.Vec) -> tuple[int, int]:
-        """Solve into the direction; return PETSc's reason for the end, 0 without a descent, and the iterations."""
+    def _run(self, tangent: Tangent, residual: Residual) -> tuple[int, Direction]:
+        """Return PETSc's reason for the end of a solve, 0 without a descent, and the direction."""
         if self._preconditioner is None:
             self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
             multilevel = self._cg.getPC()
             multilevel.setType("python")
             multilevel.setPythonContext(self._preconditioner)
+            self._solution, self._right = tangent.matrix.createVecs()
         self._preconditioner.renew()
         self._cg.setOperators(tangent.matrix)
-        self._cg.solve(residual, direction)
-        direction.scale(-1.0)
-        self._problem.apply_boundary_conditions(direction)
-        descends = direction.dot(residual) < 0  # false where it is not a number
-        return self._cg.getConvergedReason() if descends else 0, self._cg.getIterationNumber()
+        self._right.array_w[:] = residual.owned
+        self._cg.solve(self._right, self._solution)
+        owned = -self._solution.array_r
+        self._problem.clear_fixed(owned)  # which preconditioners miss by their tolerance
+        slope = self._problem.domain.dot(owned, residual.owned)
+        reason = self._cg.getConvergedReason() if slope < 0 else 0  # false where it is not a number
+        return reason, Direction(self._problem.domain.with_ghosts(owned), slope, self._cg.getIterationNumber())

@@ -1,28 +1,29 @@
-"""Newton's method for the displacement of one step: linear solves, each guarded by a line search."""
+"""Newton's method for the displacement of one step: inexact linear solves, each followed by a line search."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from petsc4py import PETSc
 
-from .linear_solver import PLAIN, LinearSolver, NotConvergedError
-from .problem import Problem
-from .tangent import Tangent
+from ..geometry.triangles import Floats
+from .linear_solver import PLAIN, Direction, LinearSolver, NotConvergedError
+from .problem import NonlinearProblem
+from .tangent import Residual, Tangent
 
-ROUND_OFF = 1e-12
-"""Relative error of an energy, a sum over elements."""
-UNRESOLVED = 1e-6
-"""Relative change of an energy that strains of a ten-thousandth leave uncertain."""
-GAIN = 1e-6
-"""Relative fall of the energy from which an iteration counts as progress, and not towards their limit."""
-PATIENCE = 10
-"""Most iterations, progress or not, over their limit."""
-SLOW = 10.0
+ENERGY_ROUND_OFF = 1e-12
+"""Relative round-off of an energy, a sum over elements."""
+MIN_RESOLVED = 1e-6
+"""Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
+MIN_PROGRESS = 1e-6
+"""Relative fall of the energy from which an iteration does not count towards `max_newton`."""
+MAX_ITERATIONS_FACTOR = 10
+"""Iterations allowed in all, as a multiple of `max_newton`."""
+STAGNATION_FACTOR = 10.0
 """Multiple of the tolerance below which an iteration that gains less than half calls for the true tangent."""
-LOOSE = 0.1
-"""Relative tolerance of a linear solve that need not be good."""
+MAX_FORCING = 0.1
+"""Largest forcing term: relative tolerance of a linear solve far from the solution."""
+ARMIJO = 1e-4
+"""Part of the decrease predicted by the slope that a line search asks for."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class NewtonSettings:
     """Tolerances and limits of the iteration.
 
     `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side: see
-    `linear_tolerance`.
+    `forcing_term`.
     """
 
     newton_tolerance: float = 1e-4
@@ -41,12 +42,14 @@ class NewtonSettings:
 
 
 @dataclass
-class StepCount:
-    """What a step took: iterations, the furthest rung of a linear solve, the residual relative to that at rest.
+class Solution:
+    """A step's displacement (k, 3) of the local nodes in m, and the work it took.
 
-    It has `converged` where that is below the tolerance: not where nothing but round-off was left to gain.
+    Iterations, the last rung that a linear solve needed, and the residual relative to that at rest. It is `converged`
+    where that is below the tolerance: not where only round-off was left to gain.
     """
 
+    displacement: Floats
     newton: int = 0
     krylov: int = 0
     rung: int = PLAIN
@@ -54,163 +57,145 @@ class StepCount:
     converged: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Iterate:
-    """Where the iteration stands; the displacement and its residual are with problem and solver.
+    """An iterate: its residual at its displacement, and its energy in J if computed.
 
-    The norm of the residual in N, the energy in J where it is known, its relative fall that led here where that was
-    asked for, and whether nothing is left to gain but round-off.
+    `progress` is the relative fall of the energy in the iteration, if computed; `exhausted` says that only round-off
+    is left to gain.
     """
 
-    norm: float
+    residual: Residual
     energy: float | None = None
-    gain: float = 0.0
+    progress: float = 0.0
     exhausted: bool = False
 
 
-def linear_tolerance(enough: float, left: float, least: float) -> float:
-    """Return the part of the residual that a linear solve may leave (forcing terms as of Eisenstat and Walker 1996).
+def forcing_term(final: float, left: float, tightest: float) -> float:
+    """Return the part of the residual that a linear solve may leave (inexact Newton, Eisenstat and Walker 1996).
 
-    `enough` ends the step, `left` is what the last iteration left of its residual (the next one leaves about the
-    square, however well it is solved), and `least` the tolerance of solves in which the iteration converges fast.
+    `final` ends the step, `left` is the part of its residual that the last iteration left (the next one leaves about
+    the square, however well it is solved), and `tightest` the tolerance with which the iteration converges fast.
     """
-    if left**2 > LOOSE:
-        return max(LOOSE, enough)
-    good = max(least, left**2)
-    # a little farther where that ends the step
-    return enough if enough >= 0.1 * good else good
+    if left**2 > MAX_FORCING:
+        return max(MAX_FORCING, final)
+    forcing = max(tightest, left**2)
+    # a little tighter where that ends the step
+    return final if final >= 0.1 * forcing else forcing
 
 
 class NewtonSolver:
-    """Solves for the displacement of one step after the other with objects made once.
+    """Newton's method for one step after the other, with objects made once.
 
     What it keeps from one step to the next decides how a solution is found, and changes it within the tolerance only.
 
-    A residual below `residual_floor`, in N, counts as solved whatever the step's start. `inverting` is det F (c, p) of
-    the local elements at the last trial of the present step that turned one inside out.
+    A residual below `residual_floor`, in N, counts as solved whatever the residual at rest. `last` is the residual of
+    the present step's last iterate, also where the solve failed, and `inverted` det F (c, p) of the local elements at
+    its last trial that inverted one, if any.
     """
 
-    def __init__(self, problem: Problem, settings: NewtonSettings, residual_floor: float) -> None:
+    def __init__(self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float) -> None:
         self.problem = problem
         self.settings = settings
         self.residual_floor = residual_floor
         self.linear_solver = LinearSolver(problem, settings.max_krylov)
-        self._residual = problem.new_vector()
-        self._first_left = 0.0  # part of the residual that the first iteration of the step before left
-        self._trial = problem.new_vector()
-        self._direction = problem.new_vector()
-        self.inverting: NDArray[np.float64] | None = None
+        self._first_left = 0.0  # part of the residual that the first iteration of the last step left
+        self.last: Residual | None = None
+        self.inverted: Floats | None = None
 
-    def solve(self, *guesses: NDArray[np.float64]) -> StepCount:
-        """Solve for the displacement from the first good one of some guesses (k, 3) in m; it is left in the problem.
+    def solve(self, *guesses: Floats) -> Solution:
+        """Return the displacement of the step, starting from the first useful one of some guesses (k, 3) in m.
 
         NotConvergedError where the residual does not fall below the tolerance.
         """
-        problem, count = self.problem, StepCount()
-        self.inverting = None
-        at_rest = self._residual_at(np.zeros_like(problem.displacement))
-        if not np.isfinite(at_rest):
+        problem, settings = self.problem, self.settings
+        self.inverted = None
+        self.last = at_rest = problem.residual(problem.rest())
+        if not np.isfinite(at_rest.norm):
             raise NotConvergedError("the forces without any displacement are not finite")
-        tolerance = max(self.settings.newton_tolerance * at_rest, self.residual_floor)
-        iterate = Iterate(at_rest if at_rest <= tolerance else self._begin(guesses, at_rest))
-        before, stalled = np.inf, 0
-        while iterate.norm > tolerance and not iterate.exhausted:
-            norm = iterate.norm
+        tolerance = max(settings.newton_tolerance * at_rest.norm, self.residual_floor)
+        iterate = Iterate(at_rest if at_rest.norm <= tolerance else self._first(guesses, at_rest))
+        solution, before, stalled = Solution(iterate.residual.displacement), np.inf, 0
+        while (norm := iterate.residual.norm) > tolerance and not iterate.exhausted:
+            self.last = iterate.residual
             # where folds snap or slide past each other, the energy falls far before the residual does
-            if max(stalled, count.newton / PATIENCE) >= self.settings.max_newton:
+            if max(stalled, solution.newton / MAX_ITERATIONS_FACTOR) >= settings.max_newton:
                 raise NotConvergedError(
                     "Newton's method did not converge",
-                    found=f"residual {norm:.2e} N after {count.newton} iterations",
+                    found=f"residual {norm:.2e} N after {solution.newton} iterations",
                     expected=f"at most {tolerance:.2e} N",
                 )
-            count.newton += 1
-            slow = before / 2 < norm <= SLOW * tolerance
-            left = norm / before if count.newton > 1 else max(norm / at_rest, self._first_left)
-            reduction = linear_tolerance(0.4 * tolerance / norm, left, self.settings.krylov_tolerance)
-            # one that is off by no more than the linear solve may leave is as good as a new one
-            tangent = problem.tangent(within=0.0 if slow else reduction)
+            solution.newton += 1
+            stagnates = before / 2 < norm <= STAGNATION_FACTOR * tolerance
+            left = norm / before if solution.newton > 1 else max(norm / at_rest.norm, self._first_left)
+            forcing = forcing_term(0.4 * tolerance / norm, left, settings.krylov_tolerance)
+            # a tangent with no more error than the linear solve may leave is as good as a new one
+            tangent = problem.tangent(iterate.residual, within=0.0 if stagnates else forcing)
             try:
-                iterate = self._iterate(iterate, tangent, reduction, count, convexify=not slow)
+                iterate = self._iterate(iterate, tangent, forcing, solution, convexify=not stagnates)
             except NotConvergedError:
-                least = self.settings.krylov_tolerance
-                if not problem.kept_tangent and reduction <= least:
+                tightest = settings.krylov_tolerance
+                if not tangent.elastic.lagged and forcing <= tightest:
                     raise
-                iterate = self._iterate(iterate, problem.tangent(), min(reduction, least), count, convexify=not slow)
-            stalled += iterate.gain < GAIN
-            if count.newton == 1:
-                self._first_left = iterate.norm / norm
+                tangent = problem.tangent(iterate.residual)
+                iterate = self._iterate(iterate, tangent, min(forcing, tightest), solution, convexify=not stagnates)
+            stalled += iterate.progress < MIN_PROGRESS
+            if solution.newton == 1:
+                self._first_left = iterate.residual.norm / norm
             before = norm
-        count.residual = iterate.norm / at_rest if at_rest > 0 else 0.0
-        count.converged = iterate.norm <= tolerance
-        return count
+        self.last = iterate.residual
+        solution.displacement = iterate.residual.displacement
+        solution.residual = norm / at_rest.norm if at_rest.norm > 0 else 0.0
+        solution.converged = norm <= tolerance
+        return solution
+
+    def _first(self, guesses: Sequence[Floats], at_rest: Residual) -> Residual:
+        """Return the residual at the first guess that leaves less than half of that at rest, or else that at rest."""
+        problem = self.problem
+        for guess in map(problem.without_rigid_motion, guesses):
+            u = problem.max_step(at_rest.displacement, guess) * guess
+            if problem.smallest_volume_ratio(u) > 0:
+                residual = problem.residual(u)
+                if residual.norm < 0.5 * at_rest.norm:  # false for NaN
+                    return residual
+        return at_rest
 
     def _iterate(
-        self, iterate: Iterate, tangent: Tangent, reduction: float, count: StepCount, *, convexify: bool
+        self, iterate: Iterate, tangent: Tangent, forcing: float, solution: Solution, *, convexify: bool
     ) -> Iterate:
-        linear = self.linear_solver.solve(tangent, self._residual, self._direction, reduction, convexify=convexify)
-        count.krylov += linear.iterations
-        count.rung = max(count.rung, linear.rung)
-        return self._advance(iterate, convex=linear.convex)
+        direction = self.linear_solver.solve(tangent, iterate.residual, forcing, convexify=convexify)
+        solution.krylov += direction.iterations
+        solution.rung = max(solution.rung, direction.rung)
+        return self._line_search(iterate, direction)
 
-    def _residual_at(self, displacement: NDArray[np.float64]) -> float:
-        self.problem.set_displacement(displacement)
-        return self.problem.residual(self._residual)
-
-    def _begin(self, guesses: Sequence[NDArray[np.float64]], at_rest: float) -> float:
-        """Goes to the first guess that leaves less than half of the residual at rest, or stays at rest.
-
-        Returns the norm of the residual there.
-        """
-        problem = self.problem
-        for guess in map(problem.admissible, guesses):
-            problem.set_displacement(problem.largest_step(guess) * guess)
-            if problem.smallest_volume_ratio() > 0:
-                norm = problem.residual(self._residual)
-                if norm < 0.5 * at_rest:  # false where it is not a number
-                    return norm
-        return self._residual_at(np.zeros_like(problem.displacement))
-
-    def _advance(self, iterate: Iterate, *, convex: bool) -> Iterate:
-        """Move along the direction as far as energy and elements allow; return where that leads.
-
-        `convex` says that the tangent was positive definite as it was.
-        """
-        problem, start, norm = self.problem, self.problem.displacement.copy(), iterate.norm
-        slope = self._direction.dot(self._residual)
-        before = None
+    def _line_search(self, iterate: Iterate, direction: Direction) -> Iterate:
+        """Return the first of ever shorter moves along a direction that lowers the energy and inverts no element."""
+        problem, start, norm = self.problem, iterate.residual.displacement, iterate.residual.norm
+        slope, convex, before = direction.slope, direction.convex, iterate.energy
+        owned = direction.values[: problem.domain.owned].ravel()
         if not problem.convex:
-            # so that the energy is asked where its sum can tell
-            before = problem.energy() if iterate.energy is None else iterate.energy
-            convex = convex and abs(slope) <= UNRESOLVED * abs(before)
-        self._direction.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
-        with self._direction.localForm() as local:
-            direction = local.array_r.reshape(-1, 3).copy()
-        length = problem.largest_step(direction)
+            # the energy is compared wherever its change is above round-off
+            before = problem.energy(start) if before is None else before
+            convex = convex and abs(slope) <= MIN_RESOLVED * abs(before)
+        length = problem.max_step(start, direction.values)
         for _ in range(self.settings.max_backtracks):
-            problem.set_displacement(start + length * direction)
-            if problem.smallest_volume_ratio() > 0:
-                trial = problem.residual(self._trial)
-                # where a convex energy's slope has all but vanished, it fell by about half of it: no need to ask for it
-                flat = abs(self._direction.dot(self._trial)) <= 0.1 * abs(slope)
-                if convex and np.isfinite(trial) and trial < norm and flat:
-                    return self._accept(trial)
-                if before is None:
-                    problem.set_displacement(start)
-                    before = problem.energy()
-                    problem.set_displacement(start + length * direction)
-                energy = problem.energy()
-                lower = np.isfinite(trial) and energy <= before + 1e-4 * length * slope
-                # what is left to gain is below the energy's round-off: the residual decides
-                if lower or (trial < norm and abs(energy - before) <= ROUND_OFF * abs(before)):
-                    return self._accept(trial, energy, (before - energy) / max(abs(before), np.finfo(float).tiny))
+            u = start + length * direction.values
+            if problem.smallest_volume_ratio(u) > 0:
+                trial = problem.residual(u)
+                finite = np.isfinite(trial.norm)
+                # where a convex energy's slope has all but vanished, the energy fell by about half of it
+                flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
+                if convex and finite and trial.norm < norm and flat:
+                    return Iterate(trial)
+                before = problem.energy(start) if before is None else before
+                energy = problem.energy(u)
+                lower = finite and energy <= before + ARMIJO * length * slope
+                # where the gain left is below the energy's round-off, the residual decides
+                if lower or (trial.norm < norm and abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)):
+                    return Iterate(trial, energy, (before - energy) / max(abs(before), np.finfo(float).tiny))
             else:
-                self.inverting = problem.volume_ratios()
+                self.inverted = problem.volume_ratios(u)
             length /= 2
-        problem.set_displacement(start)
-        if before is not None and abs(slope) <= ROUND_OFF * abs(before):
-            return Iterate(norm, before, exhausted=True)
+        if before is not None and abs(slope) <= ENERGY_ROUND_OFF * abs(before):
+            return Iterate(iterate.residual, before, exhausted=True)
         raise NotConvergedError("the line search found no step that lowers the energy")
-
-    def _accept(self, norm: float, energy: float | None = None, gain: float = 0.0) -> Iterate:
-        self._residual, self._trial = self._trial, self._residual
-        return Iterate(norm, energy, gain)

@@ -53,14 +53,15 @@ def run(
 
     def save(week: float, state: State) -> State:
         """Write the frame of a week and return the state to go on with; all ranks have to take part."""
-        contact, elements = folding.fields.of_contact(wanted), folding.fields.of_elements(wanted)
+        solved = folding.solved
+        contact, elements = folding.fields.contact_pressure(wanted, solved), folding.fields.elements(wanted, solved)
         # a mean over the steps since the last frame: before the first one, that step's
-        grown = folding.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
+        grown = solved.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
         if comm.rank == 0:
             fields = {"positions": state.positions * MM_PER_M}
             if "displacement" in wanted:
                 fields["displacement_mm"] = (state.positions - start) * MM_PER_M
-            shown = zones, folding.growth.parameters, maps, week, wanted, grown
+            shown = zones, solved.growth.parameters, maps, week, wanted, grown
             write_frame(
                 frame_path(folder, week), week, fields | layer_fields(fields["positions"], *shown) | contact, elements
             )

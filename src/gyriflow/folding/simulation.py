@@ -23,10 +23,10 @@ from .growth import Growth, GrowthInputs, StepStart
 from .growth_models import growth_model
 from .layers import PialSearch, Tissue, shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
-from .newton import NewtonSettings, NewtonSolver, StepCount
+from .newton import NewtonSettings, NewtonSolver, Solution
 from .output import say, warn
-from .problem import Problem
-from .step_fields import StepFields
+from .problem import NonlinearProblem
+from .step_fields import SolvedStep, StepFields
 from .stress import left_stretch, packed, relaxed, unpacked
 from .zones import Zones
 
@@ -39,8 +39,8 @@ STEPS_BEFORE_GROWING = 4
 class Folding:
     """A brain that folds: the solver's objects, made once, and one step at a time.
 
-    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `growth` is how tissue grew
-    in the last step, or will in the first one.
+    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `solved` is the last step
+    that was accepted, at first one without displacement; `fields` gives its fields, until the next step begins.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Folding:
         self.zones, self.maps = zones, maps or {}
         require_maps(p, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
-        self.problem = Problem(
+        self.problem = NonlinearProblem(
             self.domain,
             zones,
             MATERIALS[p.material](p.poisson_ratio),
@@ -66,7 +66,7 @@ class Folding:
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
             barrier = STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm
-            self.contact = SelfContact(self.domain, self.problem.displacement, zones.facets, *barrier)
+            self.contact = SelfContact(self.domain, zones.facets, *barrier)
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
@@ -75,47 +75,47 @@ class Folding:
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
         share = Share(comm.rank, comm.size, self.domain.summed)
         self.model = growth_model(p, self.inputs, mesh.vertices, share)
-        self.growth: Growth = self.model(StepStart(mesh.vertices, 0.0, p.step_s))
-        self.fields = StepFields(self.domain, self.problem, self.contact, zones, p)
+        self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
+        self.fields = StepFields(self.problem, self.contact, zones, p)
         self._growing = self.domain.local(zones.growth)
         self._local_maps = {name: self.domain.local(self.maps[name]) for name in p.varying_maps}
         self._pial = np.unique(zones.cortex_facets)
 
     def step(self, state: State, step_s: float) -> State:
-        """Return the state after a step of a given length, the mesh moved along; its last row says what it took.
+        """Return the state after a step of a given length; its last row of the step table describes the step.
 
-        NotConvergedError where the step is too large; the mesh is as before.
+        NotConvergedError where the step is too large.
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
-        count = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
-        self.growth, self.fields.step_s = growth, step_s
-        u = self.domain.gathered(self.problem.displacement[: self.domain.owned])
-        positions = state.positions + u
+        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
+        u = solution.displacement
+        displacement = self.domain.gathered(u[: self.domain.owned])
+        positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
         thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
-        left = None
+        stretch = None
         if self.parameters.stress_memory_gw > 0:
-            left = self.domain.gathered_cells(packed(left_stretch(self.problem.outcome("elastic"))))
+            stretch = self.domain.gathered_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
             "dt_s": step_s,
-            **self._solved_row(u, count),
-            **contact_row(self.contact, self.zones, positions),
-            **self.growth.row(size),
+            **self._solution_row(solution, displacement),
+            **contact_row(self.contact, self.zones, u, positions),
+            **growth.row(size),
             "elements_through_cortex": elements_through(
                 self.domain, tissue.depth, float(np.mean(thickness)) * M_PER_MM
             ),
-            "rung": RUNGS[count.rung],
+            "rung": RUNGS[solution.rung],
         }
-        after = state.after(u, step_s, row, left, self.growth.learnt(size), self.growth.logarithm())
-        self.domain.place(after.positions)
+        self.solved = SolvedStep(u, step_s, growth)
+        after = state.after(displacement, step_s, row, stretch, growth.learnt(size), growth.logarithm())
         row["seconds"] = time.monotonic() - began
         return after
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, Growth]:
-        """Set all that a step is solved with, and return the tissue as in the middle of the step, and the growth."""
+        """Set the problem of a step, and return the tissue with the layers of the step's middle, and the growth."""
         start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.learnt)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
@@ -131,34 +131,31 @@ class Folding:
             lambda maps: value_at(p.thickness_mm, week, maps),
             float(np.max(value_at(p.thickness_mm, week, self.maps))),
         )
-        self.problem.set_shear_modulus(tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week)))
         part = domain.part
         if self.contact is not None:
-            self.contact.adapt(state.rows)
-            self.contact.mesh_moved()
+            self.contact.begin_step(state.rows[-1] if state.rows else None)
             if self.problem.free:
                 part = self.contact.joined(part)
-        self.problem.mesh_moved(part)
-        if p.stress_memory_gw > 0:
-            self.problem.set_stretch(self._kept_stretch(state, step_s))
         growth = self.model(start)
-        self.problem.set_growth(growth.inverse(tissue))
+        mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
+        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part)
         return tissue, growth
 
-    def _kept_stretch(self, state: State, step_s: float) -> Floats:
+    def _stretch(self, state: State, step_s: float) -> Floats | None:
         if state.stretch is None:
-            return np.tile(np.eye(3), (len(self.domain.cells), len(self.problem.points.weights), 1, 1))
+            return None
         before = unpacked(state.stretch[self.domain.tet_of_cell])
         return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
 
-    def _solved_row(self, u: Floats, count: StepCount) -> dict[str, float]:
-        ratios, length = self.problem.volume_ratios(), np.linalg.norm(u, axis=1) * MM_PER_M
+    def _solution_row(self, solution: Solution, displacement: Floats) -> dict[str, float]:
+        u, length = solution.displacement, np.linalg.norm(displacement, axis=1) * MM_PER_M
+        ratios = self.problem.volume_ratios(u)
         return {
-            "newton": count.newton,
-            "krylov": count.krylov,
-            "residual": count.residual,
-            "converged": count.converged,
-            "energy_J": self.problem.energy(),
+            "newton": solution.newton,
+            "krylov": solution.krylov,
+            "residual": solution.residual,
+            "converged": solution.converged,
+            "energy_J": self.problem.energy(u),
             "min_J": self.domain.minimum(ratios),
             "max_J": -self.domain.minimum(-ratios),
             "max_u_mm": float(length.max()),

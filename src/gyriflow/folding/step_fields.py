@@ -1,10 +1,10 @@
-"""The fields that a step has left: stress, strain and contact pressure, as frames write them, and their measures.
+"""Fields of a solved step, written to frames: stress, strain and contact pressure, and the tensor measures they need.
 
-The tensors of a step, elastic deformation and stress, come from the problem that was solved (`Problem.outcome`). Arrays
-of tensors are (c, 3, 3), of scalars (c,).
+Arrays of tensors are (c, 3, 3), of scalars (c,).
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,74 +14,78 @@ from ..settings.folding import FoldingParameters
 from ..settings.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
 from .contact import SelfContact
-from .domain import Domain
+from .growth import Growth
 from .layers import PialSearch
-from .problem import Problem
+from .problem import NonlinearProblem
 from .zones import Zones
 
 
-class StepFields:
-    """What the last step has left; names of fields are those of the parameter `fields`, those of arrays have units.
+@dataclass(frozen=True, eq=False)
+class SolvedStep:
+    """A step: its displacement (k, 3) of the local nodes in m, its length, and how tissue grew."""
 
-    Where stress is forgotten, that of a step, its strain and its contact pressure are in proportion to the step, and
-    are given per week. `step_s` is the length of the last step.
+    displacement: Floats
+    step_s: float
+    growth: Growth
+
+
+class StepFields:
+    """The fields of a solved step: names are those of the parameter `fields`, those of arrays have units.
+
+    They refer to the problem of the step, whose mesh stays where the step began until the next one begins. Where stress
+    is forgotten, that of a step, its strain and its contact pressure are in proportion to the step and given per week.
     """
 
     def __init__(
-        self, domain: Domain, problem: Problem, contact: SelfContact | None, zones: Zones, parameters: FoldingParameters
+        self,
+        problem: NonlinearProblem,
+        contact: SelfContact | None,
+        zones: Zones,
+        parameters: FoldingParameters,
     ) -> None:
-        self.domain, self.problem, self.contact = domain, problem, contact
-        self.step_s = parameters.step_s
+        self.problem, self.contact, domain = problem, contact, problem.domain
         self._remembers = parameters.stress_memory_gw > 0
-        self._start = domain.positions
+        self._start = domain.local(domain.positions)
         if "strain" in parameters.fields:
-            centres = domain.local(self._start)[domain.corners].mean(axis=1)
-            self._start_normals = PialSearch(self._start, zones.cortex_facets).nearest_normals(centres)
+            centres = self._start[domain.corners].mean(axis=1)
+            self._start_normals = PialSearch(domain.positions, zones.cortex_facets).nearest_normals(centres)
 
-    def of_elements(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Return those among `wanted`, (m,) for all elements, equal on every rank: means over integration points.
-
-        Right after a step only.
-        """
-        domain, problem = self.domain, self.problem
+    def elements(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
+        """Return the fields of elements among some names, (m,), equal on every rank, averaged over points."""
+        problem, u, domain = self.problem, step.displacement, self.problem.domain
         fields: dict[str, Floats] = {}
-        if set(ELEMENT_FIELDS).isdisjoint(wanted):
+        if set(ELEMENT_FIELDS).isdisjoint(names):
             return fields
-        after, slopes = domain.positions, problem.points.slopes
-        total = deformation_gradients(domain.local(self._start), domain.local(after), domain.cells, slopes)
-        total = total.reshape(-1, 3, 3)
-
-        # back to where the step began, which its displacement refers to
-        moved = problem.displacement.copy()
-        domain.place(after - domain.gathered(moved[: domain.owned]))
-        if "stress" in wanted:
-            stress = problem.outcome("stress").reshape(-1, 3, 3)
+        slopes = problem.points.slopes
+        after = domain.local(domain.positions) + u
+        total = deformation_gradients(self._start, after, domain.cells, slopes).reshape(-1, 3, 3)
+        if "stress" in names:
+            stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
             fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
-        if "strain" in wanted:
-            Fe = problem.outcome("elastic").reshape(-1, 3, 3)
+        if "strain" in names:
+            Fe = problem.evaluate("elastic", u).reshape(-1, 3, 3)
             fields |= {"elastic_strain": hencky_equivalent(Fe), "elastic_volume_strain": np.log(np.linalg.det(Fe))}
-        fields = self._per_gw(fields)
-        if "strain" in wanted:
+        fields = self._per_gw(fields, step.step_s)
+        if "strain" in names:
             normals = np.repeat(self._start_normals, len(slopes), axis=0)
             fields |= {"total_strain": green_lagrange_maximum(total), "area_stretch": areal_stretch(total, normals)}
-        if "volume_ratio" in wanted:
-            fields["volume_ratio_step"] = np.linalg.det(problem.outcome("deformation").reshape(-1, 3, 3))
+        if "volume_ratio" in names:
+            fields["volume_ratio_step"] = np.linalg.det(problem.evaluate("deformation", u).reshape(-1, 3, 3))
             fields["volume_ratio"] = np.linalg.det(total)
-        domain.place(after)
-        by_cell = [values.reshape(-1, len(slopes)) @ problem.points.weights for values in fields.values()]
-        together = domain.gathered_cells(np.stack(by_cell, axis=1))
-        return dict(zip(fields, together.T, strict=True))
+        means = [values.reshape(-1, len(slopes)) @ problem.points.weights for values in fields.values()]
+        gathered = domain.gathered_cells(np.stack(means, axis=1))
+        return dict(zip(fields, gathered.T, strict=True))
 
-    def of_contact(self, wanted: Iterable[str]) -> dict[str, Floats]:
-        """Return the contact pressure (n,) at all vertices if it is among `wanted`. Right after a step only."""
-        if self.contact is None or "contact_pressure" not in wanted:
+    def contact_pressure(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
+        """Return the contact pressure (n,) at all vertices if it is among some names."""
+        if self.contact is None or "contact_pressure" not in names:
             return {}
-        return self._per_gw({"contact_pressure_pa": self.contact.pressure()})
+        return self._per_gw({"contact_pressure_pa": self.contact.pressure(step.displacement)}, step.step_s)
 
-    def _per_gw(self, fields: dict[str, Floats]) -> dict[str, Floats]:
+    def _per_gw(self, fields: dict[str, Floats], step_s: float) -> dict[str, Floats]:
         if self._remembers:
             return fields
-        return {f"{name}_per_gw": values * (SECONDS_PER_GW / self.step_s) for name, values in fields.items()}
+        return {f"{name}_per_gw": values * (SECONDS_PER_GW / step_s) for name, values in fields.items()}
 
 
 def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:

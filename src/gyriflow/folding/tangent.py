@@ -5,6 +5,7 @@ its own. No solver needs all entries in one matrix. Where nothing holds a body, 
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import dolfinx
 import numpy as np
@@ -60,14 +61,16 @@ class ElasticMatrix:
     dolfinx' own block matrices are filled about twice as fast as PETSc's. Of two blocks between nodes of one rank that
     mirror each other, `add` may leave out the one below the diagonal, which nothing reads.
 
-    `coupling` is a form with the same places of entries, which `add` adds at the present displacement, `fixed` (owned,
-    3) the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is (all
-    nodes, 3), by global nodes. `products` multiplies. Of the (b,) blocks of the owned rows, row by row, `nodes` are the
-    owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) says where each row begins
-    and ends.
+    `coupling` is a form with the same sparsity pattern, `add` adds the blocks at a displacement, and `fixed` (owned, 3)
+    are the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is
+    (all nodes, 3), by global nodes. `products` multiplies. Of the (b,) blocks of the owned rows, row by row, `nodes`
+    are the owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) are the first
+    blocks of the rows and the end of the last one.
     """
 
-    def __init__(self, coupling: dolfinx.fem.Form, add: Callable[[MatrixCSR], None], fixed: NDArray[np.bool_]) -> None:
+    def __init__(
+        self, coupling: dolfinx.fem.Form, add: Callable[[Floats, MatrixCSR], None], fixed: NDArray[np.bool_]
+    ) -> None:
         self._add = add
         self._blocks = dolfinx.fem.create_matrix(coupling, block_mode=BlockMode.compact)
         row_map, column_map = self._blocks.index_map(0), self._blocks.index_map(1)
@@ -90,10 +93,10 @@ class ElasticMatrix:
         # that and its transpose are the whole
         self._share_of_half = np.where((rows == self.columns) | (local_columns >= owned), 0.5, 1.0)[self._kept]
 
-    def assemble(self) -> None:
-        """Assemble the tangent at the present displacement."""
+    def assemble(self, u: Floats) -> None:
+        """Assemble the tangent at a displacement (k, 3) of the local nodes in m."""
         self._blocks.set_value(0.0)
-        self._add(self._blocks)
+        self._add(u, self._blocks)
         self._blocks.scatter_reverse()
         values = self.values
         values.reshape(-1)[self._crossed] = 0.0
@@ -118,69 +121,69 @@ class ElasticMatrix:
         return self.values[self._diagonal]
 
 
-class KeptTangent:
-    """The elastic tangent of a step, kept from one displacement to the next while it predicts how forces change.
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """The residual at a displacement (k, 3) of the local nodes in m: owned components (3 · owned,) and their norm in N.
 
-    `like` is a vector of the displacement's layout. `kept` says whether the last tangent was that of an earlier
-    displacement, `assembled` how often it has been assembled.
+    `elastic` is the part without contributions such as contact, and with a free body's resultant.
     """
 
-    def __init__(self, matrix: ElasticMatrix, like: PETSc.Vec) -> None:
+    displacement: Floats
+    elastic: Floats
+    owned: Floats
+    norm: float
+
+
+class LaggedTangent:
+    """The elastic tangent, kept from one displacement to the next while it predicts how forces change.
+
+    `lagged` says whether the tangent in use is that of an earlier displacement, `assembled` how often it was assembled.
+    """
+
+    def __init__(self, matrix: ElasticMatrix, domain: Domain) -> None:
         self.matrix = matrix
-        self.kept = False
+        self.lagged = False
         self.assembled = 0
-        self._valid = False
-        # forces last noted; displacement and forces when the tangent was asked for; for products
-        self._forces, self._at_u, self._at_forces, self._change, self._product = (like.duplicate() for _ in range(5))
+        self._domain = domain
+        self._last: Residual | None = None
 
     def forget(self) -> None:
-        """Take note that mesh, stiffness, growth or kept stretch have changed: the next tangent is assembled."""
-        self._valid = False
+        """Have the next tangent assembled, since mesh, stiffness, growth or kept stretch have changed."""
+        self._last = None
 
-    def note_forces(self, forces: PETSc.Vec) -> None:
-        """Take note of the elastic forces at the present displacement."""
-        forces.copy(self._forces)
-
-    def move_to(self, displacement: PETSc.Vec, within: float) -> None:
-        """Make the matrix that of a displacement, unless the kept one is good enough.
-
-        It is good enough where it predicts the change of the forces since the last call with an error of at most a part
-        `within`. If `within` is above 0, the forces at this displacement must have been noted last.
-        """
-        self.kept = within > 0 and self.predicts(displacement, within)
-        if not self.kept:
-            self.matrix.assemble()
+    def update(self, at: Residual, within: float) -> None:
+        """Assemble the tangent at a displacement, unless it `predicts` the elastic forces there to within a part."""
+        self.lagged = within > 0 and self.predicts(at, within)
+        if not self.lagged:
+            self.matrix.assemble(at.displacement)
             self.assembled += 1
-            self._valid = True
-        displacement.copy(self._at_u)
-        self._forces.copy(self._at_forces)
+        self._last = at
 
-    def predicts(self, displacement: PETSc.Vec, within: float) -> bool:
-        """Return whether the tangent predicts the change of forces since the last call to within a part."""
-        if not self._valid:
+    def predicts(self, at: Residual, within: float) -> bool:
+        """Return whether the tangent predicts the change of elastic forces since the last update to within a part."""
+        if self._last is None:
             return False
-        self._change.waxpy(-1.0, self._at_u, displacement)
-        self.matrix.products.multiply(self._change.array_r, self._product.array_w)
-        predicted = self._product.norm()
-        self._product.axpy(1.0, self._at_forces)
-        self._product.axpy(-1.0, self._forces)
-        return bool(self._product.norm() <= within * predicted)
+        change = (at.displacement - self._last.displacement)[: self._domain.owned].ravel()
+        predicted = np.empty_like(change)
+        self.matrix.products.multiply(change, predicted)
+        error = predicted + self._last.elastic - at.elastic
+        return self._domain.norm(error) <= within * self._domain.norm(predicted)
 
 
 class Tangent:
-    """The tangent of one iterate, which acts on displacements as a matrix of type python.
+    """The tangent of one iterate, which acts on displacements as a PETSc matrix of type python.
 
-    There is one for all iterates: the symmetric `matrix`. `like` is a vector of the displacement's layout. Further
-    `parts`, in N/m, have no entries in rows and columns of fixed components. `motions` are taken out of all products.
+    There is one for all iterates: the symmetric `matrix`. Further `parts`, in N/m, have no entries in rows and columns
+    of fixed components. `motions` are taken out of all products.
     """
 
-    def __init__(self, elastic: KeptTangent, like: PETSc.Vec) -> None:
+    def __init__(self, elastic: LaggedTangent, domain: Domain) -> None:
         self.elastic = elastic
         self.parts: Sequence[PETSc.Mat] = ()
         self.motions: RigidMotions | None = None
         self._shift: Floats | None = None
-        sizes = like.getSizes()
-        self.matrix = PETSc.Mat().createPython((sizes, sizes), context=self, comm=like.comm)
+        size = 3 * domain.owned, 3 * len(domain.positions)
+        self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=domain.comm)
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setUp()
 

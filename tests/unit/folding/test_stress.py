@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.problem import Problem
+from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.step_fields import (
     areal_stretch,
     deformation_gradients,
@@ -36,13 +36,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @cache
-def problem_of(law: type[Material], order: int) -> Problem:
+def problem_of(law: type[Material], order: int) -> NonlinearProblem:
     """Return a problem on a few elements that may remember stress."""
     mesh = box_mesh((1, 1, 1), (2.0, 3.0, 1.0))
     mesh = quadratic(mesh) if order == 2 else mesh
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
-    return Problem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45), remembers_stress=True)
+    return NonlinearProblem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45), remembers_stress=True)
 
 
 def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
@@ -52,10 +52,9 @@ def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):
         problem = problem_of(law, order)
         x, cells = problem.domain.local(problem.domain.positions), len(problem.domain.cells)
         ones, points = np.ones(len(x)), len(problem.points.weights)
-        set_layers(problem, MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)))
-        problem.set_stretch(np.tile(np.eye(3) if stretch is None else stretch, (cells, points, 1, 1)))
-        problem.set_displacement(x @ (F - np.eye(3)).T)
-        found.append(problem.outcome(name).reshape(-1, 3, 3))
+        V = None if stretch is None else np.tile(stretch, (cells, points, 1, 1))
+        set_layers(problem, MU * ones, dg * ones, dr * ones, np.tile(normal, (cells, 1)), V)
+        found.append(problem.evaluate(name, x @ (F - np.eye(3)).T).reshape(-1, 3, 3))
     tensors = np.concatenate(found)
     np.testing.assert_allclose(tensors, np.broadcast_to(tensors[0], tensors.shape), rtol=1e-9, atol=1e-9)
     return tensors[:1]

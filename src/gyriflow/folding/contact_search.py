@@ -1,0 +1,139 @@
+"""The search for pairs of surface parts near each other, and for the first touch on a way, with the IPC Toolkit."""
+
+from dataclasses import dataclass
+
+import ipctk
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.triangles import Floats
+from .surface_parts import SurfacePart, part_of_surface
+
+MARGIN_MM = 0.05
+"""Displacement of the surface after which candidates for pairs are searched for again."""
+ROOM_MM = 1.0
+"""Displacement after which each rank takes its part of the surface anew."""
+MAX_CLOSING = 0.9
+"""Largest part of a gap that a step may close."""
+SWEEP = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
+"""Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's distance. Interval bisection, the
+other choice, takes minutes where surfaces meet flat on."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchRange:
+    """Positions (s, 3) in mm between which the surface may lie, and half the distance that is searched around them."""
+
+    first: Floats
+    last: Floats
+    reach: float
+
+    def covers(self, distance_mm: float, *positions: Floats) -> bool:
+        """Return whether all pairs within a distance at some other positions have been found."""
+        margin = self.reach - distance_mm / 2
+        if np.isinf(margin):
+            return True
+        low, high = np.minimum(self.first, self.last) - margin, np.maximum(self.first, self.last) + margin
+        return all(bool((at >= low).all() and (at <= high).all()) for at in positions)
+
+
+@dataclass(frozen=True, eq=False)
+class NearPairs:
+    """A rank's own pairs within the contact distance, for (s, 3) positions in mm of the whole surface.
+
+    `mesh` is the rank's part for the IPC Toolkit, with areas as at the step's start; `part_positions` (p, 3) in mm.
+    """
+
+    positions: Floats
+    part: SurfacePart
+    mesh: ipctk.CollisionMesh
+    part_positions: Floats
+    pairs: ipctk.NormalCollisions
+
+    @property
+    def gap_mm(self) -> float:
+        """The smallest distance between the pairs, infinite without any."""
+        if not len(self.pairs):
+            return np.inf
+        return float(np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions)))
+
+
+class ContactSearch:
+    """A rank's search in one step that starts with the surface at `rest_mm` (s, 3), for pairs within a distance.
+
+    The rank's part of the surface and the candidates for pairs are kept while they cover the positions asked for, also
+    those of a `previous` step's search: this saves time and changes no result. `owned` (s,) are the rank's vertices.
+    """
+
+    def __init__(
+        self,
+        faces: NDArray[np.integer],
+        owned: NDArray[np.bool_],
+        rest_mm: Floats,
+        distance_mm: float,
+        previous: "ContactSearch | None" = None,
+    ) -> None:
+        self._faces, self._owned, self._rest, self._distance = faces, owned, rest_mm, distance_mm
+        self._part: tuple[SurfacePart, SearchRange] | None = previous._part if previous else None
+        self._candidates: tuple[ipctk.Candidates, SearchRange] | None = previous._candidates if previous else None
+        self._mesh: ipctk.CollisionMesh | None = None
+        self._broad_phase = ipctk.LBVH()
+
+    def near(self, positions: Floats) -> NearPairs:
+        """Return the rank's pairs at (s, 3) positions in mm."""
+        part, mesh = self.part_at(positions)
+        candidates = self._candidates_at(positions)
+        if candidates is None:
+            part, mesh, candidates = self._search(self._rest, positions)
+        at = part.restrict(positions)
+        pairs = ipctk.NormalCollisions()
+        pairs.use_area_weighting = True
+        pairs.build(candidates, mesh, at, self._distance)
+        return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
+
+    def free_part(self, start: NearPairs, way: Floats) -> float:
+        """Return the part of a way (s, 3) in mm from near pairs' positions that leads to no touch, at most 1."""
+        # everything that is not a pair is farther away than the contact distance
+        gap = min(self._distance, start.gap_mm)
+        if 2 * float(np.linalg.norm(way, axis=1).max()) <= MAX_CLOSING * gap:
+            return 1.0
+        first, last = start.positions, start.positions + way
+        part, mesh = self.part_at(first, last)
+        candidates = self._candidates_at(first, last)
+        if candidates is None and np.abs(way).max() <= ROOM_MM:
+            # a step's first guess leads nearly to its end, so that this search serves the whole step
+            part, mesh, candidates = self._search(first, last)
+        ends = part.restrict(first), part.restrict(last)
+        if candidates is not None:
+            return float(candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=SWEEP))
+        return float(
+            ipctk.compute_collision_free_stepsize(mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=SWEEP)
+        )
+
+    def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
+        """Return a part of the surface that has the rank's pairs at each of some (s, 3) positions in mm."""
+        if self._part is None or not self._part[1].covers(self._distance, *positions):
+            way = max(float(np.abs(at - positions[0]).max()) for at in positions)
+            # a single rank's part is the whole surface, wherever it moves
+            room = np.inf if self._owned.all() else max(ROOM_MM, way)
+            around = SearchRange(positions[0], positions[0], self._distance / 2 + room)
+            self._part = part_of_surface(positions[0], self._faces, self._owned, 2 * around.reach), around
+            # candidates have the vertex numbers of the part before
+            self._mesh, self._candidates = None, None
+        part = self._part[0]
+        if self._mesh is None:
+            self._mesh = ipctk.CollisionMesh(part.restrict(self._rest), part.edges, part.faces)
+        return part, self._mesh
+
+    def _candidates_at(self, *positions: Floats) -> ipctk.Candidates | None:
+        if self._candidates is None or not self._candidates[1].covers(self._distance, *positions):
+            return None
+        return self._candidates[0]
+
+    def _search(self, first: Floats, last: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh, ipctk.Candidates]:
+        part, mesh = self.part_at(first, last)
+        reach = self._distance / 2 + MARGIN_MM
+        candidates = ipctk.Candidates()
+        candidates.build(mesh, part.restrict(first), part.restrict(last), reach, self._broad_phase)
+        self._candidates = candidates, SearchRange(first, last, reach)
+        return part, mesh, candidates

@@ -1,0 +1,89 @@
+"""The surface of contact: its position on every rank, and sums over the ranks of what each computes on its part."""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from ..geometry.tetrahedra import finer_surface
+from ..geometry.triangles import Floats
+from ..units import MM_PER_M
+from .domain import Domain, gathered
+from .surface_parts import SurfacePart
+
+
+class ContactSurface:
+    """The pial surface with the (f, 3) `facets`, vertex indices of the mesh, as contact takes it.
+
+    A curved face becomes 16 flat triangles whose vertices follow the nodes. Four triangles between the nodes would turn
+    an even pressure into uneven nodal forces, which press quadratic elements into waves of their own size.
+
+    Attributes: the `nodes` (n,) of the mesh on the surface, the (f, 3) `faces` by the surface's own s vertices, and
+    the `weights` (s, n) of the nodes at these, the first n of which are the nodes themselves.
+    """
+
+    def __init__(self, domain: Domain, facets: NDArray[np.int64]) -> None:
+        self.domain = domain
+        self.nodes, faces = np.unique(facets, return_inverse=True)
+        faces = faces.reshape(-1, 3)
+        self.weights = sparse.eye_array(len(self.nodes)).tocsr()
+        if domain.order == 2:
+            self.weights, faces = finer_surface(faces)
+        self.faces = faces
+        owned = domain.vertex_of_node[: domain.owned]
+        place = np.searchsorted(self.nodes, owned).clip(max=len(self.nodes) - 1)
+        self._local = np.flatnonzero(self.nodes[place] == owned)
+        self._rows_by_rank = domain.comm.allgather(place[self._local])
+        self._rows = self._rows_by_rank[domain.comm.rank]
+        self._gathered_rows = np.concatenate(self._rows_by_rank)
+        self._columns = domain.node_of_vertex[self.nodes]
+        self._part: SurfacePart | None = None
+
+    def reference_mm(self) -> Floats:
+        """Return the (s, 3) positions in mm on the mesh as it is placed."""
+        return np.asarray(self.weights @ self.domain.positions[self.nodes] * MM_PER_M)
+
+    def displacement_mm(self, u: Floats) -> Floats:
+        """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in m."""
+        return np.asarray(self.weights @ gathered(self.domain.comm, u[self._local], self._gathered_rows) * MM_PER_M)
+
+    def nodal_sum(self, part: SurfacePart, values: Floats) -> Floats:
+        """Return the (n, 3) sum over all ranks of (p, 3) values on their parts, moved to the nodes."""
+        self._interpolate(part)
+        return self.domain.summed(self._part_weights.T @ values)
+
+    def add_to(self, out: Floats, nodal: Floats) -> None:
+        """Add (n, 3) values at the nodes to the owned components (3 · owned,) of a vector."""
+        out.reshape(-1, 3)[self._local] += nodal[self._rows]
+
+    def matrix_sum(self, part: SurfacePart, matrix: sparse.csc_matrix | None) -> PETSc.Mat:
+        """Return the sum over all ranks of symmetric (3p, 3p) matrices on their parts, by all nodes of the mesh."""
+        comm, components = self.domain.comm, np.arange(3)
+        of_rank: list[sparse.csr_matrix | None] = [None] * comm.size
+        if matrix is not None:
+            self._interpolate(part)
+            nodal = sparse.csr_matrix(self._part_to_nodes @ matrix @ self._nodes_to_part)
+            of_rank = [nodal[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank]
+        # each rank gets from all others the rows that it owns
+        own, of_rank[comm.rank] = of_rank[comm.rank], None
+        received = [own, *comm.alltoall(of_rank)]
+        rows = sparse.csr_matrix((3 * len(self._rows), 3 * len(self.nodes)))
+        rows = sum((block for block in received if block is not None), rows)
+        counts = np.zeros((self.domain.owned, 3), dtype=PETSc.IntType)
+        counts[self._local] = np.diff(rows.indptr).reshape(-1, 3)
+        # owned rows are in the order of the nodes
+        start = np.concatenate([[0], np.cumsum(counts.ravel())]).astype(PETSc.IntType)
+        node, component = np.divmod(rows.indices, 3)
+        columns = (3 * self._columns[node] + component).astype(PETSc.IntType)
+        size = (3 * self.domain.owned, 3 * len(self.domain.positions))
+        result = PETSc.Mat().createAIJ((size, size), bsize=3, csr=(start, columns, rows.data), comm=comm)
+        result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return result
+
+    def _interpolate(self, part: SurfacePart) -> None:
+        """Make the matrices between the nodes and a part, unless they are those of the last call."""
+        if self._part is not part:
+            self._part, self._part_weights = part, self.weights[part.vertices]
+            components = sparse.kron(self._part_weights, np.eye(3), format="csr")
+            # both stored by columns, as the stiffness is: their product needs no conversion
+            self._nodes_to_part, self._part_to_nodes = components.tocsc(), components.T
