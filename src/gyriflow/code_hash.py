@@ -22,14 +22,18 @@ def code_hash(program: Path, *modules: Path) -> str:
 
 
 def modules_behind(program: Path) -> set[Path]:
-    """Return the files of all modules of this package that a Python program imports, directly or through others."""
+    """Return the files of all modules of this package that a Python program imports, directly or through others.
+
+    A module's C code, in a file of its name beside it, comes with it.
+    """
     reached: set[Path] = set()
     waiting = set(imported_modules(program))
     while waiting:
         module = waiting.pop()
         reached.add(module)
         waiting |= imported_modules(module) - reached
-    return reached - {program}
+    c_files = {file for module in reached if (file := module.with_suffix(".c")).is_file()}
+    return (reached | c_files) - {program}
 
 
 @cache

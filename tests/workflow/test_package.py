@@ -44,6 +44,9 @@ def test_the_wheel_carries_all_that_stands_beside_the_package(wheel):
     tracked = ran("git", "-C", CHECKOUT, "ls-files", "Snakefile", *folders).stdout.split()
     assert len(tracked) > 100
     assert {f"gyriflow/shipped/{name}" for name in tracked} <= names
+    sources = ran("git", "-C", CHECKOUT, "ls-files", "src/*.py", "src/*.c").stdout.split()
+    assert "src/gyriflow/folding/products.c" in sources
+    assert {name.removeprefix("src/") for name in sources} <= names
     assert "snakemake_logger_plugin_gyriflow/__init__.py" in names
     assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]
 

@@ -4,6 +4,7 @@ A linear solve leaves a thousandth of its right-hand side or more: digits beyond
 """
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import dolfinx
@@ -15,81 +16,17 @@ from numpy.typing import NDArray
 from ..geometry.triangles import Floats, Ints
 from .compilation import compiled
 
-DECLARATION = """void take(long count, void *entries, void *values, void *blocks);
-                 void to_single(long count, void *x, void *single);
+DECLARATION = """void to_single_blocks(long count, void *entries, void *values, void *blocks);
+                 void to_single_vectors(long count, void *x, void *single);
                  void multiply(long owned, void *ends, void *columns, void *blocks, void *x, void *sums, void *y);
                  void restrict_to_parts(long count, void *part, void *arms, void *x, void *of_parts);
                  void add_motions(long count, void *part, void *arms, void *of_parts, void *y);
                  void multiply_blocks(long count, void *blocks, void *x, void *y);"""
-CODE = """
-#include <stdint.h>
-#include <string.h>
-// the fourth number is the next one's first, or of no use
-typedef float v __attribute__((vector_size(16), aligned(4)));
-
-void take(long count, const int32_t *entries, const double (*values)[9], float (*blocks)[9]) {
-    for (long k = 0; k < count; k++) for (int i = 0; i < 9; i++) blocks[k][i] = values[entries[k]][i];
-}
-
-void to_single(long count, const double (*x)[3], float (*single)[4]) {
-    for (long k = 0; k < count; k++) for (int i = 0; i < 3; i++) single[k][i] = x[k][i];
-}
-
-void multiply(long owned, const int32_t *ends, const int32_t *columns, const float (*blocks)[9],
-              const float (*x)[4], float (*sums)[4], double (*y)[3]) {
-    memset(sums, 0, owned * sizeof *sums);
-    for (long i = 0; i < owned; i++) {
-        v row[3] = {0}, at = *(const v *)x[i];
-        for (int32_t k = ends[i]; k < ends[i + 1]; k++) {
-            long j = columns[k];
-            const float *block = blocks[k];
-            v a = *(const v *)block, b = *(const v *)(block + 3), c = *(const v *)(block + 6);
-            v there = *(const v *)x[j];
-            row[0] += a * there, row[1] += b * there, row[2] += c * there;
-            // of blocks beside the diagonal there is one for both of their places, but for other ranks' columns
-            if (j > i && j < owned) *(v *)sums[j] += a * at[0] + b * at[1] + c * at[2];
-        }
-        for (int l = 0; l < 3; l++) sums[i][l] += row[l][0] + row[l][1] + row[l][2];
-    }
-    for (long i = 0; i < owned; i++) for (int l = 0; l < 3; l++) y[i][l] = sums[i][l];
-}
-
-void restrict_to_parts(long count, const int32_t *part, const float (*arms)[3], const double (*x)[3],
-                       double (*of_parts)[6]) {
-    for (long k = 0; k < count; k++) {
-        const float *a = arms[k];
-        const double *f = x[k];
-        double *sum = of_parts[part[k]];
-        for (int i = 0; i < 3; i++) {
-            int j = (i + 1) % 3, l = (i + 2) % 3;
-            sum[i] += f[i], sum[3 + i] += a[j] * f[l] - a[l] * f[j];
-        }
-    }
-}
-
-void add_motions(long count, const int32_t *part, const float (*arms)[3], const double (*of_parts)[6], double (*y)[3]) {
-    for (long k = 0; k < count; k++) {
-        const float *a = arms[k];
-        const double *move = of_parts[part[k]], *turn = move + 3;
-        for (int i = 0; i < 3; i++) {
-            int j = (i + 1) % 3, l = (i + 2) % 3;
-            y[k][i] += move[i] + turn[j] * a[l] - turn[l] * a[j];
-        }
-    }
-}
-
-void multiply_blocks(long count, const float (*blocks)[3][3], const double (*x)[3], double (*y)[3]) {
-    for (long k = 0; k < count; k++) for (int i = 0; i < 3; i++) {
-        const float *row = blocks[k][i];
-        y[k][i] = row[0] * x[k][0] + row[1] * x[k][1] + row[2] * x[k][2];
-    }
-}
-"""
 
 
 @cache
 def _library() -> tuple[Any, Any]:
-    return compiled(MPI.COMM_SELF, DECLARATION, CODE)
+    return compiled(MPI.COMM_SELF, DECLARATION, Path(__file__).with_suffix(".c").read_text())
 
 
 def _call(function: str, count: int, *arrays: NDArray) -> None:
@@ -115,11 +52,11 @@ class SymmetricProducts:
 
     def take(self, values: Floats, entries: NDArray[np.int32]) -> None:
         """Take over the blocks, which are the given (b,) entries of (·, 3, 3) values."""
-        _call("take", len(entries), entries, values, self._blocks)
+        _call("to_single_blocks", len(entries), entries, values, self._blocks)
 
     def multiply(self, x: Floats, y: Floats) -> None:
         """Set the owned components y (3 · owned,) to the product with those of x."""
-        _call("to_single", self._owned, x, self._x.array)
+        _call("to_single_vectors", self._owned, x, self._x.array)
         self._x.scatter_forward()
         _call("multiply", self._owned, self._ends, self._columns, self._blocks, self._x.array, self._sums, y)
 

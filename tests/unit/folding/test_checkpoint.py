@@ -77,10 +77,11 @@ def test_the_key_knows_mesh_and_parameters_but_not_ranks():
 
 
 @pytest.mark.fault(34)
-def test_a_checkpoint_is_not_used_after_the_source_has_changed(tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", ["newton.py", "products.c"])
+def test_a_checkpoint_is_not_used_after_the_source_has_changed(name, tmp_path, monkeypatch):
     mesh, parameters = box_mesh((1, 1, 1), (1.0, 1.0, 1.0)), parameters_from(VALUES)
     (tmp_path / "folding").mkdir()
-    source, path = tmp_path / "folding" / "newton.py", tmp_path / "state.h5"
+    source, path = tmp_path / "folding" / name, tmp_path / "state.h5"
     monkeypatch.setattr(checkpoint, "modules_behind", lambda program: {source})
     monkeypatch.setattr(checkpoint, "room_of", lambda module: module.parent.name)
     keys = []
@@ -99,3 +100,5 @@ def test_the_key_of_a_run_does_not_depend_on_how_labels_are_read():
     behind = {path.name for path in modules_behind(Path(checkpoint.__file__).with_name("__main__.py"))}
     assert {"run.py", "varying.py", "tetrahedra.py", "materials.py"} <= behind
     assert not {"labels.py", "extraction.py", "brains.py"} & behind
+    c_files = {path.name for path in Path(checkpoint.__file__).parent.glob("*.c")}
+    assert {"products.c"} < c_files <= behind

@@ -174,9 +174,10 @@ def test_a_change_of_a_module_changes_the_hash(package, tmp_path):
     program = tmp_path / "judge.py"
     program.write_text("from gyriflow.mesh import quality")
     hashes = {code_hash(program)}
-    for name in ("unused.py", "mesh/quality.py"):
-        (package / name).write_text((package / name).read_text() + "\n# another line")
+    for name in ("unused.py", "mesh/quality.py", "unused.c", "mesh/quality.c"):
+        with (package / name).open("a") as file:
+            file.write("\n// another line")
         for remembered in (sources._digest, sources._files_of, sources.imported_modules):
             remembered.cache_clear()
         hashes.add(code_hash(program))
-        assert len(hashes) == {"unused.py": 1, "mesh/quality.py": 2}[name]
+        assert len(hashes) == {"unused.py": 1, "mesh/quality.py": 2, "unused.c": 2, "mesh/quality.c": 3}[name]

@@ -1,24 +1,9 @@
-"""Energy, forces and stiffness of linear elements as C code, for any energy of I₁ and J, eight elements at a time.
-
-With b = ∇N·Fg⁻¹ of the shape functions N, f = Fe·b and c = C·b, where C = ∂J/∂Fe are the cofactors of Fe, forces are
-2ψ₁f + ψⱼc per volume. Stiffness is their derivative; that of C is (C ⊗ C − the same with two indices exchanged) / J.
-"""
-
-import ufl
-from ufl.algorithms import expand_derivatives
-from ufl.core.expr import Expr
-
-from .materials import Material
-
-DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *G_inverse,
-                                 void *mu, void *forces, void *places, void *blocks);"""
-"""Returns the energy of `count` elements, and adds their forces and stiffness unless these are NULL.
-
-Of the nodes there are (·, 3) positions X, displacements u and forces; of each element the nodes `cells` (·, 4), the
-inverse growth tensor, the shear modulus, and the `places` (·, 4, 4) of its pairs of nodes among the blocks (·, 3, 3),
-negative where there is none.
-"""
-CODE = """
+// Energy, forces and stiffness of linear elements, eight at a time. The law's energy density psi and its derivatives are
+// functions of I1, J, mu and K that precede this file (mechanics/energy_code.py).
+//
+// With b = grad N . inverse(Fg) of the shape functions N, f = Fe b and c = C b, where C = dJ/dFe are the cofactors of
+// Fe, forces are 2 psi_I f + psi_J c per volume. Stiffness is their derivative; that of C is (C x C - the same with two
+// indices exchanged) / J.
 #include <math.h>
 #include <stdint.h>
 #define W 8
@@ -35,6 +20,9 @@ static inline v cofactors(v m[3][3], v c[3][3]) {  // returns the determinant
     return dot(m[0], c[0]);
 }
 
+// Returns the energy of `count` elements, and adds their forces and stiffness unless these are NULL. Nodes have (., 3)
+// positions X, displacements u and forces; elements have nodes `cells` (., 4), the inverse growth tensor, the shear
+// modulus, and the `places` (., 4, 4) of their pairs of nodes among the blocks (., 3, 3), negative where there is none.
 double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], const double (*X)[3],
                 const double (*u)[3], const double (*G_inverse)[3][3], const double *mu,
                 double (*forces)[3], const int32_t (*places)[4][4], double (*blocks)[3][3]) {
@@ -80,39 +68,11 @@ double assemble(long count, double bulk_to_shear, const int32_t (*cells)[4], con
                     + c[a][i] * (2 * of_IJ * f[d][j] + (of_JJ + exchanged) * c[d][j]) - exchanged * c[d][i] * c[a][j];
             EACH(i, 3) K[i][i] += 2 * of_I * dot(b[a], b[d]);
             EACH(l, lanes) {
-                int32_t here = places[first + l][a][d], mirrored = places[first + l][d][a];
-                if (here >= 0) EACH(i, 3) EACH(j, 3) blocks[here][i][j] += K[i][j][l];
+                int32_t upper = places[first + l][a][d], mirrored = places[first + l][d][a];
+                if (upper >= 0) EACH(i, 3) EACH(j, 3) blocks[upper][i][j] += K[i][j][l];
                 if (a != d && mirrored >= 0) EACH(i, 3) EACH(j, 3) blocks[mirrored][j][i] += K[i][j][l];
             }
         }
     }
     return energy;
 }
-"""
-
-
-def element_code(material: Material) -> str:
-    """Return the C code of a material's elements, with a function as in `DECLARATION`."""
-    # the values are never used: the variables stand for names in C
-    variables = {name: ufl.variable(ufl.as_ufl(1.0)) for name in ("I1", "J", "mu", "K")}
-    I1, J = variables["I1"], variables["J"]
-    psi = material.energy_of_invariants(**variables)
-    slopes = ufl.diff(psi, I1), ufl.diff(psi, J)
-    functions = dict(zip(("psi", "psi_I", "psi_J"), (psi, *slopes), strict=True))
-    functions |= {"psi_II": ufl.diff(slopes[0], I1), "psi_IJ": ufl.diff(slopes[0], J), "psi_JJ": ufl.diff(slopes[1], J)}
-    names = {variable: name for name, variable in variables.items()}
-    law = [
-        f"static inline double {name}(double I1, double J, double mu, double K) "
-        f"{{ return {_in_c(expand_derivatives(value), names)}; }}"
-        for name, value in functions.items()
-    ]
-    return "\n".join(["#include <math.h>", *law, CODE])
-
-
-def _in_c(value: Expr, names: dict[Expr, str]) -> str:
-    if value in names:
-        return names[value]
-    if not value.ufl_operands:
-        return repr(float(value))
-    forms = {"Sum": "({}+{})", "Product": "({}*{})", "Division": "({}/{})", "Power": "pow({},{})", "Ln": "log({})"}
-    return forms[type(value).__name__].format(*(_in_c(part, names) for part in value.ufl_operands))
