@@ -73,8 +73,8 @@ class EvenGrowth(Growth):
         return replace(self, start=start)
 
     def inverse(self, tissue):
-        cells, points = len(tissue.cells), len(tissue.points.weights)
-        return np.tile(np.eye(3) / (1 + self.by), (cells, points, 1, 1))
+        elements = tissue.elements
+        return np.tile(np.eye(3) / (1 + self.by), (len(elements.cells), len(elements.points.weights), 1, 1))
 
 
 def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):

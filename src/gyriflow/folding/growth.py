@@ -16,7 +16,7 @@ from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
-from .layers import Tissue
+from .tissue import Tissue
 from .zones import Zones
 
 NO_GROWTH = 1e-10

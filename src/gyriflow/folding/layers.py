@@ -4,9 +4,6 @@ Plain NumPy on whole arrays. Every rank builds the same search structures from t
 do not depend on the number of ranks.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -16,8 +13,6 @@ from ..geometry.triangles import Floats, Ints, TriangleMesh, corners, unit, vert
 from ..settings.folding import FoldingParameters
 from ..settings.terms import CORTICAL_STEEPNESS
 from ..settings.varying import Maps, value_at
-from ..units import M_PER_MM, MM_PER_M
-from .points import IntegrationPoints
 
 WEIGHT_REACH = 3.0
 """Depth in cortical thicknesses beyond which the cortical weight, below 1e-8, is taken as 0."""
@@ -107,98 +102,3 @@ class PialSearch:
         neighbours = min(8, len(self.pial))
         index = self.tree.query(points, k=neighbours)[1].reshape(len(points), neighbours)
         return self.normals_from(points, index)
-
-
-def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
-    """Return the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
-
-    Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
-    turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
-    for it. `smooth` and `bounded` are weights of the nodes at the points, see `IntegrationPoints`.
-    """
-    turned = normals * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[:, :, None]
-    mean = np.matmul(smooth, turned)
-    length = np.linalg.norm(mean, axis=2, keepdims=True)
-    heaviest = turned[:, bounded.argmax(axis=1)]
-    return np.where(length > 0.1, mean / np.maximum(length, 0.1), heaviest)
-
-
-@dataclass(frozen=True, eq=False)
-class Tissue:
-    """The tissue of a rank's elements at a step's start: how deep it lies, whether it grows, and its maps.
-
-    Linear elements have it at their nodes, quadratic ones at their integration points, so that the cortical weight may
-    fall from 1 to 0 within an element. There the depth is quadratic between the nodes; what jumps between them, growth
-    and maps, is linear between them.
-
-    `cells` (c, 4) or (c, 10) are the local nodes of the elements, `vertices` (k,) their numbers in the whole mesh,
-    `nodes` (k, 3) their positions and `depth` (k,) their distances to the pial surface, in m. `nearest` are the pial
-    vertices (k,) nearest to the nodes of linear elements, or normals (k, 3) at those of quadratic ones. Cortical
-    `weight`, `growing` (1, else 0) and parameters' `maps` are (k,) at nodes or (c, q) at the points.
-    """
-
-    cells: NDArray[np.integer]
-    vertices: NDArray[np.integer]
-    points: IntegrationPoints
-    nodes: Floats
-    depth: Floats
-    pial: PialSearch
-    nearest: NDArray
-    weight: Floats
-    growing: Floats
-    maps: Maps
-
-    @classmethod
-    def of(
-        cls,
-        cells: NDArray[np.integer],
-        vertices: NDArray[np.integer],
-        points: IntegrationPoints,
-        nodes: Floats,
-        pial: PialSearch,
-        growing: Floats,
-        maps: Maps,
-        thickness_mm: Callable[[Maps], float | Floats],
-        thickest_mm: float,
-    ) -> "Tissue":
-        """Return the tissue from (k,) `growing` and maps at the nodes, other parameters as the attributes.
-
-        `thickness_mm` gives the cortex's where maps have their values, `thickest_mm` is its largest anywhere.
-        """
-        reach = WEIGHT_REACH * thickest_mm * M_PER_MM
-        nearest: NDArray
-        if points.order == 1:
-            to_vertex, nearest = pial.tree.query(nodes)
-            depth = pial.distance(nodes, reach, to_vertex)
-            weight = cortical_weight(depth * MM_PER_M, thickness_mm(maps))
-        else:
-            depth, nearest = pial.distance_and_normals(nodes, reach)
-            growing, maps = (
-                growing[cells] @ points.bounded.T,
-                {name: values[cells] @ points.bounded.T for name, values in maps.items()},
-            )
-            within = np.maximum(depth[cells] @ points.smooth.T, 0.0)
-            weight = cortical_weight(within * MM_PER_M, thickness_mm(maps))
-        return cls(cells, vertices, points, nodes, depth, pial, nearest, weight, growing, maps)
-
-    def at_points(self, values: Floats) -> Floats:
-        """Return (..., c, q) values at the integration points from those at the tissue's own places."""
-        return values[..., self.cells] @ self.points.smooth.T if self.points.order == 1 else values
-
-    def from_vertices(self, values: Floats, chunk: slice) -> Floats:
-        """Return (..., c, q) values at the points of some elements, linear between those (..., n) of the whole mesh."""
-        linear = self.points.smooth if self.points.order == 1 else self.points.bounded
-        return np.asarray(values[..., self.vertices[self.cells[chunk]]] @ linear.T)
-
-    def normals(self, wanted: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
-        """Return which elements (c,) hold a place where a normal is `wanted`, and their (w, q, 3) unit normals.
-
-        Linear elements have one normal each, that of the pial vertex nearest to their centres.
-        """
-        if self.points.order == 1:
-            chosen = np.asarray(wanted[self.cells].any(axis=1))
-            of_cells = self.cells[chosen]
-            normals = self.pial.normals_from(self.nodes[of_cells].mean(axis=1), self.nearest[of_cells])
-            return chosen, np.repeat(normals[:, None], len(self.points.weights), axis=1)
-        chosen = np.asarray(wanted.any(axis=1))
-        return chosen, normals_between(self.nearest[self.cells[chosen]], self.points.smooth, self.points.bounded)

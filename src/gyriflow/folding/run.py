@@ -3,6 +3,7 @@
 import math
 import shutil
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,11 +14,12 @@ from mpi4py import MPI
 
 from ..errors import SolverError
 from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from ..geometry.triangles import Floats
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, read_positions, write_frame
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
-from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
+from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, progress_line, say, warn
 from .simulation import Folding, advance
@@ -35,10 +37,10 @@ def run(
     *,
     may_diverge: bool = False,
 ) -> None:
-    """Folds a brain from the first to the last output week and writes frames, step table and summary into `out`.
+    """Simulate a brain from the first to the last output week; write frames, step table and summary into `out`.
 
-    Goes on from a checkpoint in `out` that belongs to this mesh and these parameters. A run that diverges raises
-    SolverError; where it `may_diverge` it ends with the output weeks that it has reached, and its summary says why.
+    A checkpoint in `out` of this mesh and these parameters is continued. A run that diverges raises SolverError; where
+    it `may_diverge`, it ends with the output weeks that it has reached, and its summary gives the reason.
     """
     began = time.monotonic()
     folding = Folding(comm, mesh, zones, parameters, maps)
@@ -46,87 +48,109 @@ def run(
     folder = out / f"checkpoint-{key}"
     state, message = comm.bcast(resumable(folder, key, parameters) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
-        for note in (message, *foreign_checkpoints(out, folder), shortened_steps(parameters)):
-            if note:
-                say(note)
-    start, weeks, wanted = mesh.vertices * M_PER_MM, parameters.output_weeks, parameters.fields
-
-    def save(week: float, state: State) -> State:
-        """Write the frame of a week and return the state to go on with; all ranks have to take part."""
-        solved = folding.solved
-        contact, elements = folding.fields.contact_pressure(wanted, solved), folding.fields.elements(wanted, solved)
-        # a mean over the steps since the last frame: before the first one, that step's
-        grown = solved.growth.logarithm() if state.grown is None else state.grown * (parameters.step_s / state.grown_s)
-        if comm.rank == 0:
-            fields = {"positions": state.positions * MM_PER_M}
-            if "displacement" in wanted:
-                fields["displacement_mm"] = (state.positions - start) * MM_PER_M
-            shown = zones, solved.growth.parameters, maps, week, wanted, grown
-            write_frame(
-                frame_path(folder, week), week, fields | layer_fields(fields["positions"], *shown) | contact, elements
-            )
-        return replace(state, grown=None, grown_s=0.0)
-
+        for note in filter(None, (message, *foreign_checkpoints(out, folder), shortened_steps(parameters))):
+            say(note)
     if state is None:
-        state = State.at_start(start, parameters.step_s)
-        state = save(weeks[0], state)
-    first, resumed, diverged = len(state.rows), time.monotonic(), None
-    for week in weeks[1:]:
-        until = seconds_to(week, parameters)
-        while state.time_s < until * (1 - 1e-12) and diverged is None:
-            try:
-                state = advance(folding, state, until)
-            except SolverError as error:
-                if not may_diverge:
-                    raise
-                diverged = str(error)
-                break
-            arrived = until - state.time_s < 1e-9 * until
-            if arrived:
-                state = save(week, state)
-            if comm.rank == 0:
-                if arrived and (missed := missed_curves(state.rows[-1])):
-                    warn(missed)
-                write_checkpoint(folder / "state.h5", key, state)
-                row, end_week = state.rows[-1], parameters.end_week
-                rate = (time.monotonic() - resumed) / (len(state.rows) - first)
-                left_s = rate * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
-                facts = {"week": row["week"], "end_week": end_week, "step": row["step"], "left_s": left_s}
-                say(progress_line(row, end_week, left_s), "step", **facts)
+        state = State.at_start(folding.start, parameters.step_s)
+        state = save_frame(folding, state, parameters.output_weeks[0], folder)
+    resumed_after = len(state.rows)
+    state, diverged = simulate(folding, state, folder, key, may_diverge=may_diverge)
     memory = comm.reduce(peak_memory_mib(), op=MPI.SUM, root=0)
     processor = comm.reduce(time.process_time(), op=MPI.SUM, root=0)
     if comm.rank == 0:
-        steps = [row["seconds"] for row in state.rows]
         reached = parameters.start_week + state.time_s / SECONDS_PER_GW
-        weeks = tuple(week for week in weeks if week <= reached + 1e-9)
+        weeks = [week for week in parameters.output_weeks if week <= reached + 1e-9]
         join_frames(out / FRAMES, mesh.tets, [frame_path(folder, week) for week in weeks])
-        meshes = (TetrahedralMesh(read_positions(out / FRAMES, week), mesh.tets) for week in weeks)
+        seconds = time.monotonic() - began
         summary = {
             "tets": len(mesh.tets),
             "dofs": 3 * len(mesh.vertices),
             "pial_faces": len(zones.facets),
             "ranks": comm.size,
-            "steps": len(steps),
-            "newton": sum(row["newton"] for row in state.rows),
-            "krylov": sum(row["krylov"] for row in state.rows),
-            "seconds": time.monotonic() - began,
+            **steps_summary(state.rows),
+            "seconds": seconds,
             "cpu_seconds": processor,
-            "seconds_per_step": float(np.median(steps)) if steps else math.nan,
             "peak_memory_MiB": memory,
-            "min_J": min((row["min_J"] for row in state.rows), default=math.nan),
-            "weeks": list(weeks),
-            "radius_ratio_01": [float(np.quantile(radius_ratios(one), 0.01)) for one in meshes],
+            "weeks": weeks,
+            "radius_ratio_01": [smallest_radius_ratios(mesh, read_positions(out / FRAMES, week)) for week in weeks],
             "reached_week": reached,
             "diverged": diverged,
-            "resumed_after_step": first,
+            "resumed_after_step": resumed_after,
         }
         write_table(out / STEPS, pd.DataFrame(list(state.rows)))
         write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)
         if diverged is not None:
             warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
-        ended = f"folded to GW {reached:g} in {len(steps)} steps, {summary['seconds']:.0f} s"
+        ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
         say(ended, "end", week=reached, error=diverged)
+
+
+def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool) -> tuple[State, str | None]:
+    """Return the state at the end of a run, with a frame in `folder` for each output week and a checkpoint a step.
+
+    Where a run that `may_diverge` does so, the state is the last good one, and the reason comes with it.
+    """
+    p, rank = folding.parameters, folding.domain.comm.rank
+    resumed_after, resumed = len(state.rows), time.monotonic()
+    for week in p.output_weeks[1:]:
+        until = seconds_to(week, p)
+        while state.time_s < until * (1 - 1e-12):
+            try:
+                state = advance(folding, state, until)
+            except SolverError as error:
+                if not may_diverge:
+                    raise
+                return state, str(error)
+            arrived = until - state.time_s < 1e-9 * until
+            if arrived:
+                state = save_frame(folding, state, week, folder)
+            if rank == 0:
+                if arrived and (missed := missed_curves(state.rows[-1])):
+                    warn(missed)
+                write_checkpoint(folder / "state.h5", key, state)
+                report_step(state, p, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
+    return state, None
+
+
+def save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
+    """Write the frame of a week and return the state to continue with; collective over the ranks."""
+    names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
+    pressure, elements = folding.fields.contact_pressure(names, solved), folding.fields.elements(names, solved)
+    # a mean over the steps since the last frame; before the first one, that step's
+    grown = solved.growth.logarithm() if state.grown is None else state.grown * (p.step_s / state.grown_s)
+    if folding.domain.comm.rank == 0:
+        fields = {"positions": state.positions * MM_PER_M}
+        if "displacement" in names:
+            fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
+        rates = solved.growth.parameters
+        fields |= layer_fields(fields["positions"], folding.zones, rates, folding.maps, week, names, grown)
+        write_frame(frame_path(folder, week), week, fields | pressure, elements)
+    return replace(state, grown=None, grown_s=0.0)
+
+
+def report_step(state: State, parameters: FoldingParameters, seconds_per_step: float) -> None:
+    """Print the progress line of the last step."""
+    row, end_week = state.rows[-1], parameters.end_week
+    left_s = seconds_per_step * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
+    facts = {"week": row["week"], "end_week": end_week, "step": row["step"], "left_s": left_s}
+    say(progress_line(row, end_week, left_s), "step", **facts)
+
+
+def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
+    """Return totals over the step table."""
+    return {
+        "steps": len(rows),
+        "newton": sum(row["newton"] for row in rows),
+        "krylov": sum(row["krylov"] for row in rows),
+        "seconds_per_step": float(np.median([row["seconds"] for row in rows])) if rows else math.nan,
+        "min_J": min((row["min_J"] for row in rows), default=math.nan),
+    }
+
+
+def smallest_radius_ratios(mesh: TetrahedralMesh, positions: Floats) -> float:
+    """Return the first centile of the elements' radius ratios, for vertices at (n, 3) positions."""
+    return float(np.quantile(radius_ratios(TetrahedralMesh(positions, mesh.tets)), 0.01))
 
 
 def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:

@@ -21,13 +21,14 @@ from .diagnosis import contact_row, elements_through, resolution_warning, unconv
 from .domain import Domain
 from .growth import Growth, GrowthInputs, StepStart
 from .growth_models import growth_model
-from .layers import PialSearch, Tissue, shear_modulus
+from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, Solution
 from .output import say, warn
 from .problem import NonlinearProblem
 from .step_fields import SolvedStep, StepFields
 from .stress import left_stretch, packed, relaxed, unpacked
+from .tissue import Elements, Tissue
 from .zones import Zones
 
 PENALTY_PA_PER_M = 5.0e5
@@ -39,8 +40,9 @@ STEPS_BEFORE_GROWING = 4
 class Folding:
     """A brain that folds: the solver's objects, made once, and one step at a time.
 
-    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `solved` is the last step
-    that was accepted, at first one without displacement; `fields` gives its fields, until the next step begins.
+    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions
+    in m. `solved` is the last step that was accepted, at first one without displacement; `fields` gives its fields,
+    until the next step begins.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Folding:
         self.zones, self.maps = zones, maps or {}
         require_maps(p, self.maps, len(mesh.vertices))
         self.domain = Domain(comm, mesh)
+        self.start = self.domain.positions
         self.problem = NonlinearProblem(
             self.domain,
             zones,
@@ -77,8 +80,7 @@ class Folding:
         self.model = growth_model(p, self.inputs, mesh.vertices, share)
         self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
         self.fields = StepFields(self.problem, self.contact, zones, p)
-        self._growing = self.domain.local(zones.growth)
-        self._local_maps = {name: self.domain.local(self.maps[name]) for name in p.varying_maps}
+        self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
         self._pial = np.unique(zones.cortex_facets)
 
     def step(self, state: State, step_s: float) -> State:
@@ -120,17 +122,7 @@ class Folding:
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
             domain.place(state.positions)
-        tissue = Tissue.of(
-            domain.cells,
-            domain.vertex_of_node,
-            self.problem.points,
-            domain.local(domain.positions),
-            PialSearch(domain.positions, self.zones.cortex_facets),
-            self._growing,
-            self._local_maps,
-            lambda maps: value_at(p.thickness_mm, week, maps),
-            float(np.max(value_at(p.thickness_mm, week, self.maps))),
-        )
+        tissue = Tissue.of(self.elements, state.positions, self.zones, self.maps, p, week)
         part = domain.part
         if self.contact is not None:
             self.contact.begin_step(state.rows[-1] if state.rows else None)

@@ -17,9 +17,9 @@ from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
 from ..settings.folding import AXES, FoldingParameters
 from .growth import Floats, Growth, GrowthInputs, Size, StepStart
-from .layers import Tissue
 from .stress import unpacked
 from .stretches import Stretches
+from .tissue import Tissue
 
 SMOOTHING_MM = 1.5
 """Standard deviation that growth is smoothed with in space."""
@@ -41,9 +41,10 @@ class TargetGrowth(Growth):
     away_mm: float
 
     def inverse(self, tissue: Tissue) -> Floats:
-        inverse = np.empty((len(tissue.cells), len(tissue.points.weights), 3, 3))
+        elements = tissue.elements
+        inverse = np.empty((len(elements.cells), len(elements.points.weights), 3, 3))
         for chunk in chunks(len(inverse)):
-            logs = tissue.from_vertices(self.strain, chunk)
+            logs = tissue.interpolate(self.strain, chunk)
             inverse[chunk] = inverse_exponential(unpacked(np.moveaxis(logs, 0, -1)))
         return inverse
 

@@ -10,9 +10,10 @@ from ellipsoid import RUN, SEMI_AXES
 from shapes import box_mesh, ellipsoid_mesh
 
 from gyriflow.folding.growth import GrowthByRates, StepStart
-from gyriflow.folding.layers import PialSearch, cortical_weight, normals_between
+from gyriflow.folding.layers import PialSearch, cortical_weight
 from gyriflow.folding.output import layer_fields
 from gyriflow.folding.points import IntegrationPoints
+from gyriflow.folding.tissue import normals_between
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.jacobians import NODES
 from gyriflow.geometry.tetrahedra import boundary_faces
