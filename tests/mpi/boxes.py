@@ -7,7 +7,7 @@ from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.folding.domain import Domain
-from gyriflow.folding.growth import Growth, layered_inverse
+from gyriflow.folding.growth import StepGrowth, layered_inverse
 from gyriflow.folding.newton import NewtonSettings, NewtonSolver
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.zones import Zones
@@ -64,7 +64,7 @@ def set_layers(problem, mu, dg, dr, normals, V=None):
 
 
 @dataclass(frozen=True, eq=False)
-class EvenGrowth(Growth):
+class EvenGrowth(StepGrowth):
     """Growth by the same part in all directions everywhere, and the model of it."""
 
     by: float

@@ -1,7 +1,4 @@
-"""Growth: what the solver knows of it, its tensor G in a step, and growth by rates.
-
-A new growth model is a subclass of `Growth`, a function that makes it for a step, and a line in `growth_models`.
-"""
+"""Growth of tissue in a step: the interface of growth models to the solver, its tensor G, and growth by rates."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -78,7 +75,7 @@ class StepStart:
 
 
 @dataclass(frozen=True, eq=False)
-class Growth(ABC):
+class StepGrowth(ABC):
     """How tissue grows in one step: by the run's parameters with the step's rates, which frames show."""
 
     parameters: FoldingParameters
@@ -101,12 +98,12 @@ class Growth(ABC):
         return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
 
 
-GrowthModel = Callable[[StepStart], Growth]
+StepModel = Callable[[StepStart], StepGrowth]
 """Says how tissue grows in each step."""
 
 
 @dataclass(frozen=True, eq=False)
-class GrowthByRates(Growth):
+class GrowthByRates(StepGrowth):
     """Growth by the parameters' rates of cortex and core, as in the middle of the step."""
 
     def inverse(self, tissue: Tissue) -> Floats:

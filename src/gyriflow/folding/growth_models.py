@@ -1,18 +1,23 @@
-"""The growth model of a run."""
+"""The growth model of a run, by the name that the configuration has for it."""
 
+from collections.abc import Callable
 from functools import partial
 
 from ..geometry.diffusion import ALONE, Share
+from ..geometry.triangles import Floats
 from ..settings.folding import FoldingParameters
-from .growth import Floats, GrowthByRates, GrowthInputs, GrowthModel
+from .growth import GrowthByRates, GrowthInputs, StepModel
 from .steering import SteeredGrowth
 from .targets import GrowthToTargets
 
+BUILDERS: dict[str, Callable[[FoldingParameters, GrowthInputs, Floats, Share], StepModel]] = {
+    "rates": lambda p, inputs, positions_mm, share: partial(GrowthByRates, p),
+    "sizes": lambda p, inputs, positions_mm, share: SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth,
+    "shapes": lambda p, inputs, positions_mm, share: GrowthToTargets.of(p, inputs, share).growth,
+}
+"""Functions of parameters, inputs, (n, 3) positions at the start and the ranks' share of work that make a model."""
 
-def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats, share: Share = ALONE) -> GrowthModel:
+
+def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats, share: Share = ALONE) -> StepModel:
     """Return the model of a run that starts at (n, 3) positions, for ranks that `share` its work."""
-    if p.targets:
-        return GrowthToTargets.of(p, inputs, share).growth
-    if p.growth.model == "sizes":
-        return SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth
-    return partial(GrowthByRates, p)
+    return BUILDERS[p.growth.model](p, inputs, positions_mm, share)

@@ -19,7 +19,7 @@ from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact
 from .diagnosis import contact_row, elements_through, resolution_warning, unconverged_warning, worst_places
 from .domain import Domain
-from .growth import Growth, GrowthInputs, StepStart
+from .growth import GrowthInputs, StepGrowth, StepStart
 from .growth_models import growth_model
 from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
@@ -116,7 +116,7 @@ class Folding:
         row["seconds"] = time.monotonic() - began
         return after
 
-    def begin(self, state: State, step_s: float) -> tuple[Tissue, Growth]:
+    def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
         """Set the problem of a step, and return the tissue with the layers of the step's middle, and the growth."""
         start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.learnt)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)

@@ -15,7 +15,7 @@ from ..geometry.triangles import TriangleMesh, area_vectors
 from ..settings.folding import FoldingParameters
 from ..settings.varying import value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .growth import Floats, Growth, GrowthByRates, GrowthInputs, Size, StepStart, increments
+from .growth import Floats, GrowthByRates, GrowthInputs, Size, StepGrowth, StepStart, increments
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
 
 JOINING_GW = 1.0
@@ -64,7 +64,7 @@ class SteeredGrowth:
     inputs: GrowthInputs
     at_start: Size
 
-    def growth(self, start: StepStart) -> Growth:
+    def growth(self, start: StepStart) -> StepGrowth:
         p, week = self.parameters, start.week(self.parameters, 1.0)
         before, aim = self.inputs.size(start.positions_mm), self.aim(week)
         made, other = free_growth(p, start.positions_mm, self.inputs, week)

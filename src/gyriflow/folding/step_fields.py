@@ -14,7 +14,7 @@ from ..settings.folding import FoldingParameters
 from ..settings.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
 from .contact import SelfContact
-from .growth import Growth
+from .growth import StepGrowth
 from .layers import PialSearch
 from .problem import NonlinearProblem
 from .zones import Zones
@@ -26,7 +26,7 @@ class SolvedStep:
 
     displacement: Floats
     step_s: float
-    growth: Growth
+    growth: StepGrowth
 
 
 class StepFields:

@@ -16,7 +16,7 @@ from ..geometry.deformations import transform_points
 from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
 from ..settings.folding import AXES, FoldingParameters
-from .growth import Floats, Growth, GrowthInputs, Size, StepStart
+from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
 from .stress import unpacked
 from .stretches import Stretches
 from .tissue import Tissue
@@ -30,7 +30,7 @@ SOON_GW = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class TargetGrowth(Growth):
+class TargetGrowth(StepGrowth):
     """Growth of a step towards a shape.
 
     `strain` (6, n) is the logarithm of G at all vertices, `away_mm` the root mean square distance from the shape at the
@@ -77,7 +77,7 @@ class GrowthToTargets:
             )
         return cls(p, inputs, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
-    def growth(self, start: StepStart) -> Growth:
+    def growth(self, start: StepStart) -> StepGrowth:
         """Return the growth of a step: its part of what is left to the next target.
 
         A step across a target leads to the shape between it and the one after it.

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import count
@@ -15,6 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
+from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
 from .labels import metric_title, plain, week_label
 from .tables import brain_table, html_table, predicted_table, span, standing, worth_table
@@ -240,8 +241,16 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
 
 
 def methods_text(template: str, **used: Any) -> str:
-    """Return the methods of a study as reStructuredText, with citations: a template filled with what was run."""
-    return Environment(undefined=StrictUndefined, keep_trailing_newline=True).from_string(template).render(**used)
+    """Return the methods of a study as reStructuredText, with citations: a template filled with what was run.
+
+    The template gets `growth_sentence(run, number)`, the sentence of the run's growth model; `number` formats numbers.
+    """
+
+    def growth_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+        return GROWTH_MODELS[run["parameters"]["growth"]["model"]].sentence(run, number)
+
+    environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(template).render(growth_sentence=growth_sentence, **used)
 
 
 def picture(address: str, inches: float, alt: str) -> Markup:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, fi
 
 from ..errors import InputError
 from .base import KeyProblem, Settings, line, validated
-from .growth import SIZES, Growth
+from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
     EndWeek,
@@ -141,9 +141,9 @@ class FoldingSettings(Settings):
     """MPI ranks of a simulation."""
 
     def problems(self) -> Iterator[KeyProblem]:
-        for key in ("growth_rate_per_s", "core_growth_rate_per_s"):
-            if SIZES[0] in self.growth.own_keys() and self.is_set(key):
-                yield KeyProblem(f"has no meaning with the growth model {self.growth.model}", (key,))
+        for key in GROWTH_RATES:
+            if key not in self.growth.definition.rates and self.is_set(key):
+                yield KeyProblem(f"is not used by the growth model {self.growth.model}; remove it", (key,))
 
     @field_validator("*")
     @classmethod
@@ -195,6 +195,9 @@ class FoldingParameters(FoldingSettings):
         weeks, ends = list(self.output_weeks), [self.start_week, self.end_week]
         if weeks != sorted(set(weeks)) or [*weeks[:1], *weeks[-1:]] != ends:
             yield KeyProblem(f"found {weeks}; they should ascend from start_week to end_week", ("output_weeks",))
+        if (self.growth.definition.measured == "shapes") != bool(self.targets):
+            text = "is not used by" if self.targets else "is missing; it is needed by"
+            yield KeyProblem(f"{text} the growth model {self.growth.model}", ("targets",))
         yield from value_problems(self, self.start_week, {})
 
 

@@ -1,6 +1,7 @@
-"""The section `folding.growth`: by which of three models the brain grows."""
+"""The section `folding.growth`, and the growth models: what all parts of gyriflow but the solver know of them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
@@ -16,10 +17,83 @@ SizeCurve = Annotated[
 """A size by gestational week, or the curve through the measured brains."""
 SIZES = ("area_cm2", "volume_ml")
 """Keys of the sizes that growth can follow."""
-MODELS_OF_KEY = {
-    "of": ("shapes",),
-    "thickness_mm": ("sizes", "shapes"),
-    **dict.fromkeys(SIZES, ("sizes", "shapes")),
+ModelName = Literal["rates", "sizes", "shapes"]
+
+
+@dataclass(frozen=True)
+class GrowthModel:
+    """What configuration, planning, figures and methods text need to know of a growth model.
+
+    Attributes
+    ----------
+    keys
+        Keys of `folding.growth` that a configuration may give for it, besides `model`.
+    resolved
+        Further keys of `folding.growth` that only the program gives, in a run's `params.yaml`.
+    rates
+        Growth rates of `folding` that it uses.
+    measured
+        What it follows of measured brains; a run that follows the observed brains themselves is `explained`, all others
+        are `predicted`.
+    sentence
+        Returns its sentence of the methods text for a run (with `parameters` and `growth_of`), given how numbers are
+        written.
+    """
+
+    keys: tuple[str, ...]
+    rates: tuple[str, ...]
+    measured: Literal["sizes", "shapes"] | None
+    sentence: Callable[[Mapping[str, Any], Callable[[Any], str]], str]
+    resolved: tuple[str, ...] = ()
+
+
+def _rates_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+    cortex, core = (number(run["parameters"][f"{name}growth_rate_per_s"]) for name in ("", "core_"))
+    return f"The cortex grew tangentially at {cortex} per second, the core at {core}."
+
+
+def _sizes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+    source = f" through brains of several subjects ({run['growth_of']}), {NOT_OWN}" if _of_population(run) else ""
+    return f"Growth rates of cortex and core were set in each step so that area and volume followed curves{source}."
+
+
+def _shapes_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
+    if _of_population(run):
+        target = f"that given by the growth of several subjects ({run['growth_of']}), {NOT_OWN}"
+    elif run["parameters"]["growth"]["of"] == "atlas":
+        target = "that given by the growth of an atlas"
+    else:
+        target = "its own later shape"
+    return f"In each step the brain grew towards a target shape for the next known week: {target}."
+
+
+NOT_OWN = "a population's growth and not the subject's own"
+
+
+def _of_population(run: Mapping[str, Any]) -> bool:
+    return run["growth_of"].startswith("population")
+
+
+GROWTH_MODELS: dict[ModelName, GrowthModel] = {
+    "rates": GrowthModel(
+        keys=(),
+        rates=("growth_rate_per_s", "radial_growth_rate_per_s", "core_growth_rate_per_s"),
+        measured=None,
+        sentence=_rates_sentence,
+    ),
+    "sizes": GrowthModel(
+        keys=("thickness_mm", *SIZES),
+        rates=("radial_growth_rate_per_s",),
+        measured="sizes",
+        sentence=_sizes_sentence,
+    ),
+    "shapes": GrowthModel(
+        keys=("of", "thickness_mm"),
+        rates=(),
+        measured="shapes",
+        sentence=_shapes_sentence,
+        resolved=SIZES,
+    ),
 }
 BEFORE_GW = 1.0
 """How far before the first week of an atlas a brain may be that is to grow as the atlas does."""
@@ -30,7 +104,7 @@ class Growth(Settings):
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string", "null"]})
 
-    model: Literal["rates", "sizes", "shapes"] = "rates"
+    model: ModelName = "rates"
     """`rates`: those of the keys that end with `growth_rate_per_s`; `sizes`: in each step the rates of cortex and
     core that lead to curves of area and volume, which a brain off its curves joins within a week; `shapes`: in each
     step what takes the brain to the shape that it is to have by the next known week."""
@@ -50,14 +124,24 @@ class Growth(Settings):
     def _model_alone(cls, raw: Any) -> Any:
         return {"model": raw} if isinstance(raw, str) else raw
 
+    @property
+    def definition(self) -> GrowthModel:
+        """The growth model."""
+        return GROWTH_MODELS[self.model]
+
     def own_keys(self) -> dict[str, Any]:
-        """Return the model and the keys that mean something with it, as they are written in a file."""
-        values = self.model_dump(mode="json")
-        return {key: value for key, value in values.items() if self.model in MODELS_OF_KEY.get(key, (self.model,))}
+        """Return the model and the keys that it uses, as they are written in a file."""
+        return self.model_dump(mode="json", include={"model", *self.definition.keys, *self.definition.resolved})
+
+    def unused_keys(self, used: Collection[str]) -> Iterator[KeyProblem]:
+        """Yield the problems of keys that are given but not among those used."""
+        for key, field in type(self).model_fields.items():
+            if key not in ("model", *used) and getattr(self, key) != field.default:
+                users = [name for name, model in GROWTH_MODELS.items() if key in model.keys]
+                remedy = f"remove it, or use the model {' or '.join(users)}"
+                yield KeyProblem(f"is not used by the growth model {self.model}; {remedy}", (key,))
 
     def problems(self) -> Iterator[KeyProblem]:
-        for key, models in MODELS_OF_KEY.items():
-            if self.model not in models and getattr(self, key) != type(self).model_fields[key].default:
-                yield KeyProblem(f"has no meaning with the model {self.model}; expected {' or '.join(models)}", (key,))
+        yield from self.unused_keys((*self.definition.keys, *self.definition.resolved))
         if self.of == "atlas" and self.thickness_mm == "measured":
             yield KeyProblem("is measured on the start's own later brains, unknown to a prediction", ("thickness_mm",))

@@ -75,11 +75,8 @@ class Run(FoldingSettings):
 
     # unlike `folding`, a run may have rates that its growth model does not use
     def problems(self) -> Iterator[KeyProblem]:
-        for key in SIZES:
-            if self.growth.model == "shapes" and getattr(self.growth, key) != "measured":
-                yield KeyProblem(
-                    "is not used by the growth model shapes; remove it, or use the model sizes", ("growth", key)
-                )
+        for problem in self.growth.unused_keys(self.growth.definition.keys):
+            yield KeyProblem(problem.text, ("growth", *problem.key))
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:

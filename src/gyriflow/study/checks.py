@@ -268,4 +268,6 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
 
 def _is_curve(key: str, base: Run) -> bool:
     value = getattr(base, key) if key in VARYING else None
-    return base.growth.model == "sizes" if key in CURVE_KEYS else isinstance(value, Varying) and bool(value.weeks)
+    if key in CURVE_KEYS:
+        return key.removeprefix("growth.") in base.growth.definition.keys
+    return isinstance(value, Varying) and bool(value.weeks)

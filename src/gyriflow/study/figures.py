@@ -151,7 +151,7 @@ GROWTH_RATES = Kind(
 def growth_figure(study: Study) -> Figure:
     # runs that follow sizes or shapes have no rate of their own
     settings = [simulation.settings for simulation in study.simulations.values()]
-    grown = [run for run in settings if run.growth.model == "rates"]
+    grown = [run for run in settings if "growth_rate_per_s" in run.growth.definition.rates]
     rate: Any = grown[0].growth_rate_per_s if grown else None
     if any(run.growth_rate_per_s != rate for run in grown):
         rate = None

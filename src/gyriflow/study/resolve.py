@@ -210,7 +210,7 @@ def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
 
 
 def _shapes(settings: Run) -> Origin | None:
-    return settings.growth.of if settings.growth.model == "shapes" else None
+    return settings.growth.of if settings.growth.definition.measured == "shapes" else None
 
 
 # which brains stand behind a run's growth
@@ -311,7 +311,7 @@ def _simulation(
 ) -> Simulation:
     run, start, growth = folding.run, folding.start, folding.settings.growth
     shapes = _shapes(folding.settings)
-    sizes = growth.model == "sizes" and "measured" in [getattr(growth, size) for size in SIZES]
+    sizes = growth.definition.measured == "sizes" and "measured" in [getattr(growth, size) for size in SIZES]
     # those of other subjects are the real ones where a run is led to them
     led_to = [brain for brain in chains[start.id, "self"].later if brain.sides == start.sides]
     alike = list(dict.fromkeys([*start.comparable(brains), *led_to]))
