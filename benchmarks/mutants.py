@@ -104,11 +104,11 @@ def failure(folder: Path, *tests: str) -> str:
     command = [sys.executable, "-B", "-m", "pytest", *options, *tests]
     environment = os.environ | {"PYTHONPATH": str(folder / "src")}
     outcome = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    said = f"{outcome.stdout[-2000:]}{outcome.stderr[-2000:]}"
+    output = f"{outcome.stdout[-2000:]}{outcome.stderr[-2000:]}"
     # pytest ends with 1 for tests that fail, and for files of tests that cannot be imported
     if outcome.returncode not in (0, 1) or "ERROR collecting" in outcome.stdout:
-        raise RuntimeError(f"{', '.join(tests)} could not be run:\n{said}")
-    return said if outcome.returncode else ""
+        raise RuntimeError(f"{', '.join(tests)} could not be run:\n{output}")
+    return output if outcome.returncode else ""
 
 
 def main() -> None:
@@ -119,8 +119,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="mutants-") as temporary:
         folder = Path(temporary) / "gyriflow"
         shutil.copytree(ROOT, folder, ignore=NOT_COPIED)
-        if said := failure(folder, *dict.fromkeys(mutant.tests for mutant in mutants)):
-            raise RuntimeError(f"tests fail without a mutant:\n{said}")
+        if output := failure(folder, *dict.fromkeys(mutant.tests for mutant in mutants)):
+            raise RuntimeError(f"tests fail without a mutant:\n{output}")
         for mutant, text in mutants.items():
             path = folder / mutant.file
             original = path.read_text()

@@ -1,4 +1,4 @@
-"""What the scripts of the report write of two brains and two runs: the numbers of each stand under its own name."""
+"""Scripts of the report on two brains and two runs: the numbers of each stand under its own name."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Which brain stands for what where a study has three or more: order in the configuration never decides by chance."""
+"""Choice of brains in studies of three or more; the order in the configuration decides nothing by chance."""
 
 import pytest
 from configurations import LABELLED, labelled, study
