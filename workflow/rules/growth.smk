@@ -3,7 +3,7 @@ rule growth_rates:
     input:
         whole=[brain.pial for _, brain in study.growing],
         reports=[brain.report for _, brain in study.growing],
-        thickness=expand(THICKNESS["report"], brain=study.with_thickness_curve),
+        thickness=expand(THICKNESS["summary"], brain=study.with_thickness_curve),
     output:
         **GROWTH,
     log:

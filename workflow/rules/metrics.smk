@@ -2,6 +2,12 @@
 MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"})
 
 
+def labels_or_white(wildcards):
+    """Return the labels of a brain, or its white surfaces."""
+    brain = brain_of(wildcards)
+    return brain.labels.path if brain.labels else list(brain.given.white_files.values())
+
+
 for suffix, sides in PARTS_OF_BRAINS.items():
 
     rule:

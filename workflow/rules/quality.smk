@@ -10,11 +10,11 @@ def quality_columns(name):
     )
 
 
-def surface_logs(wildcards):
-    """Return the logs of the steps that have made a brain's surface and thickness."""
+def surface_log(wildcards):
+    """Return the log of the step that has made a brain's surface and thickness."""
     brain = brain_of(wildcards)
-    made_by = [rule for rule, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
-    return expand(f"{BRAIN}/logs/{{rule}}.log", brain=brain.id, rule=[*made_by, "cortical_thickness"])
+    (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
+    return f"{BRAIN}/logs/{rule}{'_with_thickness' if brain.has_thickness else ''}.log".format(brain=brain.id)
 
 
 rule brain_figures:
@@ -25,7 +25,7 @@ rule brain_figures:
         image=lambda w: brain_of(w).given.image or [],
         white=lambda w: list(brain_of(w).given.white_files.values()),
         thickness=lambda w: brain_of(w).measured.thickness,
-        measured=lambda w: THICKNESS["report"].format(brain=w.brain) if brain_of(w).has_thickness else [],
+        measured=lambda w: THICKNESS["summary"].format(brain=w.brain) if brain_of(w).has_thickness else [],
         hemispheres=lambda w: brain_of(w).measured.hemispheres,
         maps=lambda w: brain_of(w).measured.maps,
     output:
@@ -47,7 +47,7 @@ rule brain_figures:
         labels=lambda w: brain_of(w).labels,
         columns=lambda w: quality_columns(w.brain),
         side=lambda w: brain_of(w).sides[0],
-        logs=surface_logs,
+        log=surface_log,
     script:
         "../scripts/brain_figures.py"
 

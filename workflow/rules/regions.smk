@@ -149,7 +149,7 @@ def mapped_surface(wildcards):
 def template_correspondence(wildcards):
     """Return where the template's points are in a brain, nothing for the template itself."""
     template, brain = on_template(wildcards)
-    return [] if brain is template else study.series.correspondence(template, brain)
+    return [] if brain is template else [study.series.correspondence(template, brain)]
 
 
 rule template_maps:

@@ -1,4 +1,6 @@
 # Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
+from itertools import product
+
 from gyriflow.running.cost import surface_memory_mib
 
 # the rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have
@@ -37,12 +39,6 @@ def pial_settings(wildcards):
     return surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci}
 
 
-def labels_or_white(wildcards):
-    """Return the labels of a brain, or its white surfaces."""
-    brain = brain_of(wildcards)
-    return brain.labels.path if brain.labels else list(brain.given.white_files.values())
-
-
 # a simple shape in the place of a brain
 rule shape:
     output:
@@ -61,21 +57,29 @@ rule shape:
         "../scripts/shape.py"
 
 
-for name, (source, sides) in PIAL_RULES.items():
+# with the thickness of the cortex, where labels of the cortex or white surfaces tell it
+for (name, (source, sides)), (suffix, thickness) in product(
+    PIAL_RULES.items(), {"": {}, "_with_thickness": THICKNESS}.items()
+):
 
     rule:
         name:
-            name
+            f"{name}{suffix}"
         input:
-            SHAPE if source == "shape" else lambda w: brain_of(w).given.files,
+            given=[SHAPE] if source == "shape" else lambda w: brain_of(w).given.files,
+            white=lambda w: list(brain_of(w).given.white_files.values()),
         output:
             **pial_of(*sides),
+            **thickness,
         log:
-            f"{BRAIN}/logs/{name}.log",
+            f"{BRAIN}/logs/{name}{suffix}.log",
         benchmark:
-            f"{BRAIN}/benchmarks/{name}.tsv"
+            f"{BRAIN}/benchmarks/{name}{suffix}.tsv"
         wildcard_constraints:
-            brain=brains_with(lambda brain: brain.given.source == source and brain.sides == sides),
+            brain=brains_with(
+                lambda brain: (brain.given.source, brain.sides, brain.has_thickness)
+                == (source, sides, bool(thickness))
+            ),
         conda:
             ENVIRONMENT
         resources:
@@ -86,36 +90,13 @@ for name, (source, sides) in PIAL_RULES.items():
             side=sides[0] if len(sides) == 1 else None,
             coordinates=lambda w: brain_of(w).given.coordinates,
             labels=lambda w: brain_of(w).labels,
+            # exchanged files are the same inputs to Snakemake
+            white=lambda w: brain_of(w).given.white_files,
             checksums=lambda w: brain_of(w).checksums,
             settings=pial_settings,
             limits=LIMITS if source == "hemispheres" else {},
         script:
             "../scripts/pial.py"
-
-
-rule cortical_thickness:
-    input:
-        given=labels_or_white,
-        surface=PIAL["whole"],
-        report=PIAL["report"],
-    output:
-        **THICKNESS,
-    log:
-        f"{BRAIN}/logs/cortical_thickness.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/cortical_thickness.tsv"
-    wildcard_constraints:
-        brain=brains_with(lambda brain: brain.has_thickness),
-    conda:
-        ENVIRONMENT
-    resources:
-        mem_mb=surface_memory,
-    params:
-        labels=lambda w: brain_of(w).labels,
-        # exchanged files are the same inputs to Snakemake
-        white=lambda w: brain_of(w).given.white_files,
-    script:
-        "../scripts/thickness.py"
 
 
 rule surface:

@@ -26,8 +26,7 @@ with step(snakemake.log[0]):
         (thickness,) = read_vertex_maps(files.thickness).values()
     whites = posed_whites(pose, {side: read_surface(path) for side, path in params.white_files.items()})
     white = merged(*whites.values()) if whites else None
-    said = [message for log in params.logs for message in read_messages(log)]
-    warnings = list(dict.fromkeys(message for level, message in said if level == "warning"))
+    warnings = list(dict.fromkeys(message for level, message in read_messages(params.log) if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.columns, report, read_json(files.measured) if files.measured else {}, warnings, expected)
     brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)

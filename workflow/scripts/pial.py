@@ -1,19 +1,28 @@
-"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from what the brain is given as."""
+"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from what it is given as, and its thickness."""
 
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, from_surface
+from gyriflow.anatomy.thickness import thickness_from_labels, thickness_from_white
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
-from gyriflow.io.surfaces import read_hemispheres, read_one_hemisphere, read_surface, write_brain
+from gyriflow.io.surfaces import (
+    read_hemispheres,
+    read_one_hemisphere,
+    read_pose,
+    read_surface,
+    write_brain,
+    write_vertex_maps,
+)
+from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
-files, volumes = list(snakemake.input), {}
+files, volumes, labels = snakemake.input.given, {}, params.labels
 settings = {"week": params.week, **params.settings}
-with step(snakemake.log[0], *files):
+with step(snakemake.log[0], *files, *snakemake.input.white):
     require_checksums(params.checksums)
-    if params.labels:
-        volume = params.labels.read(cropped=True)
-        surface = from_labels(volume.labels, volume.affine, params.labels.scheme, params.side, **settings)
+    if labels:
+        volume = labels.read(cropped=True)
+        surface = from_labels(volume.labels, volume.affine, labels.scheme, params.side, **settings)
         volumes = {"volumes_of_labels_mL": volume.volumes_ml}
     elif params.source == "hemispheres":
         left, right, declared = read_hemispheres(*files)
@@ -26,3 +35,16 @@ with step(snakemake.log[0], *files):
         surface = from_surface(mesh, params.side, coordinates=params.coordinates, **settings)
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report | volumes)
+    if output.get("thickness"):
+        pial, pose, fissure = read_surface(output.whole), read_pose(output.report), surface.report["fissure_x_mm"]
+        if labels:
+            thickness = thickness_from_labels(volume.labels, volume.affine, labels.scheme, pial, pose, fissure)
+        else:
+            whites = {
+                side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)
+                for side, path in params.white.items()
+            }
+            thickness = thickness_from_white(pial, pose, fissure, whites)
+        write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
+        write_vertex_maps(output.measured, {"thickness_mm": thickness.measured_mm})
+        write_json(output.summary, thickness.report)

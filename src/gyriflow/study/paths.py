@@ -70,7 +70,7 @@ THICKNESS = {
     "thickness": f"{BRAIN}/surface/thickness.shape.gii",
     # not a number where it could not be measured
     "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
-    "report": f"{BRAIN}/surface/thickness.json",
+    "summary": f"{BRAIN}/surface/thickness.json",
 }
 MASK = f"{BRAIN}/surface/mask.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"

@@ -124,7 +124,7 @@ def test_the_figures_of_a_brain_are_drawn_of_its_own_files(tmp_path):
     inputs |= {"maps": [f"{side}.shape.gii" for side in sides]}
     pictures = {name: f"{name}.png" for name in ("quality", "maps", "small")}
     outputs = pictures | {f"{name}_pdf": f"{name}.pdf" for name in pictures} | {"row": "row.json"}
-    params = {"columns": LABELS, "labels": None, "white_files": {}, "side": "left", "logs": [tmp_path / "surface.log"]}
+    params = {"columns": LABELS, "labels": None, "white_files": {}, "side": "left", "log": tmp_path / "surface.log"}
     run_script("brain_figures.py", tmp_path, inputs, outputs, params)
     row = read_json(tmp_path / "row.json")
     found = [row[name] for name in ("subject", "verdict", "warnings", "area_left_cm2", "mean_thickness_mm")]
