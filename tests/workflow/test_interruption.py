@@ -60,7 +60,7 @@ def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on
     os.killpg(process.pid, signal.SIGINT)
     printed, _ = process.communicate(timeout=60)
     assert process.returncode == 130, printed
-    assert "interrupted; the same command resumes from here" in printed
+    assert "run the same command again to resume" in printed
     assert all_end(started_by_it)
     assert list((workflow.directory / "results/runs/reference/a/folding").glob("checkpoint-*/state.h5"))
     again = workflow.run("--cores", "2", SUMMARY, "--configfile", "study.yaml")
