@@ -74,7 +74,7 @@ BY_TESTS = {
     ],
     "report/test_tables.py": [("src/gyriflow/settings/terms.py", "CORE_POWER_W = 12.0", "CORE_POWER_W = 120.0")],
     "report/test_report_scripts.py": [
-        ("workflow/scripts/provenance.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),
+        ("workflow/scripts/study_records.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),
         ("workflow/scripts/run_tables.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),
     ],
     "io/test_exports.py": [

@@ -15,11 +15,11 @@ pytestmark = pytest.mark.slow
 STAGES = (
     *("pial_from_labels_with_thickness", "growth_curves", "growth_rates", "growth_figure"),
     *("register", "tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
-    *("validation", "registration_ceiling", "study_resources", "html_report"),
+    *("validation", "registration_ceiling", "study_records", "html_report"),
 )
 """The rules that stand for all: tables and figures follow what they are made of."""
 REPORT = {"html_report": 1}
-RESULTS = REPORT | {"study_resources": 1}
+RESULTS = REPORT | {"study_records": 1}
 ONE_RUN = RESULTS | {
     "prepare": 1, "simulate": 1, "measure_simulated": 2, "validation": 1,
 }  # fmt: skip
@@ -69,8 +69,8 @@ SETTINGS = {
         BOTH_RUNS | MESH | CURVES | {"pial_from_labels_with_thickness": 2, "measure": 2},
     ),
     "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"measure_simulated": 6}),
-    # the number of ranks changes no result: the report alone, as it shows the configuration
-    "ranks": ({"folding": {"ranks": 1}}, REPORT),
+    # the number of ranks changes no result, but the report shows the configuration
+    "ranks": ({"folding": {"ranks": 1}}, RESULTS),
     "new brain": (
         {"brains": [{"id": "c", "week": 23, **labelled(23)}]},
         RESULTS | CURVES | {"pial_from_labels_with_thickness": 1, "measure": 1, "validation": 2},

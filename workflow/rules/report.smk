@@ -7,36 +7,10 @@ from gyriflow.running.reruns import benchmark_patterns
 PAGE = f"{workflow.basedir}/workflow/report/page"
 
 
-rule study_resources:
+# the report's own too: they are there where its page cannot be made
+rule study_records:
     input:
         # logs and the files of benchmarks are no inputs: a lost one would have its stage run again
-        rules.figures.input,
-        rules.metrics.input,
-        rules.quality_table.output,
-    output:
-        csv=f"{STUDY}/resources.csv",
-        table=f"{STUDY}/resources.html",
-        warnings=f"{STUDY}/warnings.csv",
-    log:
-        f"{STUDY}/logs/study_resources.log",
-    benchmark:
-        f"{STUDY}/benchmarks/study_resources.tsv"
-    conda:
-        ENVIRONMENT
-    params:
-        brains=[brain.id for brain in CONFIG.brains],
-        # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
-        benchmarks=lambda w: benchmark_patterns(
-            takewhile(lambda rule: rule.name != "study_resources", workflow.rules)
-        ),
-        folded=study.pairs,
-    script:
-        "../scripts/study_resources.py"
-
-
-# the report's own too: they are there where its page cannot be made
-rule provenance:
-    input:
         rules.figures.input,
         asked_for(FIGURES, "brain", "small"),
         rules.metrics.input,
@@ -45,6 +19,9 @@ rule provenance:
         summaries=study.files(FOLDING["summary"]),
         template=f"{PAGE}/methods.rst",
     output:
+        resources=f"{STUDY}/resources.csv",
+        resources_page=f"{STUDY}/resources.html",
+        warnings=f"{STUDY}/warnings.csv",
         study=f"{STUDY}/provenance.json",
         brains=expand(f"{BRAIN}/provenance.json", brain=study.brains),
         runs=study.files(f"{RUN}/provenance.json"),
@@ -53,13 +30,15 @@ rule provenance:
         # the configuration with its paths, for those who have the files
         config=f"{REPORT}/config.yaml",
     log:
-        f"{STUDY}/logs/provenance.log",
+        f"{STUDY}/logs/study_records.log",
     benchmark:
-        f"{STUDY}/benchmarks/provenance.tsv"
+        f"{STUDY}/benchmarks/study_records.tsv"
     conda:
         ENVIRONMENT
     params:
         config=study.used_settings,
+        # refused ones too
+        known_brains=[brain.id for brain in CONFIG.brains],
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         files=[
             (brain.id, what, path)
@@ -72,6 +51,10 @@ rule provenance:
             for path in paths
         ],
         folded=study.pairs,
+        # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
+        benchmarks=lambda w: benchmark_patterns(
+            takewhile(lambda rule: rule.name != "study_records", workflow.rules)
+        ),
         growth_of=[study.growth_of(one) for one in study.folded],
         # of which the text of the methods speaks
         method={
@@ -81,7 +64,7 @@ rule provenance:
             "metrics": CONFIG.metrics.model_dump(mode="json", include={"curvature_radius_mm"}),
         },
     script:
-        "../scripts/provenance.py"
+        "../scripts/study_records.py"
 
 
 def figures_on_page(brain=None):
@@ -102,14 +85,14 @@ rule html_report:
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
-        warnings=rules.study_resources.output.warnings,
+        warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.folded else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
         view=asked_for(FIGURES, "view")[0],
-        provenance=rules.provenance.output.report,
-        methods=rules.provenance.output.methods,
+        provenance=rules.study_records.output.report,
+        methods=rules.study_records.output.methods,
         page=f"{PAGE}/page.html",
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
@@ -139,7 +122,7 @@ rule html_report:
 rule report:
     input:
         rules.html_report.output,
-        rules.provenance.output,
+        rules.study_records.output,
 
 
 # what only moves text: no jobs of their own on a cluster, as targets

@@ -116,7 +116,7 @@ def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
     ]  # fmt: skip
 
 
-def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(folder):
+def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_run(folder):
     brains = [{"id": brain, "labels": str(folder / f"{brain}.nii.gz")} for _, brain in FOLDED]
     shown = "{{ run.run }} {{ run.start }}: {{ run.growth_of }}, {{ run.summary.steps }}; "
     write_text("template.rst", f"{{% for run in runs %}}{shown}{{% endfor %}}")
@@ -124,9 +124,16 @@ def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(fo
     outputs = {name: f"results/{name}/provenance.json" for name in ("study", "report")}
     outputs |= {"brains": [f"results/brains/{brain}/provenance.json" for _, brain in FOLDED]}
     outputs |= {"runs": of_runs("provenance.json"), "methods": "methods.rst", "config": "config.yaml"}
+    outputs |= {"resources": "results/study/resources.csv", "resources_page": "resources.html", "warnings": "told.csv"}
     params = {"brains": brains, "folded": FOLDED, "growth_of": GROWTH, "config": {}, "method": {}}
     params["files"] = [(brain["id"], "labels", brain["labels"]) for brain in brains]
-    run_script("provenance.py", folder, inputs | {"template": "template.rst"}, outputs, params)
+    params["known_brains"] = ["young", "old"]
+    params["benchmarks"] = {"simulate": r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"}
+    run_script("study_records.py", folder, inputs | {"template": "template.rst"}, outputs, params)
+    assert read_table(outputs["resources"]).set_index("run")["hours"][["thin", "thick"]].tolist() == [1, 2]
+    assert outputs["resources"] in "".join(read_json(outputs["study"])["results"])
+    warned = read_table("told.csv")[["run", "subject", "message"]].to_numpy().tolist()
+    assert sorted(warned) == [["thick", "old", "of thick"], ["thin", "young", "of thin"]]
     assert read_text("methods.rst") == "thin young: own, 7; thick old: population P, 8; "
     for brain, run, (name, start), thickness in zip(brains, outputs["runs"], FOLDED, (1.5, 2.5), strict=True):
         alone, folded = read_json(f"results/brains/{start}/provenance.json"), read_json(run)
@@ -139,7 +146,7 @@ def test_provenance_has_the_inputs_settings_and_results_of_each_brain_and_run(fo
         assert folded["configuration"] == {"run": name, "start": start, "parameters": {"thickness_mm": thickness}}
 
 
-def test_tables_tell_runs_and_what_they_took_apart(folder):
+def test_tables_tell_runs_apart(folder):
     files = {"params": "params.yaml", "steps": "folding/steps.csv"}
     files |= {"summaries": "folding/summary.json", "zones": "folding/zones.json", "frames": "folding/frames.h5"}
     inputs = {kind: of_runs(file) for kind, file in files.items()}
@@ -152,10 +159,3 @@ def test_tables_tell_runs_and_what_they_took_apart(folder):
     moved = read_table("displacement.csv")
     assert moved[["subject", "run", "mean_mm"]].drop_duplicates().to_numpy().tolist() == [
         ["young", "thin", 1.0], ["old", "thick", 2.0]]  # fmt: skip
-    pattern = r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"
-    outputs = {"csv": "resources.csv", "table": "resources.html", "warnings": "warnings.csv"}
-    params = {"folded": FOLDED, "brains": ["young", "old"], "benchmarks": {"simulate": pattern}}
-    run_script("study_resources.py", folder, {}, outputs, params)
-    assert read_table("resources.csv").set_index("run")["hours"][["thin", "thick"]].tolist() == [1, 2]
-    warned = read_table("warnings.csv")[["run", "subject", "message"]].to_numpy().tolist()
-    assert sorted(warned) == [["thick", "old", "of thick"], ["thin", "young", "of thin"]]
