@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from gyriflow.anatomy.extraction import remove_bridges, smooth_mask
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import surface_of_mask
-from gyriflow.anatomy.sulci import open_shut_sulci
+from gyriflow.anatomy.sulci import open_fused_sulci
 from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
 from gyriflow.geometry.triangles import area, convex_hull, euler_number, vertex_areas
 from gyriflow.io.volumes import read_label_volume
@@ -103,7 +103,7 @@ def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, 
     field, _ = remove_bridges(body, smooth_mask(body), np.zeros_like(body))
     volume = float(body.sum() * voxel_mm**3)
     shut = surface_of_mask(field, affine, volume, EDGE_MM).mesh
-    field, fine, report = open_shut_sulci(field, affine, core)
+    field, fine, report = open_fused_sulci(field, affine, core)
     opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
     row = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
     return row | {name: measured(mesh, body, core, affine) for name, mesh in zip(WAYS, (shut, opened), strict=True)}

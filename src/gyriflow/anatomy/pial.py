@@ -1,4 +1,4 @@
-"""A brain's pial surface from label volumes, from surface files or from a simple shape, posed, with its report."""
+"""Make a brain's posed pial surface from a label volume, from surface files or from a simple shape."""
 
 import logging
 from collections.abc import Iterable, Mapping
@@ -61,38 +61,39 @@ from .plausible import (
 )
 from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
 from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
-from .sulci import open_shut_sulci
+from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
 
-
-# slits this near to the mid-surface belong to the fissure
+# slits this close to the mid-surface belong to the fissure
 FISSURE_REACH_MM = 3.0
-# cosine between the mid-plane's normal and the line from left to right labels: 45°
-SAME_AXIS = 0.7
-# beyond this part of the brain's width the mid-sagittal plane is doubtful
-DOUBTFUL_ASYMMETRY = 0.03
-# a hemisphere of 4 % of the other one's volume has about a tenth of its area
-MOST_UNEQUAL = 15.0
-# voxels as large as this show the shape of a brain well enough for its pose
-OF_SHAPE_MM = 1.5
-# between hemispheres from surfaces, at least
-GAP_MM = 0.5
-# the area of the mid-surface that lies in a mask without cortex, of its volume to the power 2/3: in four shipped brains
-# as masks 1.24 and 1.36 where the fissure is shut, 0.36 and 0.54 where it is open
-SHUT_FISSURE = 0.9
-SHUT = "the mask keeps the fissure shut, which takes 20 % of two shipped brains' area: labels of the cortex open it"
-# the distance of the medial wall of a hemisphere that is alone from the mid-sagittal plane
-BESIDE_MM = 0.5
+# the mid-plane agrees with the labels if this is the cosine between its normal and the line from left to right: 45°
+MIN_AXIS_COSINE = 0.7
+# an asymmetry of more than this share of the brain's width gives a warning
+MAX_USUAL_ASYMMETRY = 0.03
+# largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
+MAX_AREA_RATIO = 15.0
+# voxels of this size are fine enough to determine the pose by shape
+POSE_VOXEL_MM = 1.5
+# smallest gap between hemispheres from surfaces
+MIN_GAP_MM = 0.5
+# area of the mid-surface inside a mask without cortex labels over its volume to the power 2/3: in masks of four
+# shipped brains 1.24 and 1.36 with a fused fissure, 0.36 and 0.54 with an open one
+MAX_HIDDEN_FISSURE = 0.9
+FUSED_FISSURE = (
+    "the fissure is fused in the mask, which loses 20 % of the area in two shipped brains: use cortex labels"
+)
+# distance of the medial wall of a single hemisphere from the mid-sagittal plane
+WALL_DISTANCE_MM = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class PialSurface:
     """A posed pial surface in RAS+ mm.
 
-    `whole` is closed and outward, of one piece or one for each hemisphere. `left` and `right` are its parts, open where
-    a connected brain is cut at the fissure, the plane x = `fissure_x_mm`; None for one that is not there. The pose is
-    that from the files of the brain; the report has it, and what was found and done, in plain values for JSON.
+    `whole` is closed and outward, in one piece or in one for each hemisphere. `left` and `right` are its parts, open
+    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`; None for a missing hemisphere. `pose`
+    leads from the brain's files. The report has the pose, measures and repairs, in plain values for JSON.
     """
 
     whole: TriangleMesh
@@ -115,66 +116,94 @@ def from_labels(
 ) -> PialSurface:
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
-    A volume whose axes are wrong is turned as its cerebellum, brainstem and sides say, or without these its shape. The
-    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel), freed of handles and turned into an isosurface, which is
-    smoothed, remeshed to `edge_length_mm`, freed of terraces, set outwards by what smoothing took of the volume and
-    turned so that the mid-sagittal plane is x = const. Where the scheme separates cortex from the tissue inside and
-    cortex labels of both sides touch, the fissure is opened there to 1.5 mm. It is half-way between the labels of the
-    two sides where the scheme has them. With `side` the volume holds that hemisphere only, which is posed as
-    `from_surface` does.
+    A volume with wrong axes is rotated according to its cerebellum, brainstem and sides, or else to its shape. The
+    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel) and its handles are removed. Its isosurface is smoothed,
+    remeshed to `edge_length_mm`, freed of terraces, moved outward to restore the volume, and rotated so that the
+    mid-sagittal plane is x = const. If cortex labels of both sides touch, the fissure is opened there to 1.5 mm,
+    half-way between the labels of the two sides if the scheme has them. With `open_sulci`, fused sulci are opened. With
+    `side` the volume contains only that hemisphere, which is posed as in `from_surface`.
 
-    InputError for labels that don't fit the scheme or the week, for one hemisphere alone without `side`, and for a
-    whole brain or labels of the other hemisphere with it. MeshError where the surface stays tangled.
+    InputError if the labels do not fit the scheme or the week, for a single hemisphere without `side`, and for a whole
+    brain or labels of the other hemisphere with it. MeshError if the surface keeps self-intersections.
     """
-    # the wall of a hemisphere towards the side that is not there may have no cortex
+    volume = _read_volume(labels, affine, scheme, side, week)
+    if side:
+        return _hemisphere_from_volume(volume, side, edge_length_mm, open_sulci)
+    return _brain_from_volume(volume, edge_length_mm, open_sulci)
+
+
+@dataclass(frozen=True, eq=False)
+class _Volume:
+    """A checked label volume: its cerebrum, the smoothed mask with its posed affine, scheme, pose and warnings."""
+
+    cerebrum: Cerebrum
+    field: NDArray[np.float32]
+    affine: Floats
+    scheme: LabelScheme
+    pose: Pose
+    week: float
+    warnings: list[str]
+
+
+def _read_volume(labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, week: float) -> _Volume:
+    # the medial wall of a single hemisphere may have no cortex
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
-    mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
     warnings = logged(cerebrum.warnings)
     pose = Pose() if side else pose_of_labels(labels, affine, scheme)
-    if side and set(_labelled_sides(tissue, scheme)) - {side}:
-        raise InputError(f"the volume holds labels of another hemisphere than the {side} one")
+    if side and set(_labelled_sides(cerebrum.tissue, scheme)) - {side}:
+        raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, week))
-    if (share := report["border_share"]) > REPORTED_LOSS:
+    if (share := cerebrum.report["border_share"]) > REPORTED_LOSS:
         cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
-        warnings += logged([f"{cut}: what lies beyond is missing, and the surface is flat there"])
-    field = smooth_mask(mask)
+        warnings += logged([f"{cut}: parts outside are missing, and the surface is flat there"])
+    field = smooth_mask(cerebrum.mask)
     if not side:
         warnings += logged(scheme_contradictions(layout_of(labels), scheme))
         warnings += logged(_require_both(cerebrum, scheme, field))
     if pose is None:
         pose = _pose_by_shape(field, cerebrum.affine, scheme)
     warnings += logged(pose.warnings)
-    affine = pose.world @ cerebrum.affine
-    if side:
-        shut, taken_ml = (field, affine), 0.0
-        if open_sulci:
-            field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme)
-            warnings += logged(_fused_sulci_warning(report))
-        taken = taken_ml / ML_PER_MM3
-        even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, shut=shut)
-        require_single_hemisphere(even.mesh)
-        pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
-        report = {"source": "hemisphere", "side": side, **report, **even.report}
-        warnings += logged([*even.warnings, *pose.warnings])
-        return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
+    return _Volume(cerebrum, field, pose.world @ cerebrum.affine, scheme, pose, week, warnings)
+
+
+def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, open_sulci: bool) -> PialSurface:
+    cerebrum, scheme, field, affine = volume.cerebrum, volume.scheme, volume.field, volume.affine
+    warnings = list(volume.warnings)
+    report, original, taken_ml = {"scheme": scheme.name, **cerebrum.report}, (field, affine), 0.0
+    if open_sulci:
+        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme)
+        warnings += logged(_fused_sulci_warning(report))
+    taken = taken_ml / ML_PER_MM3
+    even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, original=original)
+    require_single_hemisphere(even.mesh)
+    pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
+    report = {"source": "hemisphere", "side": side, **report, **even.report}
+    warnings += logged([*even.warnings, *pose.warnings])
+    return _single_hemisphere(even.mesh, side, pose, volume.week, report, warnings)
+
+
+def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool) -> PialSurface:
+    cerebrum, scheme, field, affine = volume.cerebrum, volume.scheme, volume.field, volume.affine
+    warnings = list(volume.warnings)
+    mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
     grid, opened_ml = affine, 0.0
     core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smooth_mask(core) if scheme.cortex else field, affine)
     fissure, to_right, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
     warnings += logged(doubts)
-    # what smoothing would shut, and reopened slits leave shut, is not shown
+    # gaps that smoothing closes, and that stay closed when slits are reopened, are not visible
     slit, _ = remove_bridges(mask, field, np.zeros_like(mask))
     hidden = fissure.hidden(slit > LEVEL, affine)
-    if not scheme.cortex and hidden.sum() * SPACING_MM**2 > SHUT_FISSURE * cerebrum.volume_mm3 ** (2 / 3):
-        warnings += logged([SHUT])
-    # where it is hidden, the fissure is opened whole, down to what joins the hemispheres
+    if not scheme.cortex and hidden.sum() * SPACING_MM**2 > MAX_HIDDEN_FISSURE * cerebrum.volume_mm3 ** (2 / 3):
+        warnings += logged([FUSED_FISSURE])
+    # a hidden fissure is opened as a whole, down to the tissue that joins the hemispheres
     stays_fused = np.zeros_like(mask)
     if scheme.cortex:
         voxels, points, _ = fissure.near(mask.shape, affine, FISSURE_REACH_MM)
         stays_fused[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
     field, report["slit_voxels_reopened"] = remove_bridges(mask, field, stays_fused)
-    shut = field, grid
+    original = field, grid
     if scheme.cortex:
         field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
@@ -189,26 +218,26 @@ def from_labels(
         edge_length_mm,
         smallest=cerebrum.smallest_part,
         taken_mm3=opened_ml / ML_PER_MM3,
-        shut=shut,
+        original=original,
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)
-    # between the walls of the surface itself: cortex may be thicker on one side than on the other
+    # half-way between the walls of the surface itself, since cortex may be thicker on one side
     heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
     report = {"source": "labels", **report, **even.report}
-    return _upright(mesh, left_faces(mesh, heights), fissure.plane, pose, week, report, warnings)
+    return _upright(mesh, left_faces(mesh, heights), fissure.plane, volume.pose, volume.week, report, warnings)
 
 
 def _with_sulci(
     field: NDArray[np.float32], affine: Floats, cerebrum: Cerebrum, scheme: LabelScheme, fissure: Fissure | None = None
 ) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any]]:
-    """Return the field with shut sulci opened, its affine, the volume (mL) that this took, and a report."""
+    """Open fused sulci; return the field, its affine, the volume removed (mL), and a report."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         return field, affine, 0.0, {"stays_fused": "the labels have no white matter"}
-    # handles are cheaper to find before voxels are made finer
+    # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
-    opened, fine, report = open_shut_sulci(simple, affine, core, fissure)
+    opened, fine, report = open_fused_sulci(simple, affine, core, fissure)
     if not report.get("sheets"):
         return field, affine, 0.0, report
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
@@ -217,12 +246,12 @@ def _with_sulci(
 
 
 def _fused_sulci_warning(report: Mapping[str, Any]) -> list[str]:
-    why = report["sulci"].get("stays_fused")
-    return [f"sulci that the labels keep shut were not opened: {why}"] if why else []
+    reason = report["sulci"].get("stays_fused")
+    return [f"fused sulci were not opened: {reason}"] if reason else []
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
-    every = max(int(OF_SHAPE_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+    every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
     coarse = unambiguous(field[::every, ::every, ::every])
     rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
     return pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
@@ -235,10 +264,10 @@ def _fissure_of_labels(
     to_right = signed_side_distance(tissue, scheme, affine) if scheme.left and scheme.right else None
     if to_right is not None:
         left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
-        apart = affine[:3, :3] @ (right - left)
-        if abs(plane.normal @ (apart / np.linalg.norm(apart))) < SAME_AXIS:
+        axis = affine[:3, :3] @ (right - left)
+        if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
             plane = plane_between_labels(to_right, affine, mask)
-            doubts.append("the hemispheres are no mirror images of each other: the mid-plane is that of their labels")
+            doubts.append("the hemispheres are not mirror images of each other: the mid-plane is that of their labels")
     require_sides(tissue, scheme, affine, plane.normal)
     fissure = fissure_between(walls, plane)
     if to_right is not None:
@@ -260,21 +289,21 @@ def from_hemispheres(
 ) -> PialSurface:
     """Return the pial surface of a brain from closed surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, turned
+    The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, rotated
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are 0.5 mm from each
-    other. With coordinates "auto" each may be in any rigid pose, which its shape shows; `declared` is whether both
-    files name one coordinate system. Where coordinates are named, a shape that contradicts them is warned of.
-    InputError where the pose cannot be determined, or the hemispheres are swapped, of different size or not of the
-    week's size; MeshError where one can't be made a closed surface without handles and intersections.
+    other. With coordinates "auto" each may have any rigid pose, which is determined from its shape; `declared` is
+    whether both files name the same coordinate system. If a shape contradicts named coordinates, there is a warning.
+    InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
+    impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
     """
-    given = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
-    sides = [sound_pieces(transformed(mesh, given), max_hole_mm, one=True) for mesh in (left, right)]
+    to_ras = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
+    sides = [sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True) for mesh in (left, right)]
     warnings = logged(warning for side in sides for warning in side.warnings)
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
     warnings += logged(require_plausible_size(volume, week))
     if named := coordinates != "auto":
-        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), given), by="configuration")
+        pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
         pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
@@ -289,17 +318,17 @@ def from_hemispheres(
     plane = mid_plane(merged(left, right), named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     gap, to_right = smallest_gap(left, right), plane.normal
-    left, right, moved = separate(left, right, GAP_MM, to_right)
+    left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
     if moved > 0:
-        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {GAP_MM:g} mm"])
+        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {MIN_GAP_MM:g} mm"])
         plane = mid_plane(merged(left, right), named=named)
-    apart = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
-    files = {side: shift @ pose.of_file(side) for side, shift in apart.items()}
+    shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
+    files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, "moved_apart_mm": moved}
     report["gap_before_mm"] = gap
     for name, *steps in zip(SIDES, sides, even, strict=True):
-        report |= {f"{key}_{name}": value for one in steps for key, value in one.report.items()}
+        report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
     mesh = merged(left, right)
     return _upright(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, pose, week, report, warnings)
 
@@ -313,15 +342,15 @@ def from_surface(
     edge_length_mm: float = 1.0,
     max_hole_mm: float = 3.0,
 ) -> PialSurface:
-    """Return the pial surface of a brain, or of the only hemisphere that there is, from one closed surface.
+    """Return the pial surface of a brain, or of a single hemisphere (`side`), from one closed surface.
 
-    It is repaired (holes up to `max_hole_mm`), smoothed and remeshed to `edge_length_mm`. A whole brain, of one piece
-    or one for each hemisphere, is turned so that the mid-sagittal plane is x = const. With `side` it is that hemisphere
-    alone, whose medial wall is set upright beside x = `fissure_x_mm`. With coordinates "auto" the pose follows from the
-    shape. InputError where it is a whole brain instead of a hemisphere or the reverse, of the other side, or not of the
-    week's size; MeshError where it can't be made closed and free of handles and intersections.
+    It is repaired (holes up to `max_hole_mm`), smoothed and remeshed to `edge_length_mm`. A whole brain, in one piece
+    or in one for each hemisphere, is rotated so that the mid-sagittal plane is x = const. The medial wall of a single
+    hemisphere is set upright next to x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
+    InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
+    if it cannot be made closed and free of handles and self-intersections.
     """
-    clean = sound_pieces(mesh, max_hole_mm, one=side is not None)
+    clean = sound_pieces(mesh, max_hole_mm, single=side is not None)
     warnings = logged(clean.warnings)
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
@@ -334,7 +363,7 @@ def from_surface(
         warnings += logged(require_whole(even.mesh, "surface"))
         pose = pose_of_surface(even.mesh, coordinates)
     warnings += logged(pose.warnings)
-    # "lps" where these were found, else what the user has named
+    # "lps" if these were found, else the configured coordinates
     read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     report = {"coordinates": read_as, **clean.report, **even.report}
     if side:
@@ -347,17 +376,17 @@ def from_surface(
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
-    """Return a simple geometry as it is, in the place of a brain: its left and right meet at x = 0.
+    """Return a simple geometry, unchanged, in place of a brain; left and right meet at x = 0.
 
-    It has no fissure to be found and no size of its own, and smoothing would round its edges. MeshError where it is
-    not closed or cuts itself.
+    It has neither a fissure nor a size to check, and smoothing would round its edges. MeshError if it is not closed or
+    has self-intersections.
     """
     require_sound(mesh)
     return _pial_surface(mesh, *split(mesh, 0.0), 0.0, Pose(), week, {"source": "shape", "rotation_deg": 0.0})
 
 
 def logged(warnings: Iterable[str]) -> list[str]:
-    """Return warnings after they have been logged."""
+    """Log warnings and return them."""
     warnings = list(warnings)
     for warning in warnings:
         log.warning(warning)
@@ -403,22 +432,22 @@ def _upright(
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
     left, right = cut_sides(whole, is_left)
-    # where the plane, which may have kept a tilt below half a degree, passes the brain's centre
+    # x of the plane, which may be tilted by less than half a degree, at the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
     doubts = []
     if plane.fissure_points == 0:
-        doubts.append("no fissure was found between facing walls: its place is that of the plane of mirror symmetry")
-    if plane.asymmetry_mm > DOUBTFUL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
+        doubts.append("no fissure was found between facing walls: the plane of mirror symmetry is used")
+    if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
         doubts.append(f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
     doubts += proportion_warnings(np.ptp(whole.vertices, axis=0))
     areas = sorted((area(left), area(right)))
-    if areas[1] > MOST_UNEQUAL * areas[0]:
+    if areas[1] > MAX_AREA_RATIO * areas[0]:
         raise InputError(
-            "one hemisphere is too small to be one",
+            "one hemisphere is too small",
             found=f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²",
-            expected=f"at most {MOST_UNEQUAL:g} times as much",
+            expected=f"at most {MAX_AREA_RATIO:g} times as much",
         )
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
@@ -432,7 +461,7 @@ def _single_hemisphere(
 ) -> PialSurface:
     whole = transformed(mesh, pose.of_file())
     x = whole.vertices[:, 0]
-    fissure_x = float(x.max() + BESIDE_MM if side == "left" else x.min() - BESIDE_MM)
+    fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
     left, right = (whole, None) if side == "left" else (None, whole)
     report = {**report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
     return _pial_surface(whole, left, right, fissure_x, pose, week, report, warnings)
@@ -440,34 +469,34 @@ def _single_hemisphere(
 
 def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
     cortex = scheme.cortex or scheme.cerebrum
-    there = {"left": scheme.left, "right": scheme.right}
-    return [side for side in SIDES if np.isin(tissue, np.intersect1d(there[side], cortex)).any()]
+    labels = {"left": scheme.left, "right": scheme.right}
+    return [side for side in SIDES if np.isin(tissue, np.intersect1d(labels[side], cortex)).any()]
 
 
 def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.float32]) -> list[str]:
-    if len(there := _labelled_sides(cerebrum.tissue, scheme)) == 1:
+    if len(sides := _labelled_sides(cerebrum.tissue, scheme)) == 1:
         raise InputError(
-            f"the volume has labels of the {there[0]} hemisphere only",
+            f"the volume has labels of the {sides[0]} hemisphere only",
             expected="labels of both hemispheres",
-            remedy="Choose a scheme without left and right, or give the only one under hemisphere, with its side.",
+            remedy="Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side.",
         )
-    # a part that is left out below, for its size, makes no second hemisphere
+    # parts that are removed below because of their size do not count
     parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
     surface = isosurface(smooth_mask(parts), cerebrum.affine)
-    # a brain that the field of view cuts off may be as flat, which has been reported already
+    # a brain that is cut by the field of view may be as narrow, which has been reported already
     return require_whole(surface, "volume", refuses=cerebrum.report["border_share"] <= REPORTED_LOSS)
 
 
 def _with_fissure(
     field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, hidden: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Return the field with the fissure opened, its affine, and the volume (mL) that this took.
+    """Open the fissure; return the field, its affine, and the volume removed (mL).
 
-    Where more than a thousandth of the brain is taken, the fissure was shut; voxels that are too coarse for its new
-    walls are then made finer first.
+    If more than a thousandth of the brain is removed, the fissure was fused. Voxels that are too coarse for its walls
+    are then refined first.
     """
     wide = open_fissure(field, affine, core, fissure, hidden)
-    # an opening of less than two voxels would be lost between them
+    # an opening of less than two voxels would be lost
     factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / FISSURE_MM))
     if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
         solid, _ = refine(core.astype(np.float32), affine, factor)

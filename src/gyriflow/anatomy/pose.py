@@ -16,8 +16,8 @@ from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
 from .hindbrain import MIN_TURN_DEG, pose_from_rotation
 from .template import (
-    DEEPEST,
-    Shape,
+    MAX_DEPTH,
+    PointCloud,
     brains,
     hemispheres,
     medial_wall,
@@ -54,7 +54,7 @@ class Hemisphere:
     by this residual, `side_ratio` that of the mirrored shape.
     """
 
-    shape: Shape
+    shape: PointCloud
     rotation: Floats
     wall_mm: float
     residual: float
@@ -148,7 +148,7 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
         )
 
 
-def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[Shape], what: str) -> Pose:
+def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: str) -> Pose:
     """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+.
 
     Few random poses are this close to RAS+, so this is evidence if the shape is ambiguous.
@@ -232,7 +232,7 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     Named coordinates are kept, with a warning if the shape clearly contradicts them. InputError with "auto" if the
     shape is ambiguous.
     """
-    shape = shape_of(mesh, deepest=DEEPEST)
+    shape = shape_of(mesh, max_depth=MAX_DEPTH)
     fit, confidence = register_from_all_sides(shape, brains())
     brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
     return _choose_pose(brain, brain.rotation, coordinates, "brain", brains())
@@ -278,7 +278,12 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
 
 
 def _choose_pose(
-    shape: Hemisphere, rotation: Floats, coordinates: str, what: str, targets: Sequence[Shape], of_volume: bool = False
+    shape: Hemisphere,
+    rotation: Floats,
+    coordinates: str,
+    what: str,
+    targets: Sequence[PointCloud],
+    of_volume: bool = False,
 ) -> Pose:
     """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3) leads to RAS+."""
     angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}

@@ -1,4 +1,4 @@
-"""Surfaces made sound: cleaned, freed of stalks, of even triangles, of the right volume, or rebuilt through voxels.
+"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them through voxels.
 
 Every repair is counted.
 """
@@ -40,142 +40,142 @@ from .terraces import without_terraces
 
 log = logging.getLogger(__name__)
 
-# vertices closer than this are one vertex
-SAME_MM = 1e-5
-# pieces from this part of the largest area are kept: two hemispheres in one file
+# vertices closer than this are merged
+MERGE_MM = 1e-5
+# pieces with at least this share of the largest area are kept: two hemispheres in one file
 COMPARABLE = 0.3
-# lengths of brains and hemispheres
-SMALLEST_MM, LARGEST_MM = 15.0, 300.0
-# an edge as long, and so many times the median, leads to a vertex off the surface
-SPIKE_MM, SPIKE_SPREADS = 10.0, 10.0
-# voxels in which a surface is looked at for stalks
+# range of lengths of brains and hemispheres
+MIN_LENGTH_MM, MAX_LENGTH_MM = 15.0, 300.0
+# an edge longer than this, and than this multiple of the median, suggests a vertex far off the surface
+SPIKE_MM, SPIKE_FACTOR = 10.0, 10.0
+# voxel size of the search for stalks
 STALK_VOXEL_MM = 0.8
-# cuts follow the triangles, so that they are wider than the stalks
-WIDEST_CUT_MM = 12.0
-# around a surface that is rebuilt
+# cuts follow the triangles, so they are wider than the stalks
+MAX_CUT_MM = 12.0
+# margin around a surface that is rebuilt
 MARGIN_VOXELS = 6
-# smoothing keeps the volume to this part
-KEPT = 0.01
-# beyond this it has taken structures, not rounded them, and moving the whole surface would not bring them back
-MOST_GIVEN_BACK = 0.05
-# of Taubin smoothing
+# a larger relative change of volume by smoothing gives a warning
+VOLUME_TOL = 0.01
+# with a larger loss, smoothing has removed structures, and moving the whole surface cannot restore them
+MAX_RESTORED = 0.05
+# Taubin smoothing
 SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
-# how many times walls that would cut each other are held back, and after smoothing with how many rings of neighbours
-HELD_BACK, HELD_RINGS = 4, 3
-# walls where the field before an opening was above this are walls of what was opened
-WITHIN = 0.8
+# rounds in which crossing walls are reset, and after smoothing the number of rings of neighbours reset with them
+N_RESETS, N_RESET_RINGS = 4, 3
+# walls where the field before an opening was above this are walls of the opening
+INSIDE_LEVEL = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Sound:
-    """A surface after repairs, with what these were, in plain values for JSON, and what is to be told."""
+class RepairedSurface:
+    """A surface after repairs, with a report in plain values for JSON and warnings."""
 
     mesh: TriangleMesh
     report: dict[str, Any]
     warnings: list[str]
 
 
-def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> Sound:
-    """Return a surface of one piece or two, or its largest piece, repaired and without parts that hang on stalks."""
+def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> RepairedSurface:
+    """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks."""
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
-    mesh, repairs = clean(mesh, max_hole_mm, one=one)
-    warnings, dropped, kept = [], repairs["area_dropped_mm2"], area(mesh)
-    if lengths.max() > max(SPIKE_MM, SPIKE_SPREADS * np.median(lengths)):
+    mesh, repairs = clean(mesh, max_hole_mm, single=single)
+    warnings, dropped, remaining = [], repairs["area_dropped_mm2"], area(mesh)
+    if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
         warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
-    if dropped > REPORTED_LOSS * kept:
+    if dropped > REPORTED_LOSS * remaining:
         warnings.append(
-            f"{repairs['pieces_dropped']} pieces apart from the brain or inside it were dropped: "
-            f"{100 * dropped / (kept + dropped):.1f} % of the area"
+            f"{repairs['pieces_dropped']} pieces outside or inside the brain were dropped: "
+            f"{100 * dropped / (remaining + dropped):.1f} % of the area"
         )
     mesh, stalks = surface_without_stalks(mesh)
     warnings += [
-        f"a part of {stalk['volume_mm3']:.0f} mm³ hung on a stalk of {stalk['stalk_mm2']:.0f} mm²: cut off"
+        f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
         for stalk in stalks
     ]
-    return Sound(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
+    return RepairedSurface(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
 
 
-def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> Sound:
-    """Return the surface smoothed and remeshed, each piece a sphere that does not cut itself.
+def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
+    """Smooth and remesh a surface so that each piece is a sphere without self-intersections.
 
-    Where the triangles can't be repaired, the surface is rebuilt through voxels of half an edge length. The report has
-    what `rebuild` says as "remade". MeshError where that stays tangled.
+    If the triangles cannot be repaired, the surface is rebuilt through voxels of half an edge length; the report of
+    `rebuild` is in "remade". MeshError if self-intersections remain.
     """
     smooth, cutting = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
     if not (remaining := faults(smooth)):
-        return Sound(smooth, report, [])
+        return RepairedSurface(smooth, report, [])
     mesh, report["remade"] = rebuild(mesh, 0.5 * edge_length_mm)
     smooth, _ = make_even(mesh, edge_length_mm)
     require_sound(smooth)
-    return Sound(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
+    return RepairedSurface(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
 
 
 def require_sound(mesh: TriangleMesh) -> None:
-    """Raise MeshError where the surface is not made of closed spheres without intersections."""
+    """Raise MeshError if the surface is not made of closed spheres without self-intersections."""
     if problems := faults(mesh):
         raise MeshError(
-            "the surface could not be made good",
+            "the surface could not be repaired",
             found=problems,
-            expected="closed pieces of Euler number 2 that do not cut themselves",
+            expected="closed pieces of Euler number 2 without self-intersections",
         )
 
 
 def faults(mesh: TriangleMesh) -> str:
-    """Return what keeps the surface from being closed spheres without intersections; empty where nothing does."""
+    """Return the faults of a surface that should be closed spheres without self-intersections; empty if none."""
     euler = [euler_number(piece) for piece in pieces(mesh)]
-    cutting = int(self_intersecting_faces(mesh).sum())
+    crossing = int(self_intersecting_faces(mesh).sum())
     problems = [
         "edges without two faces" if not is_closed(mesh) else "",
         f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
-        f"{cutting} faces that cut others" if cutting else "",
+        f"{crossing} self-intersecting faces" if crossing else "",
     ]
     return ", ".join(fault for fault in problems if fault)
 
 
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Return the surface smoothed, remeshed and untangled, and the number of faces that cut others before that.
+    """Smooth, remesh and untangle a surface; return it and the number of self-intersecting faces before untangling.
 
-    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53). Walls of a narrow slit that stay
-    tangled are not smoothed.
+    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53). Walls of a narrow slit that keep crossing are
+    not smoothed.
     """
     document = in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
     smooth = from_meshlab(document)
     even = remesh(smooth, edge_length_mm)
-    cutting = int(self_intersecting_faces(even).sum())
-    if cutting and self_intersecting_faces(even := untangle(even)).any():
-        even = untangle(remesh(_held_back(mesh, smooth), edge_length_mm))
-    return even, cutting
+    crossing = int(self_intersecting_faces(even).sum())
+    if crossing and self_intersecting_faces(even := untangle(even)).any():
+        even = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
+    return even, crossing
 
 
-def _held_back(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
-    """Return the smoothed surface with faces that cut others, and some rings around these, as they were before."""
-    for _ in range(HELD_BACK):
-        held = self_intersecting_faces(smooth)
-        if not held.any():
+def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
+    """Reset self-intersecting faces of a smoothed surface, and some rings around them, to their original places."""
+    for _ in range(N_RESETS):
+        reset = self_intersecting_faces(smooth)
+        if not reset.any():
             break
-        for _ in range(HELD_RINGS):
-            held[:] = np.isin(mesh.faces, mesh.faces[held]).any(axis=1)
+        for _ in range(N_RESET_RINGS):
+            reset[:] = np.isin(mesh.faces, mesh.faces[reset]).any(axis=1)
         places = smooth.vertices.copy()
-        places[mesh.faces[held]] = mesh.vertices[mesh.faces[held]]
+        places[mesh.faces[reset]] = mesh.vertices[mesh.faces[reset]]
         smooth = TriangleMesh(places, mesh.faces)
     return smooth
 
 
-def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
+def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
     """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are joined, degenerate and double faces removed, non-manifold edges opened, holes up to `max_hole_mm`
-    across closed, faces turned outward, small pieces and pieces inside others dropped, and all but the largest where
-    there is to be `one`. MeshError for larger holes and for surfaces that stay open.
+    Equal vertices are merged, degenerate and duplicate faces removed, non-manifold edges opened, holes up to
+    `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
+    all but the largest. MeshError for larger holes and for surfaces that stay open.
     """
     mesh, doubles = _drop_doubles(mesh)
-    # not before: faces that meet in several copies of a vertex would count
-    cutting = int(self_intersecting_faces(mesh).sum())
+    # after merging, since faces that meet in copies of a vertex would count
+    crossing = int(self_intersecting_faces(mesh).sum())
     mesh, opened = _make_manifold(mesh)
-    mesh, dropped = _main_pieces(mesh, one)
+    mesh, dropped = _main_pieces(mesh, single)
     mesh, holes = _fill_holes(mesh, max_hole_mm)
     parts = pieces(mesh)
     inward = [signed_volume(piece) < 0 for piece in parts]
@@ -186,7 +186,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, one: bool = False) -> tuple
             found=f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair",
             expected="a closed surface",
         )
-    counts = {"faces_that_cut_others": cutting, "pieces_turned_outward": sum(inward)}
+    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": sum(inward)}
     return mesh, doubles | opened | dropped | holes | counts
 
 
@@ -197,17 +197,17 @@ def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
 
 
 def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
-    vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, SAME_MM)
+    vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, MERGE_MM)
     used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    result, kept = submesh(TriangleMesh(vertices, faces[np.sort(first)]), np.ones(len(first), dtype=bool))
+    result, used_vertices = submesh(TriangleMesh(vertices, faces[np.sort(first)]), np.ones(len(first), dtype=bool))
     return result, {
         "degenerate_faces_removed": int(flat.sum()),
         "double_faces_removed": len(faces) - len(first),
-        "duplicate_vertices_joined": max(used - len(kept), 0),
+        "duplicate_vertices_joined": max(used - len(used_vertices), 0),
     }
 
 
@@ -229,16 +229,16 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     }
 
 
-def _main_pieces(mesh: TriangleMesh, one: bool) -> tuple[TriangleMesh, dict[str, Any]]:
+def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[str, Any]]:
     parts = pieces(mesh)
     areas = [area(piece) for piece in parts]
-    kept = [parts[0]]
+    main = [parts[0]]
     for piece, size in zip(parts[1:], areas[1:], strict=True):
         inside = np.median(np.abs(igl.fast_winding_number(parts[0].vertices, parts[0].faces, piece.vertices))) > 0.5
-        if size >= COMPARABLE * areas[0] and not (inside or one):
-            kept.append(piece)
-    dropped = {"pieces_dropped": len(parts) - len(kept), "area_dropped_mm2": sum(areas) - sum(map(area, kept))}
-    return merged(*kept), {"pieces": len(kept)} | dropped
+        if size >= COMPARABLE * areas[0] and not (inside or single):
+            main.append(piece)
+    dropped = {"pieces_dropped": len(parts) - len(main), "area_dropped_mm2": sum(areas) - sum(map(area, main))}
+    return merged(*main), {"pieces": len(main)} | dropped
 
 
 def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
@@ -252,24 +252,24 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
             expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
             remedy="Give a closed surface, or raise surface.max_hole_mm if the opening may be covered."
             if wide[0] <= MAX_HOLE_MM
-            else "Give a closed surface: holes of this size are not to be covered.",
+            else "Give a closed surface: holes of this size cannot be covered.",
         )
     vertices, faces = [mesh.vertices], [mesh.faces]
     for number, loop in enumerate(loops):
         centre = np.full(len(loop), len(mesh.vertices) + number)
         start, end = loop, np.roll(loop, -1)
-        # the fan runs along the loop against the faces that are there
-        along = (mesh.faces[:, [0, 1, 2]] == start[0]) & (mesh.faces[:, [1, 2, 0]] == end[0])
-        faces.append(np.stack([end, start, centre] if along.any() else [start, end, centre], axis=1))
+        # the fan is oriented against the existing faces
+        runs_along = (mesh.faces[:, [0, 1, 2]] == start[0]) & (mesh.faces[:, [1, 2, 0]] == end[0])
+        faces.append(np.stack([end, start, centre] if runs_along.any() else [start, end, centre], axis=1))
         vertices.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
     counts = {"holes_closed": len(loops), "largest_hole_mm": max(sizes, default=0.0)}
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)), counts
 
 
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
-    """Return a closed surface without what hangs on it by stalks, closed where these were cut, and the parts."""
-    if not SMALLEST_MM < np.ptp(mesh.vertices, axis=0).max() < LARGEST_MM:
-        # in another unit, which is reported elsewhere
+    """Remove the parts of a closed surface that hang by a stalk and close the cuts; return it and the parts."""
+    if not MIN_LENGTH_MM < np.ptp(mesh.vertices, axis=0).max() < MAX_LENGTH_MM:
+        # surfaces in another unit are reported elsewhere
         return mesh, []
     size = np.full(3, STALK_VOXEL_MM)
     first = mesh.vertices.min(axis=0) - 2.0 * size
@@ -280,15 +280,15 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     mask = np.asarray(image["mask"]).reshape(shape, order="F") > 0
     affine = np.diag([*size, 1.0])
     affine[:3, 3] = first
-    left, report = without_stalks(mask, affine)
+    remaining, report = without_stalks(mask, affine)
     if not report:
         return mesh, []
-    # which side of the cuts each face is on: that of the nearest voxel inside
+    # a face belongs to the same side of a cut as the nearest voxel inside
     _, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
-    at = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
-    kept = left[tuple(nearest[(slice(None), *at.T)])]
-    open_, _ = submesh(mesh, kept)
-    return clean(open_, WIDEST_CUT_MM)[0], report
+    voxel = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
+    is_kept = remaining[tuple(nearest[(slice(None), *voxel.T)])]
+    cut_open, _ = submesh(mesh, is_kept)
+    return clean(cut_open, MAX_CUT_MM)[0], report
 
 
 def surface_of_mask(
@@ -299,40 +299,39 @@ def surface_of_mask(
     *,
     smallest: float = COMPARABLE_PARTS,
     taken_mm3: float = 0.0,
-    shut: tuple[NDArray[np.float32], Floats] | None = None,
-) -> Sound:
+    original: tuple[NDArray[np.float32], Floats] | None = None,
+) -> RepairedSurface:
     """Return the even surface around a smoothed (i, j, k) mask, without terraces and with the mask's volume.
 
-    `volume_mm3` is that of the mask, `taken_mm3` what was taken from it; parts below `smallest` of the largest are left
-    out; `shut` is the field before it was opened, with its affine: walls that were not there have no terraces. The
-    report has the "topology" and the "smoothing" too. MeshError where the surface stays tangled.
+    `volume_mm3` is the volume of the mask, `taken_mm3` the part removed by openings; parts below `smallest` of the
+    largest are left out. `original` is the field before sulci and fissure were opened, with its affine: walls of
+    openings have no terraces. The report includes "topology" and "smoothing". MeshError if self-intersections remain.
     """
     simple, topology = make_simple(field, smallest)
     rough = isosurface(simple, affine)
     even = make_sound(rough, edge_length_mm)
-    before, grid = shut or (simple, affine)
-    smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > WITHIN)
+    before, grid = original or (simple, affine)
+    smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL)
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))
     moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
     smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
     warnings = list(even.warnings)
-    if abs(change := smoothing["volume_change"]) > KEPT:
-        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: finer voxels keep it")
-    return Sound(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
+    if abs(change := smoothing["volume_change"]) > VOLUME_TOL:
+        warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: use finer voxels")
+    return RepairedSurface(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
 
 
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Return a closed surface set along its normals so that it encloses a volume, and a report in plain values.
+    """Move a closed surface along its normals until it encloses a volume; return it and a report in plain values.
 
-    Smoothing and remeshing draw a convex surface inwards by some hundredths of a mm: ΔV/A is given back. Walls so near
-    to each other that they would cut stay where they are. So does the whole surface where more than 5 % of the volume
-    is missing, or where it would cut itself even so. `area_mm2` is that of the mask's isosurface before it was smoothed
-    and remeshed.
+    Smoothing and remeshing move a convex surface inward by some hundredths of a mm, which ΔV/A restores. Walls that
+    would cross each other are not moved, nor is the whole surface if more than 5 % of the volume is missing or if it
+    would still cross itself. `area_mm2` is the area of the mask's isosurface before smoothing and remeshing.
     """
     before = signed_volume(mesh) / volume_mm3 - 1.0
-    moved = _set_along_normals(mesh, volume_mm3) if abs(before) <= MOST_GIVEN_BACK else mesh
+    moved = _move_along_normals(mesh, volume_mm3) if abs(before) <= MAX_RESTORED else mesh
     change = signed_volume(moved) / volume_mm3 - 1.0
     report = {
         "volume_expected_mL": volume_mm3 * ML_PER_MM3,
@@ -344,17 +343,17 @@ def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple
     return moved, report
 
 
-def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
+def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     free = np.ones(len(mesh.vertices), dtype=bool)
-    for _ in range(HELD_BACK + 1):
+    for _ in range(N_RESETS + 1):
         moved = mesh
         for _ in range(ROUNDS):
             share = float(vertex_areas(moved)[free].sum())
             offset = (volume_mm3 - signed_volume(moved)) / share * free
             moved = TriangleMesh(moved.vertices + offset[:, None] * vertex_normals(moved), moved.faces)
-        if not (cutting := self_intersecting_faces(moved)).any():
+        if not (crossing := self_intersecting_faces(moved)).any():
             return moved
-        near = np.isin(mesh.faces, mesh.faces[cutting]).any(axis=1)
+        near = np.isin(mesh.faces, mesh.faces[crossing]).any(axis=1)
         free[mesh.faces[near]] = False
         if not free.any():
             break
@@ -362,28 +361,28 @@ def _set_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Return the surface of the region that `mesh` winds around, without handles or intersections, and a report.
+    """Rebuild a surface through voxels, without handles or self-intersections; return it and a report.
 
     The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
-    even where the surface cuts itself. Details below the voxel size are lost.
+    even where the surface crosses itself. Details below the voxel size are lost.
     """
     first = mesh.vertices.min(axis=0) - MARGIN_VOXELS * voxel_mm
     shape = np.ceil(np.ptp(mesh.vertices, axis=0) / voxel_mm).astype(int) + 2 * MARGIN_VOXELS
     affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
     affine[:3, 3] = first
     points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
-    # NaN beyond the bound, where the field is 0 or 1
-    near_by = igl.SIGNED_DISTANCE_TYPE_UNSIGNED, -2.0 * voxel_mm, 2.0 * voxel_mm
-    distance = igl.signed_distance(points, mesh.vertices, mesh.faces, *near_by)[0]
+    # NaN beyond the bounds, where the field is 0 or 1
+    bounds = igl.SIGNED_DISTANCE_TYPE_UNSIGNED, -2.0 * voxel_mm, 2.0 * voxel_mm
+    distance = igl.signed_distance(points, mesh.vertices, mesh.faces, *bounds)[0]
     band = np.isfinite(distance)
     distance[~band] = np.inf
     wound = np.zeros(len(points), dtype=bool)
     wound[band] = igl.fast_winding_number(mesh.vertices, mesh.faces, points[band]) > 0.5
-    # where no surface is near, each region is inside or outside as a whole
+    # each region away from the surface is inside or outside as a whole
     far = ~band.reshape(shape)
     number, count = ndimage.label(far)
-    one = np.array(ndimage.maximum_position(far, number, np.arange(1, count + 1)), dtype=float)
-    winding = igl.fast_winding_number(mesh.vertices, mesh.faces, one @ affine[:3, :3].T + affine[:3, 3])
+    samples = np.array(ndimage.maximum_position(far, number, np.arange(1, count + 1)), dtype=float)
+    winding = igl.fast_winding_number(mesh.vertices, mesh.faces, samples @ affine[:3, :3].T + affine[:3, 3])
     inside = wound.reshape(shape) | np.concatenate([[False], winding > 0.5])[number]
     signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin: what a folding model is tried on."""
+"""Spheres and ellipsoids as closed surfaces in mm, RAS+ around the origin, for tests of a folding model."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..settings.synthetic import ShapeSettings
 REMESHING_ROUNDS = 10
 # the edges of a finely sampled curved face are far less sharp
 SHARP_DEG = 45.0
-# bumps of all these wavelengths, so that folding finds its own among them
+# bumps of all these wavelengths, so that they contain that of the folds
 WAVELENGTHS_MM = (8.0, 40.0)
 WAVES = 64
 
@@ -22,11 +22,10 @@ def shape_surface(
     noise_mm: float = ShapeSettings.model_fields["noise_mm"].default,
     seed: int = ShapeSettings.model_fields["seed"].default,
 ) -> TriangleMesh:
-    """Return an ellipsoid as a closed, outward surface of even triangles, its vertices on the shape.
+    """Return an ellipsoid as a closed, outward surface of even triangles, with smooth bumps along the normal.
 
-    Smooth bumps along the normal, which folding needs to start from, have the root mean square height `noise_mm`; their
-    pattern follows from `seed`, not from the edge length. InputError where the edges are longer than half the smallest
-    radius of curvature.
+    The bumps, from which folding starts, have the root mean square height `noise_mm`; their pattern depends on `seed`,
+    not on the edge length. InputError if the edges are longer than half the smallest radius of curvature.
     """
     size = np.array(semi_axes_mm, dtype=float)
     longest = 0.5 * size.min() ** 2 / size.max()

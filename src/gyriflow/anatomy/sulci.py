@@ -1,7 +1,7 @@
-"""Sulci that voxels keep shut, opened where fronts from the white matter of two banks meet within the cortex.
+"""Open fused sulci where fronts from the white matter of two banks meet within the cortex.
 
-The cortex between two banks that touch is one thick sheet, and the shut sulcus is its middle (Han et al. 2004, doi
-10.1016/j.neuroimage.2004.06.043). There the white matter nearest to a point changes from one bank to the other.
+The cortex of two fused banks is one thick sheet, and the sulcus is its middle (Han et al. 2004, doi
+10.1016/j.neuroimage.2004.06.043). There the nearest point of white matter changes from one bank to the other.
 """
 
 import heapq
@@ -16,40 +16,40 @@ from ..geometry.deformations import transform_points
 from ..units import ML_PER_MM3
 from .extraction import INSIDE, LEVEL, OUTSIDE, Floats, Mask, is_simple, main_parts, refine, shifted_affine
 from .fissure import Fissure, sample
-from .thickness import LEAST_VOXELS
+from .thickness import MIN_VOXELS
 
-# voxels are made as fine as this before a slit is cut between them; usual ones of 0.5 mm, exact or not, are as they are
-FINE_MM = 0.55
-# the points of white matter nearest to both sides of a sulcus are so many cortical thicknesses apart; under a bend or a
-# thick crest they are nearer to each other
-APART = 1.4
-# the cortex of a bank has at least this part of its usual thickness
-LEAST_BANK = 0.75
-# smaller sheets are roughness of the labels; those that reach less deep below the surface, in cortical thicknesses, are
-# an open sulcus' own bottom, rounded by voxels
-LEAST_MM2 = 8.0
-DEEP = 1.5
-# voxels that are kept around a brain
+# voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
+MAX_VOXEL_MM = 0.55
+# the nearest points of white matter on both sides of a sulcus are at least this many cortical thicknesses apart;
+# under a bend or a thick crest they are closer
+MIN_BANK_DISTANCE = 1.4
+# the cortex of a bank has at least this share of its usual thickness
+MIN_BANK = 0.75
+# smaller sheets are roughness of the labels; sheets less deep than this (in cortical thicknesses) are the rounded
+# bottom of an open sulcus
+MIN_SHEET_MM2 = 8.0
+MIN_SHEET_DEPTH = 1.5
+# margin around a brain
 MARGIN_VOXELS = 3
-# the field in a slit: with 1 beside it, a slit one voxel wide comes out 0.9 voxels wide
-IN_SLIT = 0.1
-# cortex further from white matter than so many thicknesses lacks white matter; more than this share of it is too much
-FAR, MOST_FAR = 3.0, 0.05
+# value of the field in a slit; with 1 next to it, a slit of one voxel becomes 0.9 voxels wide
+SLIT_VALUE = 0.1
+# cortex further from white matter than this many thicknesses lacks white matter; largest share of such cortex
+FAR, MAX_FAR_SHARE = 3.0, 0.05
 
 
-def open_shut_sulci(
+def open_fused_sulci(
     field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure | None = None
 ) -> tuple[NDArray[np.float32], Floats, dict[str, Any]]:
-    """Return the smoothed mask of a cerebrum with its shut sulci opened by slits, its affine, and a report.
+    """Open the fused sulci of a cerebrum's smoothed mask by slits; return the field, its affine, and a report.
 
-    The (i, j, k) `field` is cut to the brain and made finer, to voxels of at most 0.55 mm; its voxels are those of the
-    mask `core`, the tissue inside the cortex, or a whole part of these. Slits begin outside and grow inwards over
-    simple points, so that they add neither handles nor cavities, and stop where one bank's white matter begins to be
-    the other's. The `fissure` parts the hemispheres: what lies between these is no sulcus. The field is returned as it
-    was where no sulcus is shut, where much cortex lies far from all white matter, and where cortex is thinner than 1.5
-    voxels; for the latter two the report says why as "stays_fused".
+    The (i, j, k) `field` is cropped to the brain and refined to voxels of at most 0.55 mm. Its voxels are those of the
+    mask `core`, the tissue inside the cortex, or an integer fraction of these. Slits grow inward from outside over
+    simple points, so they add neither handles nor cavities, and end where both banks have the same white matter. Slits
+    between the hemispheres, on different sides of the `fissure`, are not sulci. The field is returned unchanged if no
+    sulcus is fused, if much cortex is far from all white matter, or if the cortex is thinner than 1.5 voxels. In the
+    latter two cases the report has the reason as "stays_fused".
     """
-    factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / FINE_MM))
+    factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
     brain, part = _around_brain(field, every)
     solid, _ = refine(main_parts(core)[0][part].astype(np.float32), affine, every * factor)
@@ -60,34 +60,34 @@ def open_shut_sulci(
     cortex = inside & ~solid
     nearest = ndimage.distance_transform_edt(~solid, sampling=size, return_distances=False, return_indices=True)
     places = np.argwhere(cortex).astype(np.int32)
-    away = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
-    beside = ndimage.binary_dilation(~inside, INSIDE)
-    low, thickness = map(float, np.quantile(away[beside[cortex]], [0.25, 0.5]))
-    if (far := float((away > FAR * low).mean())) > MOST_FAR:
-        why = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
-        return field, affine, {"stays_fused": why}
-    if (voxels := thickness / (factor * every * size.max())) < LEAST_VOXELS:
-        why = f"the cortex is {voxels:.1f} voxels thick, so that roughness of the labels looks like two banks"
-        return field, affine, {"stays_fused": why}
+    depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
+    at_surface = ndimage.binary_dilation(~inside, INSIDE)
+    low, thickness = map(float, np.quantile(depth_mm[at_surface[cortex]], [0.25, 0.5]))
+    if (far := float((depth_mm > FAR * low).mean())) > MAX_FAR_SHARE:
+        reason = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
+        return field, affine, {"stays_fused": reason}
+    if (voxels := thickness / (factor * every * size.max())) < MIN_VOXELS:
+        reason = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
+        return field, affine, {"stays_fused": reason}
     bank = cortex.copy()
-    bank[cortex] = away > LEAST_BANK * thickness
-    apart = np.zeros(cortex.shape, dtype=np.float32)
+    bank[cortex] = depth_mm > MIN_BANK * thickness
+    distance = np.zeros(cortex.shape, dtype=np.float32)
     for axis in range(3):
-        _mark(apart, bank, nearest, axis, APART * thickness, fine, fissure)
-    # coarse voxels tell how deep a sheet reaches, at an eighth of the time
+        _mark_sheet(distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, fine, fissure)
+    # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0))
-    depth = sample(below, grid, transform_points(np.argwhere(apart > 0), fine))
-    sheets, count = _deep_sheets(apart > 0, beside, size, depth, DEEP * thickness)
+    depth = sample(below, grid, transform_points(np.argwhere(distance > 0), fine))
+    sheets, count = _deep_sheets(distance > 0, at_surface, size, depth, MIN_SHEET_DEPTH * thickness)
     if not count:
         return field, affine, {"sheets": 0, "slit_voxels": 0, "opened_mL": 0.0}
-    slit = _grown(inside, sheets, cortex, apart)
-    opened = np.where(slit, np.minimum(whole, np.float32(IN_SLIT)), whole)
+    slit = _grow_slits(inside, sheets, cortex, distance)
+    opened = np.where(slit, np.minimum(whole, np.float32(SLIT_VALUE)), whole)
     taken = float((whole - opened).sum(dtype=float) * size.prod() * ML_PER_MM3)
     return opened, fine, {"sheets": count, "slit_voxels": int(slit.sum()), "opened_mL": taken}
 
 
 def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-    """Return the slices of a field around a brain, and those of voxels `every` times larger: air costs time."""
+    """Return the slices of a field around a brain, and those of voxels `every` times larger."""
     large = [
         slice(max(side.start // every - MARGIN_VOXELS, 0), -(-side.stop // every) + MARGIN_VOXELS)
         for side in ndimage.find_objects((field > LEVEL).astype(np.uint8))[0]
@@ -95,63 +95,64 @@ def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, 
     return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(large)
 
 
-def _deep_sheets(apart: Mask, beside: Mask, size_mm: Floats, depth_mm: Floats, least_mm: float) -> tuple[Mask, int]:
-    """Return the large parts of a mask that begin at the outside and reach so deep, and their number.
+def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, depth_mm: Floats, min_mm: float) -> tuple[Mask, int]:
+    """Return the large parts of a mask that reach from the surface to a minimum depth, and their number.
 
-    `depth_mm` (n,) is that of the mask's voxels below the surface, `beside` where the outside is next.
+    `depth_mm` (n,) is the depth of the mask's voxels below the surface, `at_surface` the mask of voxels at it.
     """
-    number, count = ndimage.label(apart, OUTSIDE)
-    part, parts = number[apart], np.arange(count + 1)
-    large = np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3) >= LEAST_MM2
-    reached = np.bincount(part, beside[apart], minlength=count + 1) > 0
-    deep = np.bincount(part, depth_mm > least_mm, minlength=count + 1) > 0
-    kept = large & reached & deep & (parts > 0)
-    return kept[number], int(kept.sum())
+    number, count = ndimage.label(sheet, OUTSIDE)
+    part, parts = number[sheet], np.arange(count + 1)
+    large = np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3) >= MIN_SHEET_MM2
+    reached = np.bincount(part, at_surface[sheet], minlength=count + 1) > 0
+    deep = np.bincount(part, depth_mm > min_mm, minlength=count + 1) > 0
+    is_sheet = large & reached & deep & (parts > 0)
+    return is_sheet[number], int(is_sheet.sum())
 
 
-def _mark(
-    apart: NDArray[np.float32],
+def _mark_sheet(
+    distance: NDArray[np.float32],
     cortex: Mask,
     nearest: NDArray[np.int32],
     axis: int,
-    least_mm: float,
+    min_mm: float,
     affine: Floats,
     fissure: Fissure | None,
 ) -> None:
-    """Set `apart` (i, j, k) where neighbours along an axis have different banks: how far these are apart in mm.
+    """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
 
-    Of both voxels those are set that the plane half-way between the banks passes through: faces join these.
+    It is set in the voxels that the plane half-way between the banks passes, which are connected through faces.
     """
     size, step = np.linalg.norm(affine[:3, :3], axis=0), np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))
-    banks = [nearest[(slice(None), *one.T)].T for one in (first, first + step)]
-    way = (banks[1] - banks[0]) * size
-    length = np.linalg.norm(way, axis=1)
-    two = length > least_mm
+    banks = [nearest[(slice(None), *voxels.T)].T for voxels in (first, first + step)]
+    offset = (banks[1] - banks[0]) * size
+    length = np.linalg.norm(offset, axis=1)
+    differ = length > min_mm
     if fissure is not None:
-        sides = [fissure.height_above(transform_points(one[two], affine)) > 0 for one in banks]
-        two[two] = sides[0] == sides[1]
-    first, way, length, middle = first[two], way[two], length[two], (0.5 * (banks[0] + banks[1]) * size)[two]
-    normal = way / length[:, None]
+        sides = [fissure.height_above(transform_points(bank[differ], affine)) > 0 for bank in banks]
+        differ[differ] = sides[0] == sides[1]
+    first, offset, length = first[differ], offset[differ], length[differ]
+    middle = (0.5 * (banks[0] + banks[1]) * size)[differ]
+    normal = offset / length[:, None]
     reach = 0.5 * (np.abs(normal) * size).sum(axis=1)
-    for one in (first, first + step):
-        through = np.abs(((one * size - middle) * normal).sum(axis=1)) <= reach
-        np.maximum.at(apart, tuple(one[through].T), length[through].astype(np.float32))
+    for voxels in (first, first + step):
+        through = np.abs(((voxels * size - middle) * normal).sum(axis=1)) <= reach
+        np.maximum.at(distance, tuple(voxels[through].T), length[through].astype(np.float32))
 
 
-def _grown(inside: Mask, sheet: Mask, cortex: Mask, apart: NDArray[np.float32]) -> Mask:
-    """Return what the outside gains by growing into a sheet over simple points, first where banks are furthest apart.
+def _grow_slits(inside: Mask, sheet: Mask, cortex: Mask, distance: NDArray[np.float32]) -> Mask:
+    """Return the slits: voxels of a sheet into which the outside grows over simple points, widest banks first.
 
-    Gaps of a voxel in the sheet are bridged, and given back where they were not needed.
+    Gaps of one voxel in the sheet are bridged, and filled again if this was not necessary.
     """
     layer, row = inside.shape[1] * inside.shape[2], inside.shape[2]
     steps = [i * layer + j * row + k for i, j, k in product((-1, 0, 1), repeat=3) if (i, j, k) != (0, 0, 0)]
     faces = (1, -1, row, -row, layer, -layer)
     rows = [i * layer + j * row - 1 for i in (-1, 0, 1) for j in (-1, 0, 1)]
-    # flat bytes: single voxels of an array take ten times as long to read
-    mask, of_sheet = bytearray(inside.tobytes()), sheet.tobytes()
+    # flat bytes, since reading single voxels of an array takes ten times as long
+    mask, sheet_bytes = bytearray(inside.tobytes()), sheet.tobytes()
     places = np.flatnonzero(sheet | (ndimage.binary_closing(sheet, OUTSIDE) & cortex))
-    waiting = {int(place): -float(apart.flat[place]) for place in places}
+    waiting = {int(place): -float(distance.flat[place]) for place in places}
     queue = [(value, place) for place, value in waiting.items()]
     queued, order = set(waiting), []
     heapq.heapify(queue)
@@ -172,6 +173,6 @@ def _grown(inside: Mask, sheet: Mask, cortex: Mask, apart: NDArray[np.float32]) 
                 queued.add(near)
                 heapq.heappush(queue, (waiting[near], near))
     for place in reversed(order):
-        if not of_sheet[place] and simple(place):
+        if not sheet_bytes[place] and simple(place):
             mask[place] = 1
     return inside & (np.frombuffer(mask, dtype=np.uint8).reshape(inside.shape) == 0)

@@ -1,4 +1,4 @@
-"""Surfaces registered with an upright template: the rotation that brings them to RAS+, and how sure it is.
+"""Register surfaces to an upright template: the rotation to RAS+ and its confidence.
 
 The template is the shipped atlas at three weeks, `atlases/spina-bifida/right.week*.surf.gii`.
 """
@@ -26,28 +26,28 @@ from ..shipped import SHIPPED
 
 WEEKS = 21, 28, 34
 POINTS = 2400
-# of whole brains, points deeper below the hull, in sizes, do not count
-DEEPEST = 0.15
-# how much a difference of normals counts beside a distance, in sizes, when nearest points are looked for
-NORMALS = 0.2
-# distances beyond these (in sizes) hardly count: coarse for the start, finer for the end
+# points of whole brains deeper than this below the hull (in sizes) are left out
+MAX_DEPTH = 0.15
+# weight of a difference of normals relative to a distance (in sizes) in the search for nearest points
+NORMAL_WEIGHT = 0.2
+# scales of the robust weight of distances (in sizes), at first and at the end
 COARSE, FINE = 0.3, 0.12
-FURTHEST = 0.3
-# poses that differ by less are one, and so many are refined
-DISTINCT_DEG, REFINED = 40.0, 3
-# the medial wall: how near to its plane points are, in sizes, and how far their normals are from its own, in degrees
+MAX_DISTANCE = 0.3
+# poses that differ by less count as one; number of poses that are refined
+DISTINCT_DEG, N_REFINED = 40.0, 3
+# the medial wall: largest distances of its points from the plane (in sizes) and of their normals from the plane's (°)
 WALL = ((0.30, 40.0), (0.15, 25.0), (0.075, 15.0), (0.075, 10.0))
 WALL_ROUNDS, WALL_COSINE = 6, 0.85
-# narrower looks that turn the plane by more follow a bend of the wall
+# narrower fits that rotate the plane by more than this follow a bend of the wall
 BEND_DEG = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """Points spread over a closed surface, free of its place and size.
+class PointCloud:
+    """Points on a closed surface, independent of its position and size.
 
-    (n, 3) `points` are relative to the `centre` of volume (3,), in mm, and to the size, the cube root of the volume;
-    `normals` are their outward unit normals.
+    (n, 3) `points` are relative to the `centre` of volume (3,) in mm and divided by the size, the cube root of the
+    volume; `normals` are their outward unit normals.
     """
 
     points: Floats
@@ -61,20 +61,20 @@ class Shape:
 
     @staticmethod
     def features(points: Floats, normals: Floats) -> Floats:
-        """Return the (n, 6) places between which nearest points are looked for."""
-        return np.hstack([points, NORMALS * normals])
+        """Return the (n, 6) features in whose space nearest points are searched."""
+        return np.hstack([points, NORMAL_WEIGHT * normals])
 
-    def mirrored(self) -> "Shape":
-        """Return the shape of the other side."""
+    def mirrored(self) -> "PointCloud":
+        """Return the mirror image."""
         mirror = MIRROR[:3, :3]
-        return Shape(self.points @ mirror, self.normals @ mirror, mirror @ self.centre, self.size_mm)
+        return PointCloud(self.points @ mirror, self.normals @ mirror, mirror @ self.centre, self.size_mm)
 
 
-def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
-    """Return the shape of a closed, outward surface, by points drawn at random in proportion to area.
+def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
+    """Sample points of a closed, outward surface at random, in proportion to area.
 
-    Those `deepest` sizes and more below the convex hull are left out: of whole brains the depth of the fissure, which
-    may be open or shut.
+    Points deeper than `max_depth` sizes below the convex hull are left out: in whole brains the depth of the fissure,
+    which may be open or fused.
     """
     triangles, areas = corners(mesh), face_areas(mesh)
     volumes = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
@@ -84,23 +84,23 @@ def shape_of(mesh: TriangleMesh, *, deepest: float = np.inf) -> Shape:
     faces = random.choice(len(areas), POINTS, p=areas / areas.sum())
     points = np.einsum("nc,ncd->nd", random.dirichlet(np.ones(3), POINTS), triangles[faces])
     points, normals = (points - centre) / size, face_normals(mesh)[faces]
-    if np.isfinite(deepest):
+    if np.isfinite(max_depth):
         hull = ConvexHull(points).equations
-        outer = (points @ hull[:, :3].T + hull[:, 3]).max(axis=1) > -deepest
+        outer = (points @ hull[:, :3].T + hull[:, 3]).max(axis=1) > -max_depth
         points, normals = points[outer], normals[outer]
-    return Shape(points, normals, centre, size)
+    return PointCloud(points, normals, centre, size)
 
 
 @cache
-def hemispheres() -> tuple[Shape, ...]:
+def hemispheres() -> tuple[PointCloud, ...]:
     """Return the right hemispheres of the template."""
     return tuple(map(shape_of, _surfaces()))
 
 
 @cache
-def brains() -> tuple[Shape, ...]:
+def brains() -> tuple[PointCloud, ...]:
     """Return the template's brains, of two hemispheres each."""
-    return tuple(shape_of(merged(transformed(right, MIRROR), right), deepest=DEEPEST) for right in _surfaces())
+    return tuple(shape_of(merged(transformed(right, MIRROR), right), max_depth=MAX_DEPTH) for right in _surfaces())
 
 
 def _surfaces() -> list[TriangleMesh]:
@@ -108,24 +108,27 @@ def _surfaces() -> list[TriangleMesh]:
     return [read_surface(folder / f"right.week{week}.surf.gii") for week in WEEKS]
 
 
-def register(shape: Shape, targets: Sequence[Shape], rotation: Floats, shift: Floats | None = None) -> RigidFit:
-    """Return the best fit of a shape on one of several, from a (3, 3) rotation near it."""
+def register(
+    shape: PointCloud, targets: Sequence[PointCloud], rotation: Floats, shift: Floats | None = None
+) -> RigidFit:
+    """Return the best fit of a shape to one of several targets, starting from a (3, 3) rotation close to it."""
     return min(
         (_descend(shape, target, rotation, shift, FINE, 30, 3) for target in targets), key=lambda fit: fit.residual
     )
 
 
-def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[RigidFit, float]:
-    """Return the best fit of a shape on one of several, from 24 starts, and how many times worse the next pose is.
+def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) -> tuple[RigidFit, float]:
+    """Return the best fit of a shape to one of several targets from 24 starts, and its confidence.
 
-    The next pose is more than 40° away. Near 1, as for a body of revolution, the shape says no pose.
+    The confidence is the residual of the best pose more than 40° away over that of the best fit. Near 1, as for a body
+    of revolution, the shape does not determine the pose.
     """
     middle = targets[len(targets) // 2]
     fits = fits_from_all_sides(
         CUBE_ROTATIONS,
         lambda start: _descend(shape, middle, start, None, COARSE, 12, 8),
         lambda fit: register(shape, targets, fit.rotation, fit.shift),
-        REFINED,
+        N_REFINED,
         DISTINCT_DEG,
     )
     best = min(fits, key=lambda fit: fit.residual)
@@ -135,9 +138,9 @@ def register_from_all_sides(shape: Shape, targets: Sequence[Shape]) -> tuple[Rig
 
 
 def _descend(
-    shape: Shape, target: Shape, rotation: Floats, shift: Floats | None, scale: float, rounds: int, every: int
+    shape: PointCloud, target: PointCloud, rotation: Floats, shift: Floats | None, scale: float, rounds: int, every: int
 ) -> RigidFit:
-    """Return the fit after rounds of iterative closest points, with every so many of the points.
+    """Return the fit after `rounds` of iterative closest points, with every `every`-th point.
 
     Steps follow the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037), with
     Geman-McClure weights.
@@ -145,48 +148,49 @@ def _descend(
     points, normals = shape.points[::every], shape.normals[::every]
 
     def planes(rotation: Floats, shift: Floats) -> Planes:
-        at, facing = points @ rotation.T + shift, normals @ rotation.T
-        _, nearest = target.tree.query(target.features(at, facing))
-        theirs = target.normals[nearest]
-        plane = unit(theirs + facing)
-        ahead = np.einsum("ij,ij->i", target.points[nearest] - at, plane)
-        return at, plane, ahead, (np.einsum("ij,ij->i", theirs, facing) > 0.5) / (1.0 + (ahead / scale) ** 2) ** 2
+        moved, facing = points @ rotation.T + shift, normals @ rotation.T
+        _, nearest = target.tree.query(target.features(moved, facing))
+        target_normals = target.normals[nearest]
+        plane = unit(target_normals + facing)
+        distances = np.einsum("ij,ij->i", target.points[nearest] - moved, plane)
+        agrees = np.einsum("ij,ij->i", target_normals, facing) > 0.5
+        return moved, plane, distances, agrees / (1.0 + (distances / scale) ** 2) ** 2
 
     def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
         return bool(np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3)
 
     rotation, shift = follow_planes(rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged)
-    there, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
-    theirs, facing = target.points[::every], target.normals[::every]
-    back, _ = shape.tree.query(shape.features((theirs - shift) @ rotation, facing @ rotation))
-    squares = [np.mean(np.minimum(distance, FURTHEST) ** 2) for distance in (there, back)]
+    forward, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
+    target_points, facing = target.points[::every], target.normals[::every]
+    backward, _ = shape.tree.query(shape.features((target_points - shift) @ rotation, facing @ rotation))
+    squares = [np.mean(np.minimum(distance, MAX_DISTANCE) ** 2) for distance in (forward, backward)]
     return RigidFit(rotation, shift, float(np.sqrt(np.mean(squares))))
 
 
-def medial_wall(shape: Shape, normal: Floats) -> tuple[Floats, float]:
-    """Return the plane normal·p = offset along a hemisphere's medial wall, which faces about the unit vector given.
+def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:
+    """Fit the plane normal·p = offset to a hemisphere's medial wall, given its approximate unit normal.
 
-    The normal (3,) is outward, the offset in sizes of the hemisphere.
+    The normal (3,) is outward; the offset is in sizes of the hemisphere.
     """
     facing = shape.normals @ normal > WALL_COSINE
     points, normals = shape.points[facing], shape.normals[facing]
     heights = points @ normal
     counts, edges = np.histogram(heights, bins=20)
     offset = edges[counts.argmax()] + 0.5 * (edges[1] - edges[0])
-    # ever more narrowly, so that a wall that was cut along a plane gets that plane
-    for number, look in enumerate(WALL):
-        narrower, there = _wall_plane(points, normals, normal, offset, *look)
-        if number > 1 and _degrees(narrower @ normal) > BEND_DEG:
+    # successively narrower, so that a wall that was cut along a plane gets that plane
+    for number, limits in enumerate(WALL):
+        new_normal, new_offset = _wall_plane(points, normals, normal, offset, *limits)
+        if number > 1 and _degrees(new_normal @ normal) > BEND_DEG:
             break
-        normal, offset = narrower, there
+        normal, offset = new_normal, new_offset
     return normal, float(offset)
 
 
 def _wall_plane(
-    points: Floats, normals: Floats, normal: Floats, offset: float, width: float, most_deg: float
+    points: Floats, normals: Floats, normal: Floats, offset: float, width: float, max_deg: float
 ) -> tuple[Floats, float]:
     for _ in range(WALL_ROUNDS):
-        weights = _biweight((points @ normal - offset) / width) * _biweight(_degrees(normals @ normal) / most_deg)
+        weights = _biweight((points @ normal - offset) / width) * _biweight(_degrees(normals @ normal) / max_deg)
         _, axes = np.linalg.eigh(np.cov(points.T, aweights=weights))
         normal = np.asarray(axes[:, 0] * np.sign(axes[:, 0] @ normal), dtype=np.float64)
         offset = float(np.average(points, axis=0, weights=weights) @ normal)
@@ -197,5 +201,5 @@ def _degrees(cosine: ArrayLike) -> Floats:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), dtype=np.float64)
 
 
-def _biweight(away: NDArray[np.floating]) -> Floats:
-    return np.where(np.abs(away) < 1.0, (1.0 - away**2) ** 2, 0.0)
+def _biweight(distance: NDArray[np.floating]) -> Floats:
+    return np.where(np.abs(distance) < 1.0, (1.0 - distance**2) ** 2, 0.0)

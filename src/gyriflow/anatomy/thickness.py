@@ -1,4 +1,4 @@
-"""Cortical thickness at the vertices of a pial surface, from labels of the cortex or white surfaces beside it."""
+"""Cortical thickness at the vertices of a pial surface, from labels of the cortex or from white surfaces."""
 
 import logging
 from collections.abc import Mapping
@@ -22,58 +22,57 @@ from .labels import Labels, read_cerebrum
 
 log = logging.getLogger(__name__)
 
-# a vertex has cortex under it where the centre of a voxel of cortex is nearer than this, and lies on the labels' own
-# surface where voxels outside are not much further
+# a vertex has cortex under it if a voxel of cortex is closer than this, and lies on the labels' own surface if a voxel
+# outside is closer than that
 NEAR_VOXELS = 1.0
-FARTHEST_VOXELS = 1.5
-# an opened fissure is this near to its plane
+MAX_OUTSIDE_VOXELS = 1.5
+# an opened fissure is this close to its plane
 FISSURE_REACH_MM = 3.0
-# a layer thinner than this part of a voxel is none
-THINNEST_VOXELS = 1 / 3
-LEAST_VOXELS = 1.5
+# a layer thinner than this does not count
+MIN_LAYER_VOXELS = 1 / 3
+MIN_VOXELS = 1.5
 QUANTILES = (0.05, 0.95)
-# on the medial wall, where there is no cortex, white and pial surfaces meet
-LEAST_MM = 0.3
-LEAST_RATIO = 0.95
-HIDDEN = "a part of the pial surface is hidden in shut sulci: area and gyrification are lower bounds"
+# on the medial wall, which has no cortex, white and pial surfaces coincide
+MIN_MM = 0.3
+MIN_AREA_RATIO = 0.95
+HIDDEN = "a part of the pial surface is hidden in fused sulci: area and gyrification are lower bounds"
 USUAL_MM = 0.4, 3.5  # means in label atlases of 21 to 36 GW are 0.8 to 2.7 mm
-# the white surface crosses the pial one where so much of its area is so far outside
-OUTSIDE_MM, MOST_OUTSIDE = 0.5, 0.01
+# the white surface crosses the pial one if a larger share of its area is further outside than this
+OUTSIDE_MM, MAX_OUTSIDE_SHARE = 0.5, 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
     """Cortical thickness on a surface.
 
-    `values_mm` (n,) hold that of the nearest vertex where it was measured for those where it was not, `measured` (n,)
-    says where it was; the report has means and shares, in plain values for JSON.
+    `is_measured` (n,) is the mask of vertices where it was measured; the others have the value of the nearest measured
+    vertex in `values_mm` (n,). The report has means and shares, in plain values for JSON.
     """
 
     values_mm: Floats
-    measured: Mask
+    is_measured: Mask
     report: dict[str, Any]
 
     @property
     def measured_mm(self) -> Floats:
         """The (n,) thickness at each vertex, NaN where it was not measured."""
-        return np.where(self.measured, self.values_mm, np.nan)
+        return np.where(self.is_measured, self.values_mm, np.nan)
 
 
 def cortical_thickness(
     pial: TriangleMesh, cerebrum: Mask, cortex: Mask, affine: Floats, fissure_x_mm: float | None = None
 ) -> Thickness:
-    """Return the cortical thickness at the vertices of a pial surface; InputError where it has no cortex under it.
+    """Return the cortical thickness at the vertices of a pial surface; InputError if it has no cortex under it.
 
     The inner border is the isosurface of the smoothed mask of the cerebrum without its cortex, which lies between
     voxels as the pial surface does. The thickness at a vertex is the mean of two distances: from the vertex to the
     nearest point of the inner border, and from there to the nearest point of the pial surface (Fischl & Dale 2000,
     doi 10.1073/pnas.200033797). It is not measured where the surface has no cortex under it (corpus callosum,
-    brainstem), and where a fissure that the labels hide was opened. Where `fissure_x_mm` tells where that is, it is
-    measured in sulci that were opened.
+    brainstem), nor where a hidden fissure or fused sulci were opened; with `fissure_x_mm`, it is measured in sulci.
 
     `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
     its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over the
-    cortex's volume by its mean thickness.
+    cortex's volume divided by its mean thickness.
     """
     core = smooth_mask(cerebrum & ~cortex)
     kept, _, _ = main_parts(core > LEVEL)
@@ -86,23 +85,23 @@ def cortical_thickness(
     to_cortex, to_outside = (
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points) for mask in (~cortex, cerebrum)
     )
-    at_labels, over_cortex = to_outside < FARTHEST_VOXELS * voxel, to_cortex < NEAR_VOXELS * voxel
+    at_labels, over_cortex = to_outside < MAX_OUTSIDE_VOXELS * voxel, to_cortex < NEAR_VOXELS * voxel
     if fissure_x_mm is not None:
         at_labels |= np.abs(points[:, 0] - fissure_x_mm) > FISSURE_REACH_MM
-    measured = at_labels & over_cortex & (values >= THINNEST_VOXELS * voxel)
-    if not measured.any():
+    is_measured = at_labels & over_cortex & (values >= MIN_LAYER_VOXELS * voxel)
+    if not is_measured.any():
         raise InputError(
             "the labels of the cortex lie nowhere at the surface of the cerebrum",
             found=f"{int(cortex.sum())} voxels of cortex, all of them deep inside or thinner than a third of a voxel",
             expected="a layer around the cerebrum",
         )
-    _, nearest = cKDTree(points[measured]).query(points[~measured])
+    _, nearest = cKDTree(points[is_measured]).query(points[~is_measured])
     filled = values.copy()
-    filled[~measured] = values[measured][nearest]
-    report = summary(values, measured, vertex_areas(pial))
-    # a sheet of this volume and thickness has this area in its middle; its outside in a folded brain has more
+    filled[~is_measured] = values[is_measured][nearest]
+    report = summary(values, is_measured, vertex_areas(pial))
+    # volume over thickness is the area of the middle of the sheet; a folded brain has more outside
     report["area_ratio"] = area(pial) * report["mean_mm"] / (float(cortex.sum()) * voxel**3)
-    return Thickness(filled, measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
+    return Thickness(filled, is_measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
 
 
 def thickness_from_labels(
@@ -124,26 +123,26 @@ def thickness_from_labels(
     mean = thickness.report["mean_mm"]
     log.info("cortical thickness: %.2f mm on average", mean)
     if not USUAL_MM[0] <= mean <= USUAL_MM[1]:
-        log.warning("the cortex is %.1f mm thick on average: is it cortex that the scheme calls so?", mean)
-    if (voxels := thickness.report["voxels_through_cortex"]) < LEAST_VOXELS:
-        log.warning("the labels of the cortex are %.1f voxels thick: they say little of its thickness", voxels)
-    elif (ratio := thickness.report["area_ratio"]) < LEAST_RATIO:
-        log.warning("the pial area is %.2f of the cortex's volume over its thickness: %s", ratio, HIDDEN)
+        log.warning("the cortex is %.1f mm thick on average: are its labels correct?", mean)
+    if (voxels := thickness.report["voxels_through_cortex"]) < MIN_VOXELS:
+        log.warning("the labels of the cortex are %.1f voxels thick: its thickness is inaccurate", voxels)
+    elif (ratio := thickness.report["area_ratio"]) < MIN_AREA_RATIO:
+        log.warning("the pial area is %.2f times the cortex's volume over its thickness: %s", ratio, HIDDEN)
     return thickness
 
 
-def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
-    """Return the summary of the thickness; means are weighted by area."""
-    chosen, weights = values[measured], areas[measured]
-    quantiles = np.quantile(chosen, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
+def summary(values: Floats, is_measured: Mask, areas: Floats) -> dict[str, Any]:
+    """Summarise the thickness; means are weighted by area."""
+    values, weights = values[is_measured], areas[is_measured]
+    quantiles = np.quantile(values, [QUANTILES[0], 0.5, QUANTILES[1]], weights=weights, method="inverted_cdf")
     low, median, high = map(float, quantiles)
-    mean = float(np.average(chosen, weights=weights))
+    mean = float(np.average(values, weights=weights))
     return {
         "mean_mm": mean,
         "median_mm": median,
         "quantile05_mm": low,
         "quantile95_mm": high,
-        "sd_mm": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
+        "sd_mm": float(np.sqrt(np.average((values - mean) ** 2, weights=weights))),
         "measured_area_share": float(weights.sum() / areas.sum()),
     }
 
@@ -151,11 +150,11 @@ def summary(values: Floats, measured: Mask, areas: Floats) -> dict[str, Any]:
 def thickness_from_white(
     surface: TriangleMesh, pose: Pose, fissure_x_mm: float, whites: Mapping[str, TriangleMesh]
 ) -> Thickness:
-    """Return the cortical thickness on a pial surface: its distance from the white surface, as `cortical_thickness`.
+    """Return the cortical thickness on a pial surface from its distance to the white surface, as `cortical_thickness`.
 
-    `surface` is the whole pial surface, `pose` its own and `fissure_x_mm` the place of its fissure. `whites` are the
-    white surfaces in the coordinates of the files that the pial one was made from, by side: "left", "right", or
-    "whole". InputError where that of a side lies on the other one, and where a white surface crosses the pial one.
+    `surface` is the whole pial surface with its `pose` and fissure. `whites` are the white surfaces by side ("left" and
+    "right", or "whole"), in the coordinates of the pial surface's files. InputError if one is in the other hemisphere
+    or crosses the pial surface.
     """
     posed = posed_whites(pose, whites)
     for side, white in posed.items():
@@ -172,24 +171,24 @@ def thickness_from_white(
         distance, _, _ = nearest_on(white.vertices, surface)
         crossing = outside & (distance > OUTSIDE_MM)
         share = float(areas[crossing].sum() / areas.sum())
-        if share > MOST_OUTSIDE:
+        if share > MAX_OUTSIDE_SHARE:
             raise InputError(
                 f"the white surface ({side}) crosses the pial one",
                 found=f"{100 * share:.0f} % of its area outside, by up to {distance[crossing].max():.1f} mm",
-                expected=f"at most {100 * MOST_OUTSIDE:.0f} % by more than {OUTSIDE_MM} mm",
+                expected=f"at most {100 * MAX_OUTSIDE_SHARE:.0f} % by more than {OUTSIDE_MM} mm",
             )
     inner = merged(*posed.values())
     values = layer_thickness(surface, inner)
-    measured = values >= LEAST_MM
-    if not measured.any():
+    is_measured = values >= MIN_MM
+    if not is_measured.any():
         raise InputError(
-            "the white surface is the pial one",
-            found=f"{values.max():.2f} mm between them at most",
-            expected=f"{LEAST_MM} mm and more",
+            "the white surface equals the pial surface",
+            found=f"a distance of at most {values.max():.2f} mm",
+            expected=f"{MIN_MM} mm and more",
         )
-    return Thickness(values, measured, summary(values, measured, vertex_areas(surface)))
+    return Thickness(values, is_measured, summary(values, is_measured, vertex_areas(surface)))
 
 
 def posed_whites(pose: Pose, whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
-    """Return the white surfaces by side, moved as the pial ones were."""
+    """Return the white surfaces by side, in the pose of the pial surfaces."""
     return {side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()}

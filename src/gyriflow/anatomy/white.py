@@ -1,4 +1,4 @@
-"""White surfaces, the inner border of the cortex, from labels or files: even and in two sides as pial ones are."""
+"""White surfaces (the inner border of the cortex) from labels or files, even and split like pial surfaces."""
 
 from collections.abc import Mapping
 
@@ -24,10 +24,10 @@ def white_from_labels(
     *,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
-    """Return by side the surface around what lies within the cortex of an (i, j, k) label volume.
+    """Return by side the surface around the tissue within the cortex of an (i, j, k) label volume.
 
-    It is made as `pial.from_labels` makes the pial one of these labels, and lies where that does. Where the cerebrum
-    has no cortex, as on the medial wall, both are one. MeshError where it stays tangled.
+    It is made like the pial surface in `pial.from_labels`, in the same pose. Where the cerebrum has no cortex, as on
+    the medial wall, both surfaces coincide. MeshError if it keeps self-intersections.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
@@ -45,9 +45,9 @@ def white_from_surfaces(
     max_hole_mm: float = 3.0,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
-    """Return by side the given white surfaces of "left" and "right" or of the "whole", posed and made even.
+    """Pose and remesh white surfaces of "left" and "right" or of the "whole"; return them by side.
 
-    MeshError where one can't be made a closed surface without handles and intersections.
+    MeshError if one cannot be made a closed surface without handles and self-intersections.
     """
     even = {
         name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh

@@ -94,7 +94,7 @@ def test_white_surfaces_give_the_thickness_in_any_pose_and_may_not_cross(sides):
     whites = {side: inner(mesh, 1.5) for side, mesh in zip(("left", "right"), moved, strict=True)}
     thickness = thickness_from_white(*posed, whites)
     assert thickness.report["mean_mm"] == pytest.approx(1.5, abs=0.15)
-    assert thickness.measured.mean() > 0.98
+    assert thickness.is_measured.mean() > 0.98
     with pytest.raises(InputError, check=Facts("left", "1 %", "0.5 mm")):
         thickness_from_white(*posed, whites | {"left": inner(moved[0], -1.5)})
     with pytest.raises(InputError, check=Facts("right", f"{surface.fissure_x_mm:.1f} mm")):

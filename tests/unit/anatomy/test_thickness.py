@@ -56,8 +56,8 @@ def folded():
 def errors(brain, thickness_mm):
     pial, depth, inside, affine = brain
     found = cortical_thickness(pial, inside, inside & (depth < thickness_mm), affine)
-    assert found.measured.mean() > 0.99
-    return found, found.values_mm[found.measured] - thickness_mm
+    assert found.is_measured.mean() > 0.99
+    return found, found.values_mm[found.is_measured] - thickness_mm
 
 
 @pytest.mark.parametrize("thickness_mm", [1.0, 1.7, 3.0])
@@ -93,9 +93,9 @@ def test_what_has_no_cortex_takes_the_value_of_its_neighbours_and_is_told(ball):
     # a cap of a quarter of the sphere's area is bare
     assert found.report["measured_area_share"] == pytest.approx(0.75, abs=0.03)
     bare = pial.vertices[:, 0] > 12
-    assert not found.measured[bare].any()
+    assert not found.is_measured[bare].any()
     assert (found.values_mm > 0.8 / 3).all()
-    edge = found.measured & (pial.vertices[:, 0] > 7)
+    edge = found.is_measured & (pial.vertices[:, 0] > 7)
     assert set(np.round(found.values_mm[bare], 6)) <= set(np.round(found.values_mm[edge], 6))
 
 
