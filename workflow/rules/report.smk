@@ -112,7 +112,7 @@ rule html_report:
         figures=figures_on_page(),
         brain_figures={brain: figures_on_page(brain) for brain in study.brains},
         brains=study.described_brains,
-        prediction=study.described_prediction,
+        prediction=study.prediction_facts,
         norm=measured_name(study.brains[brain] for brain in study.norm_reference),
         config=study.used_settings,
     script:

@@ -147,7 +147,7 @@ def study_page(
     brains, pictures : as for `brains_table`
     shown : what `shown_figures` returns
     norm : what the brains of the norm are called
-    prediction : what `Study.described_prediction` returns, and worth, of `norms/predictions.yaml`
+    prediction : what `Study.prediction_facts` returns, and worth, of `norms/predictions.yaml`
     """
     runs, validation = tables.runs, tables.validation
     title, sentence, scores = "Measured cortical folding", measured_verdict(tables.quality), ""
@@ -158,7 +158,7 @@ def study_page(
         scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
     if prediction:
         title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
-        title += prediction["growth_of"]
+        title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
         numbers, known = predicted_table(tables.metrics, prediction), worth_table(prediction["worth"])
         prediction = {**prediction, "numbers": html_table(numbers), "known": html_table(known)}
     return _shared(brains, tables, origin, shown, norm, pictures) | {

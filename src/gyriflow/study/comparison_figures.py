@@ -62,6 +62,7 @@ VALIDATION = Kind(
         "registration."
     ),
     target="validate",
+    job="validation_charts",
 )
 PREDICTION = Kind(
     "prediction_figure",
@@ -75,6 +76,7 @@ PREDICTION = Kind(
         "aligned. Dashed: simpler predictions, without mechanics, and the target shape of the run."
     ),
     target="validate",
+    job="validation_charts",
 )
 PREDICTION_TABLE = Kind(
     "prediction_table",
@@ -155,6 +157,7 @@ ONSET = Kind(
         "neighbouring crowns. Marks at the right edge: not within the simulated or measured weeks."
     ),
     target="validate",
+    job="validation_charts",
 )
 
 # sweeps, which the configuration calls studies

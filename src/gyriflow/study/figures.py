@@ -396,6 +396,7 @@ METRICS = Kind(
         "is left out of both areas, so a smooth brain may have an index a few per cent below 1. Shape index: −1 is a "
         "cup, −½ a valley, +½ a ridge, +1 a cap."
     ),
+    job="metrics_charts",
 )
 METRICS_TABLE = Kind(
     "metrics_table",
@@ -421,6 +422,7 @@ SPECTRA = Kind(
         "reach, per hemisphere (SpAnGy, Germanaud et al. 2012). Open marks: the band is cut off, or finer than the "
         "surface resolves."
     ),
+    job="metrics_charts",
 )
 NORMS = Kind(
     "norms_figure",
@@ -435,6 +437,7 @@ NORMS = Kind(
         "band, and brains have a difference from the curve in % instead of a centile and z. Brains with other "
         "hemispheres than the norm's are not compared with it, and not drawn."
     ),
+    job="metrics_charts",
 )
 
 

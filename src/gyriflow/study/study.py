@@ -287,8 +287,8 @@ class Study:
         ]
 
     @property
-    def described_prediction(self) -> dict[str, Any] | None:
-        """What the report of a prediction begins with: names, weeks, whose growth it has, and where its files are."""
+    def prediction_facts(self) -> dict[str, Any] | None:
+        """The names, weeks, growth and files of the one prediction, for its report; None if there is none."""
         if (one := self.prediction) is None:
             return None
         at, beside = one.measured[-1], self.atlas_brain(one)
@@ -298,8 +298,9 @@ class Study:
         return {
             **{**one.names, "start_week": one.start.week, "week": at.week},
             **{"beside": beside.id, "beside_week": beside.week},
-            "growth_of": f"the atlas {atlas.name}" if atlas else beside.population,
-            "atlas": atlas and atlas.model_dump(include={"title", "licence", "reference"}),
+            # those whose growth it has
+            "population": beside.population,
+            "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
             "surfaces": [*at.parts.values()],
             "labels": labels_of("results/export", last, exported) if last.volume else None,
         }

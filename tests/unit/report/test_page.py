@@ -168,11 +168,11 @@ WORTH = read_yaml(SHIPPED / "norms" / "predictions.yaml")
 
 def foretold(weeks: float) -> dict:
     """Return what the report of a prediction is given, so many weeks ahead of 22 GW."""
-    atlas = {"title": "An atlas", "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None}}
+    atlas = {"name": "crl", "title": "An atlas", "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None}}
     atlas["licence"] = {"name": "CRL licence", "url": None, "terms": "Research only.", "accept": True}
     return {
         "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks, "beside": "crl-30", "beside_week": 30,
-        "growth_of": "the atlas crl", "atlas": atlas, "worth": WORTH,
+        "population": "well", "atlas": atlas, "worth": WORTH,
         "surfaces": ["results/a.surf.gii"], "labels": "results/a_dseg.nii.gz",
     }  # fmt: skip
 

@@ -351,12 +351,12 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
 
 def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     found = study(of_two(22.4), **EXPECTED, folding={"end_week": 23.9})
-    described = found.described_prediction
+    described = found.prediction_facts
     at = "results/runs/a/own22.4/surfaces/week-23.90"
     assert described | {"surfaces": described["surfaces"][:1]} == {
         **{"run": "a", "brain": "own22.4", "start_week": 22.4, "week": 23.9, "beside": "b24", "beside_week": 24},
         # a series of one's own is no atlas with a licence
-        **{"growth_of": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
+        **{"population": "atlas", "atlas": None, "surfaces": [f"{at}/pial.surf.gii"]},
         "labels": "results/export/sub-own224/anat/sub-own224_desc-agw2390_dseg.nii.gz",
     }
     (drawn,) = (figure for figure in figures_of(found) if figure.kind.name == "predicted_figure")
@@ -364,8 +364,8 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     assert list(drawn.inputs["real"].items()) == [(Facts(week, "GW"), path) for week, path in shown.items()]
     assert drawn.options["predicted"] == list(drawn.inputs["real"])[1]
     # no prediction is one that its own later brains explain, or a study of several runs
-    assert study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).described_prediction is None
-    assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).described_prediction is None
+    assert study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).prediction_facts is None
+    assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).prediction_facts is None
 
 
 def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
