@@ -6,16 +6,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from markupsafe import Markup
+from facts import Facts
+from markupsafe import Markup, escape
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.page import (
+    NORM_WORDS,
+    NOT_COMPARED,
     Origin,
     Tables,
     brain_page,
     brains_table,
     caption_html,
     hide_paths,
+    made,
     methods_text,
     report_page,
     run_verdict,
@@ -103,6 +107,11 @@ def page(figures: list[dict], view: dict | None = None, prediction: dict | None 
     return written(study_page(BRAINS, Tables(**TABLES | tables), ORIGIN, figures, **about), view)
 
 
+def elements(text: str, name: str) -> list[str]:
+    """Return the texts inside the elements of a page that have a name, without their tags."""
+    return [Markup(inside).striptags() for inside in re.findall(rf"<{name}\b[^>]*>(.*?)</{name}>", text, re.DOTALL)]
+
+
 def written(content: dict, view: dict | None = None) -> str:
     texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
     return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
@@ -115,13 +124,13 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', outside) == ['href="brains/young.html"']
     assert "</script><b>" not in text
     assert "<em>all</em>" in text
-    parts = ("first &lt;page", "<h3>Runs", "<h2>Surfaces in 3D", "<h2>growth_figure", "<h2>Brains", "<h2>Provenance")
-    order = [text.index(word) for word in parts]
+    ids = (f'<section id="{name}' for name in ("surfaces-in-3d", "growth_figure", "brains", "provenance"))
+    order = [text.index(word) for word in ("first &lt;page", "results/study/validation.csv", *ids)]
     assert order == sorted(order)
-    assert "2 brains of 21 to 23 GW were analysed, all of them healthy. young was meshed and" in " ".join(text.split())
-    assert "grown to 23 GW in 1 simulation of" in " ".join(text.split())
+    assert Facts(2, 21, "23 GW", "healthy", "young", 1) in elements(text, "p")
     assert "12ab" in text
-    assert "Made 2026-01-01 12:30 UTC by gyriflow 0.1, commit abc, changed." in text
+    assert Facts("2026-01-01 12:30 UTC", "0.1", "abc") in elements(text, "p")
+    assert made(PROVENANCE) != made(PROVENANCE | {"commit": "abc"})
     assert "numpy" in text
     assert "absent" not in text
 
@@ -151,15 +160,12 @@ def test_sections_stand_in_order_with_technical_figures_last_and_numbers_run_thr
 def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     none = pd.DataFrame({"level": [], "message": []})
     told = verdict(RUNS, VALIDATION, none)
-    assert told.startswith(
-        "At 23 GW, run thin agrees best with the real brain (predicted): shape index r 0.57, against"
-    )
-    assert "distance of 0.42 mm. Worst warning: cortex not resolved (1.2 elements through it, 2 needed)" in told
+    assert told == Facts("23 GW", "thin", "predicted", 0.57, "0.42 mm", 1.2, 2)
     failed = pd.DataFrame({"level": ["warning", "error"], "message": ["holes closed", "a step died."]})
-    assert verdict(RUNS, VALIDATION, failed).endswith("Worst warning: a step died.")
+    assert verdict(RUNS, VALIDATION, failed) == Facts("23 GW", "a step died.") != Facts("holes closed")
     alone = verdict(RUNS.assign(elements_through_cortex=3.0, unresolved_from_week=np.nan), None, none)
-    assert alone.startswith("There is no real brain of the same population")
-    assert alone.endswith("There were no warnings.")
+    assert alone == Facts(NOT_COMPARED)
+    assert not re.search(r"\d", alone)
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
 
 
@@ -181,25 +187,24 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     figures = shown("weekly_figure", "predicted_figure", caption="of *all*")
     metrics = pd.concat([METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)])
     text = " ".join(page(figures, validation=None, prediction=foretold(7.5), metrics=metrics).split())
+    assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
+    assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
     parts = (
-        "Prediction of young to 29.5 GW, by the growth of the atlas crl</h1>",
-        *("This is a prediction, not a scan. In tests over 8", "7.5 weeks later", "210.5", "How accurate such"),
-        *("norms/predictions.yaml", "results/a.surf.gii", "results/a_dseg.nii.gz"),
-        *("Cite: A. et al., doi 10.1/x.", "CRL licence. Research only.", "<h2>Brains"),
+        *("</h1>", str(escape(worth_told(foretold(7.5)))), "210.5", "norms/predictions.yaml", "results/a.surf.gii"),
+        *("results/a_dseg.nii.gz", "A. et al., doi 10.1/x.", "CRL licence", "Research only.", '<section id="brains"'),
     )
     order = [text.index(part) for part in parts]
     assert order == sorted(order)
     # no table of dashes, and the other figure in its section
-    assert "<h3>Runs" not in text
+    assert "results/study/validation.csv" not in text
     assert "<h2>weekly_figure" in text
-    assert "<h3>Runs" in page(figures, prediction=foretold(7.5))
+    assert "results/study/validation.csv" in page(figures, prediction=foretold(7.5))
 
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
     last = max(row["horizon"] for row in WORTH["rows"])
-    assert "No test went" not in worth_told(foretold(last))
-    assert f"In tests over {last:g} weeks, " in worth_told(foretold(last + 1))
-    assert f"No test went as far as {last + 1:g} weeks." in worth_told(foretold(last + 1))
+    assert worth_told(foretold(last)).count(f"{last:g} weeks") == 1
+    assert worth_told(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
 
 
 def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_beside_simpler_ways():
@@ -223,10 +228,10 @@ def test_paths_are_hidden():
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
     young, old = brains_table(BRAINS, **MEASURES, pictures=PICTURES).to_dict("records")
-    assert [Markup(row["verdict"]).striptags() for row in (young, old)] == ["looka bridge was cut", "refusedcropped"]
-    assert [Markup(row["brain"]).striptags() for row in (young, old)] == [
-        "young21 GW; healthy; sex: F; CC0 1.0", "old23 GW; healthy; labels; your own data"
-    ]  # fmt: skip
+    assert young["verdict"] == Facts("look", "a bridge was cut")
+    assert old["verdict"] == Facts("refused", "cropped")
+    assert young["brain"] == Facts("young", "21 GW", "healthy", "sex: F", "CC0 1.0") != Facts("labels")
+    assert old["brain"] == Facts("old", "23 GW", "healthy", "labels")
     assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (+1.2)", "–"]
     # averages give no centile
     assert Markup(young["pial area (cm²)"]).striptags() == "90−10.0 %"
@@ -234,14 +239,12 @@ def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings()
 
 
 def test_a_page_says_what_its_centiles_are_worth():
-    text = page(shown("growth_figure"))
-    assert "its centile (and z) for this age among the norm&#39;s other subjects." in text
-    assert "the curve of the norm (the norm)" in text
-    assert "the spread of individuals around the curve is unknown" in text
-    assert "There are too few subjects" not in text
-    # those of an atlas itself are not spoken of
     few = pd.concat([MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")])
-    assert "There are too few subjects" not in page([], centiles=few)
+    # those of an atlas itself are not spoken of
+    for text in (page(shown("growth_figure")), page([], centiles=few)):
+        sentences = elements(text, "p")
+        explained = [flag for flag, words in NORM_WORDS.items() if words.format(norm="the norm") in sentences]
+        assert explained == ["ok", SPREAD_UNKNOWN]
 
 
 def test_a_brain_has_a_page_of_its_own():
@@ -250,7 +253,7 @@ def test_a_brain_has_a_page_of_its_own():
     )
     tables = Tables(**TABLES | {"warnings": warnings})
     text = written(brain_page(BRAINS[0], tables, ORIGIN, shown("quality"), norm="the norm"))
-    assert "<h1>Measured cortical folding, young</h1>" in text
+    assert elements(text, "h1") == [Facts("young")]
     assert 'href="../report.html"' in text
     assert "other&#39;s" not in text
     assert text.index(">own<") < text.index("<h2>quality") < text.index("<th>left</th>")
@@ -260,37 +263,38 @@ def test_a_brain_has_a_page_of_its_own():
 
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
-    assert row["verdict"].startswith("ended at 22 GW of 23; cortex not resolved (1.2 elements")
-    assert row["real brain"] == "23 GW, predicted"
+    assert row["verdict"] == Facts("22 GW", 23, 1.2, 2)
+    assert row["real brain"] == Facts("23 GW", "predicted")
     assert row["area (%)"] == "−7.9"
     assert (row["gain"], row["95 % interval"]) == ("−0.00", "−0.04 to +0.04")
     assert row["distance (mm)"] == "0.42"
     (alone,) = scores_table(RUNS).to_dict("records")
-    assert [alone[name] for name in ("real brain", "gain", "95 % interval")] == ["none", "–", "–"]
+    assert [alone[name] for name in ("gain", "95 % interval")] == ["–", "–"]
+    assert "GW" not in alone["real brain"]
 
 
 @pytest.mark.parametrize(
-    ("order", "through", "verdict"),
+    ("order", "through", "facts"),
     [
-        (1, (2.4, 2.2), ""),
-        (2, (1.0, 1.0), ""),
-        (1, (1.0, 1.0), "(1 elements through it, 2 needed)"),
-        (2, (0.6, 0.5), "not resolved (0.6 elements"),
-        (1, (2.3, 2.1, 1.9, 1.7), "cortex not resolved from 22.5 GW on (down to 1.7 elements"),
-        (2, (1.0, 0.9, 0.7, 0.6), "cortex not resolved from 22.5 GW on (down to 0.6 elements"),
-        (2, (1.0, 0.9, np.nan), "(down to 0 elements"),
+        (1, (2.4, 2.2), []),
+        (2, (1.0, 1.0), []),
+        (1, (1.0, 1.0), [1, 2]),
+        (2, (0.6, 0.5), [0.6]),
+        (1, (2.3, 2.1, 1.9, 1.7), ["22.5 GW", 1.7, 2]),
+        (2, (1.0, 0.9, 0.7, 0.6), ["22.5 GW", 0.6]),
+        (2, (1.0, 0.9, np.nan), [0]),
     ],
 )
-def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, verdict):
+def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, facts):
     # to its end, with so many elements before its steps of half a week and in them
     steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
     run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
     run |= resolution_over_steps(order, steps)
-    assert verdict in run_verdict(run)
-    assert verdict or run_verdict(run) == "reached 23 GW"
-    assert "inverted" in run_verdict(run | {"min_J": -0.1})
-    assert "beyond their planes" not in run_verdict(run | {"initial_penetration_mm": 0.45})
-    assert "0.55 mm beyond their planes" in run_verdict(run | {"initial_penetration_mm": 0.55})
+    reached, *doubts = run_verdict(run).split("; ")
+    assert (reached, doubts) == (Facts("23 GW"), [Facts(*facts)] * bool(facts))
+    assert len(run_verdict(run | {"min_J": -0.1}).split("; ")) == 2 + len(doubts)
+    assert run_verdict(run | {"initial_penetration_mm": 0.45}) == run_verdict(run)
+    assert run_verdict(run | {"initial_penetration_mm": 0.55}) == Facts("0.55 mm")
 
 
 def test_the_methods_say_what_was_run():
@@ -318,23 +322,24 @@ def test_the_methods_say_what_was_run():
         template, brains=brains, runs=runs, software=software, metrics=metrics,
         surface={"edge_length_mm": 0.8, "open_sulci": True}, mesh={"order": 2, "mesher": "tetgen"},
     )  # fmt: skip
-    assert "2 brains of 21 to 24.5 weeks of gestation (GW), 1 of them spina bifida, were processed with" in text
-    assert "Run *stiff* folded young from 21 to 24.5 GW in 49 steps of at most 12 h, on 1234 quadratic" in text
-    assert "Sulci that are closed in the labels were left closed, as mesh elements are wider than slits" in text
-    assert "1500 and the values given for each week or place Pa" in text
-    assert "tangentially at 2·10⁻⁷ per second" in text
-    alone = methods_text(
-        template, brains=brains[:1], runs=[], software=software, metrics=metrics,
-        surface={"edge_length_mm": 1, "open_sulci": True},
+    # closed sulci make areas after 29 GW lower bounds
+    assert text.split("\n\n")[0] == Facts(2, 21, 24.5, "GW", 1, "spina bifida", "gyriflow 0.1", 29, "0.8 mm")
+    stiff, led, own = (line for line in text.splitlines() if line.startswith("- "))
+    assert stiff == Facts("*stiff*", "young", 21, "24.5 GW", 49, "12 h", 1234, "quadratic", 1500, "Pa", "2·10⁻⁷", "[4]")
+    assert "{" not in stiff
+    assert led == Facts("*led*", "population cohort") != Facts("atlas")
+    assert not {"atlas", "population"} & set(own.split())
+    alone, opened = (
+        methods_text(
+            template, brains=brains[:1], runs=[], software=software, metrics=metrics,
+            surface={"edge_length_mm": 1, "open_sulci": opens},
+        ) for opens in (False, True)
     )  # fmt: skip
-    assert "simulated" not in alone
-    assert "Tallinen" not in alone
-    assert "Sulci that are closed in the labels were opened by slits" in alone
-    assert "van Doorn [1]" in alone
-    assert "(population cohort), a population's growth and not the subject's own. Stress" in text
-    assert text.count("its own later shape") == 1
-    assert "was modelled [4]" in text
-    assert "<li><p>Run <em>stiff</em>" in caption_html(text)
+    assert "Simulation" not in opened
+    assert "Tallinen" not in opened
+    assert opened == Facts("Koenderink", "[1]") != Facts(29)
+    assert len(opened) > len(alone)
+    assert caption_html(text).count("<li><p>") == 3 + 7
     assert "system-message" not in caption_html(text)
 
 
@@ -346,5 +351,4 @@ def test_messages_tell_files_without_their_folders(monkeypatch):
 
 
 def test_a_page_without_simulations_says_how_many_brains_were_measured():
-    said = "<strong>2 brains: 1 to look at, 1 refused.</strong>"
-    assert said in page([], runs=None, validation=None)
+    assert elements(page([], runs=None, validation=None), "strong")[0] == Facts(2, 1, "refused")
