@@ -3,6 +3,7 @@
 from itertools import takewhile
 
 from gyriflow.running.reruns import benchmark_patterns
+from gyriflow.settings.terms import run_names
 
 PAGE = f"{workflow.basedir}/workflow/report/page"
 
@@ -76,6 +77,21 @@ def figures_on_page(brain=None):
     return [figure.described for figure in alone if figure.names["brain"] == brain]
 
 
+# the surfaces of the 3D view by week: of all runs, and of measured brains of the start's population
+VIEWED = [
+    brain
+    for brain in study.brains.values()
+    if study.starts and brain.given.population == study.starts[0].given.population
+]
+SURFACES = {
+    "runs": {
+        name: [[row.week, halves_of(row)] for row in simulation.measured]
+        for name, simulation in zip(run_names(study.pairs), study.folded)
+    },
+    "real": [[brain.week, halves_of(brain.measured)] for brain in sorted(VIEWED, key=lambda brain: brain.week)],
+}
+
+
 rule html_report:
     input:
         rules.figures.input,
@@ -90,7 +106,7 @@ rule html_report:
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
-        view=asked_for(FIGURES, "view")[0],
+        surfaces=files_in(SURFACES),
         provenance=rules.study_records.output.report,
         methods=rules.study_records.output.methods,
         page=f"{PAGE}/page.html",
@@ -102,6 +118,7 @@ rule html_report:
     output:
         report=f"{REPORT}/report.html",
         brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=study.brains),
+        view=f"{REPORT}/surfaces.json",
     log:
         f"{REPORT}/logs/html_report.log",
     benchmark:
@@ -113,6 +130,8 @@ rule html_report:
         brain_figures={brain: figures_on_page(brain) for brain in study.brains},
         brains=study.described_brains,
         prediction=study.prediction_facts,
+        surfaces=SURFACES,
+        measured=measured_name(VIEWED),
         norm=measured_name(study.brains[brain] for brain in study.norm_reference),
         config=study.used_settings,
     script:
@@ -123,9 +142,3 @@ rule report:
     input:
         rules.html_report.output,
         rules.study_records.output,
-
-
-# what only moves text: no jobs of their own on a cluster, as targets
-localrules:
-    atlas_file,
-    html_report,

@@ -33,3 +33,8 @@ rule atlas_file:
 rule retrieve:
     input:
         [f"/{file}" for file in ATLAS_FILES],
+
+
+# nodes of a cluster may have no network
+localrules:
+    atlas_file,

@@ -6,7 +6,7 @@ import pandas as pd
 
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
-from gyriflow.io.files import read_json, read_table, write_json
+from gyriflow.io.files import read_json, read_table
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
@@ -54,7 +54,5 @@ with step(snakemake.log[0]):
         drawn = getattr(module, function)(**read(dict(figure["inputs"])), **figure["options"])
         if isinstance(drawn, pd.DataFrame):
             write_html(*figure["files"], module.html_table(drawn))
-        elif isinstance(drawn, dict):
-            write_json(*figure["files"], drawn)
         else:
             write_figure(*figure["files"], drawn)

@@ -1,9 +1,11 @@
 """Write the report of a study and the pages of its brains, each a single HTML file."""
 
 from gyriflow.io.figures import picture_addresses, read_body
-from gyriflow.io.files import read_json, read_table, read_text, write_text
+from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
+from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml, yaml_text
 from gyriflow.report.page import Origin, Tables, brain_page, hide_paths, report_page, shown_figures, study_page
+from gyriflow.report.view3d import surfaces_view
 from gyriflow.step import step
 
 PICTURE_BYTES = 9_000_000
@@ -20,6 +22,11 @@ def shown(figures):
     return shown_figures(figures, {path: contents.get(path) or read_body(path) for path in paths})
 
 
+def read_weeks(weeks):
+    """Return the hemispheres of a brain with their maps by week."""
+    return [(week, [(read_surface(mesh), read_vertex_maps(maps)) for mesh, maps in halves]) for week, halves in weeks]
+
+
 with step(snakemake.log[0]):
     template, parts = read_text(files.page), {name: read_text(files[name]) for name in PARTS}
     tables = Tables(**{name: read_table(files[name]) for name in TABLES if files[name]})
@@ -32,4 +39,8 @@ with step(snakemake.log[0]):
     prediction = params.prediction and params.prediction | {"worth": read_yaml(files.worth)}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
     page = study_page(params.brains, tables, origin, shown(params.figures), **about)
-    write_text(output.report, report_page(template, parts, read_json(files.view), **page))
+    runs, real = params.surfaces["runs"], params.surfaces["real"]
+    runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
+    view = surfaces_view(runs, read_weeks(real), measured=params.measured)
+    write_json(output.view, view)
+    write_text(output.report, report_page(template, parts, view, **page))

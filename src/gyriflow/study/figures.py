@@ -36,7 +36,6 @@ def figures_of(study: Study) -> list[Figure]:
         *_metric_figures(study),
         *_region_figures(study),
         *comparison_figures(study),
-        view_surfaces(study),
         Figure(RESOURCES),
     ]
 
@@ -488,22 +487,6 @@ REGIONS_FIGURE = Kind(
 )
 
 # the report
-
-VIEW = Kind("view_surfaces", "results/report/surfaces.json", "view3d:surfaces_view", target="view")
-
-
-def view_surfaces(study: Study) -> Figure:
-    """Return the surfaces of the report's 3D view: of all runs, and of measured brains of the start's population."""
-    populations = [start.given.population for start in study.starts[:1]]
-    # a view of measured brains alone is none over the weeks of one brain
-    real = [brain for brain in study.brains.values() if populations and brain.given.population in populations]
-    runs = zip(run_names(study.pairs), study.folded, strict=True)
-    inputs = {
-        "runs": {name: [[row.week, halves_of(row)] for row in simulation.measured] for name, simulation in runs},
-        "real": [[brain.week, halves_of(brain.measured)] for brain in sorted(real, key=lambda brain: brain.week)],
-    }
-    return Figure(VIEW, inputs, {"measured": measured_name(real)})
-
 
 RESOURCES = Kind(
     "study_resources",

@@ -18,7 +18,7 @@ class Kind:
     Attributes
     ----------
     name : name of the kind, and of its rule unless `job` is given
-    pattern : path with wildcards: a PNG (a PDF is written with it), an HTML page, or JSON
+    pattern : path with wildcards: a PNG (a PDF is written with it) or an HTML page
     draw : the function, as `module:function` of `gyriflow.report`; empty if the file has a rule of its own
     section, title, caption
         Text of the report, the caption in reStructuredText, with the names of a figure in braces. Kinds without a

@@ -7,11 +7,13 @@ import pandas as pd
 import pytest
 from PIL import Image
 from scripts import run_script
+from shapes import sphere
 
 from gyriflow.io.downloads import sha256_of
 from gyriflow.io.figures import picture_addresses
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_table, write_text
 from gyriflow.io.frames import join_frames, write_frame
+from gyriflow.io.surfaces import write_surface, write_vertex_maps
 from gyriflow.io.yaml_files import write_yaml
 
 from .test_page import BRAINS, MEASURES, METRICS, PAGE, PARTS, PROVENANCE, RUNS, VALIDATION
@@ -85,26 +87,34 @@ def pages(folder):
         "page": PAGE / "page.html",
         "provenance": "provenance.json",
         "methods": "methods.rst",
-        "view": "view.json",
     }
-    write_json("view.json", {"groups": []})
     pictures = {name: FIGURE | {"name": "picture", "path": str(folder / f"{name}.png")} for name in COLOURS}
-    params = {"config": {"labels": "/data/Smith/young.nii.gz"}, "norm": "N", "brains": BRAINS, "prediction": None}
+    params = {"config": {"labels": "/data/Jane Roe/young.nii.gz"}, "norm": "N", "brains": BRAINS, "prediction": None}
     params |= {"figures": [pictures["overview"]], "brain_figures": {name: [pictures[name]] for name in NAMES}}
-    outputs = {"report": "report.html", "brains": [f"{name}.html" for name in NAMES]}
+    ball = sphere(10.0, 2)
+    write_surface("ball.surf.gii", ball)
+    write_vertex_maps("ball.shape.gii", {"shape_index": ball.vertices[:, 2] / 10})
+    frames = [[week, [["ball.surf.gii", "ball.shape.gii"]]] for week in (21.0, 22.0)]
+    params |= {"surfaces": {"runs": {"thin": frames}, "real": frames[:1]}, "measured": "healthy"}
+    outputs = {"report": "report.html", "brains": [f"{name}.html" for name in NAMES], "view": "surfaces.json"}
     run_script("html_report.py", folder, inputs | {"small": [f"{name}.png" for name in NAMES]}, outputs, params)
     return [read_text(path) for path in ("report.html", "young.html", "old.html")]
 
 
 def test_the_report_has_pictures_numbers_and_scores_of_each_brain_and_run(folder):
     text, *_ = pages(folder)
+    view = read_json("surfaces.json")["groups"]
+    groups = [(group["name"], [frame["week"] for frame in group["frames"]]) for group in view]
+    assert groups == [("thin", [21, 22]), ("healthy", [21])]
+    assert read_text("surfaces.json").count("shape_index") >= 3
+    assert '<section id="surfaces-in-3d">' in text
     rows = [row_with(text, f'href="brains/{name}.html"') for name in ("young", "old")]
     assert [pictured(row) for row in rows] == [["young"], ["old"]]
     assert [("46.2" in row, "refused" in row, "CC0 1.0" in row) for row in rows] == [(1, 0, 1), (0, 1, 0)]
     for name in ("young", "old"):
         assert name in row_with(text, f"hash of {name}")
     assert ("0.42" in row_with(text, ">thin<"), "0.90" in row_with(text, ">thick<")) == (True, True)
-    assert ("overview" in pictured(text), "<em>processed</em>" in text, "Smith" in text) == (True, True, False)
+    assert ("overview" in pictured(text), "<em>processed</em>" in text, "Jane Roe" in text) == (True, True, False)
 
 
 def test_the_page_of_a_brain_is_of_that_brain_alone(folder):
