@@ -1,21 +1,22 @@
-"""How much folding depends on the mesh: one smooth start, several resolutions, both orders of elements.
+"""Measure how folding depends on the mesh: one smooth start surface, several resolutions, both element orders.
 
     ./run python benchmarks/convergence.py --folder FOLDER
 
-A smooth hemisphere of 21 GW whose cortex and core grow, free, in contact with itself, is folded on meshes with so many
-node distances at the surface to the cortical thickness, linear and quadratic elements alike, so that both orders have
-about the same unknowns. The shape is the left half of the shipped atlas' brain of 21 GW, from labels smoothed more than
-a study would, with shallow bumps of 8 to 24 mm, far higher than facets and mesh noise: every mesh starts from the same
-imperfection. Every run carries the same surface along, which is measured; runs are compared with the finest one at the
-same material points. A second mesh of the same resolution, made of the surface turned, shows what chance does.
+A smooth hemisphere of 21 GW is folded on meshes of several resolutions. Its cortex and core grow; it is free and in
+contact with itself. Resolution is the number of node distances per cortical thickness, so linear and quadratic meshes
+have about the same number of unknowns. The shape is the left half of the shipped atlas brain of 21 GW, from labels
+smoothed more than in a study. It gets shallow bumps of 8 to 24 mm, far higher than facets and mesh noise, so every mesh
+starts from the same imperfection. Every run carries the same surface, which is measured, and is compared with the
+finest run at the same material points. A second mesh of the same resolution, of the rotated surface, shows how much is
+chance.
 
-Runs are done one at a time on one rank; what in FOLDER is done already is not done again. Each run prints a JSON line;
-the last line is one JSON object with `runs` and the differences from the finest (`against_finest`) at the end.
+Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
+last line is one JSON object with `runs` and the differences from the finest run (`against_finest`).
 
     ./run python benchmarks/convergence.py --folder FOLDER --run MESH PARAMS [MAPS]
 
-varies the tolerance of Newton's method and the time step of a study's run instead: `tolerances` and `run_steps` give
-the error of positions at its end against the least of each.
+varies the Newton tolerance and the time step of a study's run instead: `tolerances` and `run_steps` give the error of
+its final positions, relative to the run with the smallest value.
 """
 
 import argparse
@@ -56,21 +57,21 @@ LABELS = "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.
 START_WEEK, END_WEEK = 21.0, 28.0
 SMOOTHING_VOXELS = 2.0
 BUMPS, BUMP_MM = 24, 0.15
-"""Number of the waves, and the standard deviation of their sum."""
+"""Number of waves, and the standard deviation of their sum."""
 WAVELENGTHS_MM = (8.0, 24.0)
 FINE_EDGE_MM = 0.6
-"""Edges of the surface that all meshes hold."""
+"""Edge length of the surface that all meshes are made from."""
 MEASURED_EDGE_MM = 1.0
-"""Edges of the surface that is carried along by every run and measured, as those of a study."""
-CORE = 1.6
-"""Largest distance of nodes inside, in those at the surface: meshes differ by their scale only."""
+"""Edge length of the surface that every run carries and that is measured, as in a study."""
+CORE_FACTOR = 1.6
+"""Node distance inside over that at the surface: meshes differ only in scale."""
 ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
-"""Turns the surface while it is meshed: another mesh of the same resolution."""
+"""Rotation of the surface during meshing, which gives another mesh of the same resolution."""
 ORDERS = {1: "linear", 2: "quadratic"}
 NODES_TO_CORTEX = (1.41, 2.0, 2.83, 4.0)
-"""Thickness over the distance of nodes at the surface: halved, elements to the cortex of quadratic ones."""
+"""Cortical thickness over the node distance at the surface; quadratic elements per thickness are half as many."""
 REPEATED = 2.0
-"""The resolution at which a second mesh of quadratic elements is made."""
+"""Resolution of the second mesh of quadratic elements."""
 THICKNESS_MM = 2.0
 DAY_S = 86400.0
 PARAMETERS = {
@@ -81,7 +82,7 @@ PARAMETERS = {
     "thickness_mm": THICKNESS_MM,
     "contact": {"kind": "global"},
     "fissure_x_mm": 0.0,
-    # about as the atlas' areas and volumes grow from 21 to 29 GW, had nothing to be pressed together
+    # about the growth of the atlas' areas and volumes from 21 to 29 GW, if nothing were compressed
     "growth_rate_per_s": 2.0e-7,
     "core_growth_rate_per_s": 0.8e-7,
     "support": "free",
@@ -93,7 +94,7 @@ COMPARED = (
     *("folding_index", *(f"spangy_B{band}_relative_power" for band in range(1, 6))),
 )
 TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
-"""Of Newton's method and in time, of a study's run."""
+"""Newton tolerances and time steps to try with a study's run, the most accurate first."""
 
 
 @cache
@@ -102,9 +103,9 @@ def start_surface() -> TriangleMesh:
     volume, scheme = read_label_volume(ROOT / LABELS), SCHEMES["spina-bifida-atlas"]
     places = np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T + volume.affine[:3, 3]
     x = places[..., 0]
-    of_cerebrum = x[np.isin(volume.labels, scheme.cerebrum)]
-    # half a voxel aside, since the middle lies on voxels
-    left = np.where(x < (of_cerebrum.min() + of_cerebrum.max()) / 2 - volume.affine[0, 0] / 2, volume.labels, 0)
+    cerebrum_x = x[np.isin(volume.labels, scheme.cerebrum)]
+    # shifted by half a voxel, since the middle lies on voxel centres
+    left = np.where(x < (cerebrum_x.min() + cerebrum_x.max()) / 2 - volume.affine[0, 0] / 2, volume.labels, 0)
     cerebrum = read_cerebrum(left, volume.affine, scheme, 0.0)
     field = smooth_mask(cerebrum.mask, SMOOTHING_VOXELS)
     mesh = surface_of_mask(field, cerebrum.affine, cerebrum.volume_mm3, FINE_EDGE_MM).mesh
@@ -124,7 +125,7 @@ def bumps(points: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Case:
-    """A mesh to be folded: order of its elements, node distances to the thickness, and whether it is the second one."""
+    """A mesh to fold: element order, node distances per cortical thickness, and whether the surface was rotated."""
 
     order: int
     nodes: float
@@ -141,7 +142,7 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
     mesh = tetrahedralise(
         transformed(surface, motion(rotation)),
         surface_edge_mm=spacing_mm,
-        core_edge_mm=CORE * spacing_mm,
+        core_edge_mm=CORE_FACTOR * spacing_mm,
         envelope_mm=0.1,
         time_limit_s=1800,
         mesher="tetgen",
@@ -152,7 +153,7 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The measured surface as a run has moved it, with the mean curvature in 1/mm at its vertices, and metrics."""
+    """The measured surface moved by a run, the mean curvature (1/mm) at its vertices, and its metrics."""
 
     surface: TriangleMesh
     mean_curvature: Floats
@@ -161,21 +162,21 @@ class Carried:
 
 @cache
 def measured_surface() -> TriangleMesh:
-    """Return the start surface with the edges at which a study measures."""
+    """Return the start surface, remeshed with the edge length of a study's surfaces."""
     return remesh(start_surface(), MEASURED_EDGE_MM)
 
 
 def carried(frames: Path, week: float) -> Carried:
-    """Return the measured surface as a run has moved it by a week, with its metrics."""
+    """Return the measured surface as a run moved it until a week, with its metrics."""
     start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
-    own, nodes = boundary_surface(start)
-    before, after, faces = own.vertices, read_positions(frames, week)[nodes], own.faces.astype(np.int64)
+    boundary, nodes = boundary_surface(start)
+    before, after, faces = boundary.vertices, read_positions(frames, week)[nodes], boundary.faces.astype(np.int64)
     if start.order == 2:
         matrix, faces = finer_surface(faces)
         before, after = matrix @ before, matrix @ after
-    measured = measured_surface()
-    match = match_points(measured.vertices, vertex_normals(measured), TriangleMesh(before, faces))
-    surface = TriangleMesh(measured.vertices + values_at(match, after - before), measured.faces)
+    mesh = measured_surface()
+    match = match_points(mesh.vertices, vertex_normals(mesh), TriangleMesh(before, faces))
+    surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
     side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, "B5")
     metrics = size_metrics(surface, side.crossing) | folding_metrics([side]) | spectrum_metrics(side)
     return Carried(surface, side.bend.mean, metrics)
@@ -183,14 +184,16 @@ def carried(frames: Path, week: float) -> Carried:
 
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True, help="for meshes and runs, which are kept")
-    parser.add_argument("--run", type=Path, nargs="+", help="mesh and params.yaml of a run, with its maps.h5")
-    parser.add_argument("--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="to the thickness")
+    parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
+    parser.add_argument("--run", type=Path, nargs="+", help="mesh, params.yaml and, if there is one, maps.h5 of a run")
+    parser.add_argument(
+        "--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="node distances per cortical thickness"
+    )
     return parser.parse_args()
 
 
 def mesh_file(folder: Path, case: Case) -> Path:
-    """Return the file of a case's mesh, made where it is not there."""
+    """Return the file of a case's mesh; make the mesh if the file does not exist."""
     file = folder / f"{case.name}.xdmf"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -199,7 +202,7 @@ def mesh_file(folder: Path, case: Case) -> Path:
 
 
 def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict[str, Any]:
-    """Return the summary of a run on one rank, done where it has not been; an interrupted one goes on."""
+    """Run a simulation on one rank unless it is finished, and return its summary. Interrupted runs are resumed."""
     if not (out / "summary.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         write_yaml(out / "params.yaml", parameters)
@@ -213,7 +216,7 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict
 
 
 def resolution_runs(arguments: argparse.Namespace) -> dict[Case, dict[str, Any]]:
-    """Fold all cases, coarse ones first; what their runs took."""
+    """Fold all cases, coarse ones first, and return the size and cost of each run."""
     cases = [Case(order, nodes) for nodes in sorted(arguments.nodes) for order in ORDERS]
     if REPEATED in arguments.nodes:
         cases.append(Case(2, REPEATED, turned=True))
@@ -227,33 +230,33 @@ def resolution_runs(arguments: argparse.Namespace) -> dict[Case, dict[str, Any]]
     return rows
 
 
-def difference(one: Carried, other: Carried, start: Carried) -> dict[str, float]:
-    """Return how two runs differ at a week: places in mm at the same material points, surfaces, curvature, metrics."""
-    areas = vertex_areas(other.surface)
-    apart = without_rigid_motion(other.surface.vertices, one.surface.vertices, areas)
-    moved = without_rigid_motion(start.surface.vertices, other.surface.vertices, areas)
-    laid = transformed(one.surface, rigid_fit(one.surface.vertices, other.surface.vertices, areas))
-    pairs = ((laid, other.surface), (other.surface, laid))
-    ways = [(nearest_on(surface.vertices, far)[0], vertex_areas(surface)) for surface, far in pairs]
-    distance, distance95 = surface_distance(ways)
+def difference(run: Carried, reference: Carried, start: Carried) -> dict[str, float]:
+    """Return how a run differs from a reference at a week: material points and surfaces (mm), curvature, metrics."""
+    areas = vertex_areas(reference.surface)
+    gaps = without_rigid_motion(reference.surface.vertices, run.surface.vertices, areas)
+    displacements = without_rigid_motion(start.surface.vertices, reference.surface.vertices, areas)
+    aligned = transformed(run.surface, rigid_fit(run.surface.vertices, reference.surface.vertices, areas))
+    pairs = ((aligned, reference.surface), (reference.surface, aligned))
+    distances = [(nearest_on(source.vertices, target)[0], vertex_areas(source)) for source, target in pairs]
+    distance, distance95 = surface_distance(distances)
 
     def rms(vectors: np.ndarray) -> float:
         return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=areas)))
 
     return {
-        "displacement_rms_mm": rms(apart),
-        "displacement_share": rms(apart) / rms(moved),
+        "displacement_rms_mm": rms(gaps),
+        "displacement_share": rms(gaps) / rms(displacements),
         "surface_distance_mm": distance,
         "surface_distance_95_mm": distance95,
-        "r_mean_curvature": correlation(one.mean_curvature, other.mean_curvature, areas),
-        **{name: one.values[name] - other.values[name] for name in COMPARED},
+        "r_mean_curvature": correlation(run.mean_curvature, reference.mean_curvature, areas),
+        **{name: run.values[name] - reference.values[name] for name in COMPARED},
     }
 
 
 def errors(
     varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: Path, *maps: Path
 ) -> list[dict[str, Any]]:
-    """Return the error of positions at the end of each run against the first, and what it took."""
+    """Return the error of each run's final positions, relative to the first run, and its cost."""
     rows, exact = [], None
     for value, parameters in runs.items():
         out = folder / f"{value:g}"
@@ -261,22 +264,22 @@ def errors(
         ends = parameters["start_week"], parameters["end_week"]
         before, after = (read_positions(out / "frames.h5", week) for week in ends)
         exact = after if exact is None else exact
-        apart, moved = np.linalg.norm(after - exact, axis=1), np.linalg.norm(exact - before, axis=1)
+        gaps, moved = np.linalg.norm(after - exact, axis=1), np.linalg.norm(exact - before, axis=1)
         row = {varied: value} | {name: found[name] for name in ("steps", "newton", "krylov", "cpu_seconds")}
-        row |= {"rms_mm": float(np.sqrt((apart**2).mean())), "mean_mm": float(apart.mean())}
-        row |= {"p95_mm": float(np.quantile(apart, 0.95)), "largest_mm": float(apart.max())}
+        row |= {"rms_mm": float(np.sqrt((gaps**2).mean())), "mean_mm": float(gaps.mean())}
+        row |= {"p95_mm": float(np.quantile(gaps, 0.95)), "largest_mm": float(gaps.max())}
         rows.append(row | {"share": row["rms_mm"] / float(np.sqrt((moved**2).mean()))})
         print(json.dumps(rows[-1]), flush=True)
     return rows
 
 
 def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
-    """Return the errors that tolerance and time step of a study's run leave, against its least of each."""
+    """Return the errors due to the Newton tolerance and the time step of a study's run."""
     mesh, file, *maps = arguments.run
-    given = read_yaml(file)
-    solver = given["solver"]
-    tolerances = {value: given | {"solver": solver | {"newton_tolerance": value}} for value in TOLERANCES}
-    steps = {days: given | {"step_s": days * DAY_S} for days in STEPS_DAYS}
+    values = read_yaml(file)
+    solver = values["solver"]
+    tolerances = {value: values | {"solver": solver | {"newton_tolerance": value}} for value in TOLERANCES}
+    steps = {days: values | {"step_s": days * DAY_S} for days in STEPS_DAYS}
     return {
         "run_steps": errors("step_days", steps, arguments.folder / "run_steps", mesh, *maps),
         "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
@@ -284,7 +287,7 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any
 
 
 def against_finest(arguments: argparse.Namespace, cases: list[Case]) -> list[dict[str, Any]]:
-    """Return how all runs differ from the finest at the end."""
+    """Return how all runs differ from the finest run at the end."""
     finest = max((case for case in cases if not case.turned), key=lambda case: (case.nodes, case.order))
     frames = {case: arguments.folder / "runs" / case.name / "frames.h5" for case in cases}
     start, exact = carried(frames[finest], START_WEEK), carried(frames[finest], END_WEEK)

@@ -1,12 +1,12 @@
-"""What predictions are worth by horizon: a normal atlas' brain of 22 GW, grown to 34 GW by the growth of another.
+"""Accuracy of predictions by horizon: a brain of 22 GW of one normal atlas, folded to 34 GW with the growth of another.
 
     ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --write norms/predictions.yaml
 
-CRL and CHINESE are the folders with the labels of these two atlases, which are not part of gyriflow. In FOLDER each
-start has a study of its own; the same command goes on after an interruption. All weeks of an atlas give its growth; the
-brains of every second week of the other tell what the prediction is worth. The last line is one JSON object, which
-`--write` writes as YAML: for each start, horizon (GW) and model the columns of `results/study/prediction.csv` that
-`NUMBERS` names.
+CRL and CHINESE are the folders with the labels of these two atlases, which are not part of gyriflow. Each start brain
+has its own study in FOLDER; the same command continues after an interruption. Growth is measured on all weeks of an
+atlas; the prediction is compared with every second week of the other atlas. The last line is one JSON object, which
+`--write` also writes as YAML: for each start, horizon (GW) and model, the columns of `results/study/prediction.csv`
+listed in `NUMBERS`.
 """
 
 import argparse
@@ -27,8 +27,8 @@ MODELS = ("run", "atlas", "atlas_deformed", "scaled")
 NUMBERS = {"distance_mm": 3, "r_shape_index": 3, "area_error": 4, "volume_error": 4}
 RUN = "predicted"
 HEAD = """\
-# What predictions were worth on brains whose later scan was known, by horizon (weeks): distance of the surfaces, r of
-# the shape index, errors of area and volume as fractions of the real brain's. Written by benchmarks/horizon.py.
+# Accuracy of predictions for brains with a later scan, by horizon (weeks): distance between the surfaces, r of the
+# shape index, errors of area and volume as fractions of the observed brain's. Written by benchmarks/horizon.py.
 """
 NOTE = "The Chinese brain of 26 GW is 14 % smaller than the weeks around it suggest; no way of predicting meets that."
 
@@ -36,9 +36,10 @@ NOTE = "The Chinese brain of 26 GW is 14 % smaller than the weeks around it sugg
 def study(start: str, folders: dict[str, Path], edge_mm: float) -> dict[str, Any]:
     """Return the configuration of a prediction from the first brain of an atlas."""
     weeks = {start: list(WEEKS[::2]), GROWN_BY[start]: list(WEEKS)}
-    own = {"accept_licence": True}
     return {
-        "atlas": [own | {"name": name, "folder": str(folders[name]), "weeks": weeks[name]} for name in weeks],
+        "atlas": [
+            {"name": name, "folder": str(folders[name]), "weeks": weeks[name], "accept_licence": True} for name in weeks
+        ],
         "start": f"{start}-{WEEKS[0]}",
         "mesh": {
             "order": 1,
@@ -81,10 +82,10 @@ def main() -> None:
         found += rows(folder, start)
         summary = read_json(folder / f"results/runs/{RUN}/{start}-{WEEKS[0]}/folding/summary.json")
         elements.append(int(summary["tets"]))
-    atlases = {name: read_keys(ATLASES / name / "atlas.yaml")["reference"] for name in GROWN_BY}
+    references = [read_keys(ATLASES / name / "atlas.yaml")["reference"] for name in GROWN_BY]
     result = {
         "source": "benchmarks/horizon.py",
-        "references": [f"{one['citation']}, {one.get('doi') or one['url']}" for one in atlases.values()],
+        "references": [f"{paper['citation']}, {paper.get('doi') or paper['url']}" for paper in references],
         "note": NOTE,
         "start_week": WEEKS[0],
         "mesh": {"order": 1, "surface_edge_mm": arguments.edge, "elements": elements},

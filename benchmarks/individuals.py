@@ -1,17 +1,18 @@
-"""From which size of individuality on a predicted brain is nearer to the later one than the atlas' own brain is.
+"""Find how large an individual difference must be for a prediction to be better than the atlas' brain of that week.
 
     ./run python benchmarks/individuals.py FOLDER --volumes 'CRL/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
         --growth crl CRL --accept-licence
 
-CRL is the folder of an atlas' files. The individuals are invented: its volumes, deformed by random smooth maps. `shape`
-has waves of 40 to 60 mm at the start, `sulci` of 15 to 25 mm; their size is the root mean square displacement in the
-start's cerebrum in mm. Maps follow the brain's centre and lengths along three axes over the weeks, so an individuality
-is `kept`; or it is `fading` as e^(−weeks/8), and another one of the same size takes its place.
+CRL is the folder of an atlas' files. The individuals are synthetic: the atlas' volumes, deformed by random smooth maps.
+At the start, `shape` has waves of 40 to 60 mm and `sulci` of 15 to 25 mm; their size is the root mean square
+displacement (mm) in the start brain's cerebrum. Maps follow the brain's centre and its lengths along three axes over
+the weeks, so the individual difference is `kept`; or it is `fading` as e^(−weeks/8), and another one of the same size
+replaces it.
 
-The starts are predicted by the growth of the atlas as it is, and laid rigidly onto the invented later brains, which
-have no part in that. The last line is one JSON object: `scores`, rows with `law`, `individual`, `horizon` (GW),
-`model`, `distance_mm`, `r_shape_index`. Models are the `run`, the `atlas`' own brain of the week, and, for values of
-DIFFERENCE_SMOOTHING_MM and FADING_GW, the shape that a run grows towards, as `8 mm 1 GW`.
+The start brains are predicted with the growth of the atlas, without the synthetic later brains, and rigidly aligned
+with these. The last line is one JSON object: `scores`, rows with `persistence`, `individual`, `horizon` (GW), `model`,
+`distance_mm`, `r_shape_index`. Models are the `run`, the `atlas`' own brain of the week and, for values of
+DIFFERENCE_SMOOTHING_MM and FADING_GW, the run's target, e.g. `8 mm 1 GW`.
 """
 
 import argparse
@@ -43,10 +44,10 @@ WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
-ALL, HERE = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
+FULL, DEFAULT = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
-# flat elements of a coarse mesh of a detailed surface are let through
+# a coarse mesh of a detailed surface has flat elements
 MESH_SETTINGS |= {"max_surface_distance_mm": 0.5, "min_radius_ratio": 0.005}
 INDIVIDUALS = ["shape-0-1", "shape-1-1", "shape-2-1", "shape-4-1", "sulci-1-1", "sulci-2-1"]
 
@@ -60,24 +61,24 @@ def velocity(kind: str, seed: int, points: Floats) -> Floats:
 
 
 def cerebrum_of(volume: LabelVolume, scheme: str) -> tuple[Floats, Floats, Floats]:
-    """Return the cerebrum's centre, its standard deviations along the axes, and its voxels from there (n, 3), in mm."""
+    """Return the cerebrum's centre, its standard deviations along the axes, and its (n, 3) centred voxels, in mm."""
     points = transform_points(np.argwhere(np.isin(volume.labels, SCHEMES[scheme].cerebrum)), volume.affine)
     return points.mean(axis=0), points.std(axis=0), points - points.mean(axis=0)
 
 
-def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, kept: float) -> LabelVolume:
-    """Return the labels of an individual KIND-SIZE-SEED, of whose individuality at the start a part is kept."""
+def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, share: float) -> LabelVolume:
+    """Return the labels of an individual KIND-SIZE-SEED with a share of its individual difference at the start."""
     kind, size, seed = name.split("-")
     (centre, lengths, _), (_, start_lengths, cerebrum) = cerebrum_of(volume, scheme), cerebrum_of(start, scheme)
     parts = []
-    for part, number in ((kept, int(seed)), (np.sqrt(1 - kept**2), int(seed) + 1000)):
+    for part, number in ((share, int(seed)), (np.sqrt(1 - share**2), int(seed) + 1000)):
         rms = np.sqrt((velocity(kind, number, cerebrum[::20]) ** 2).sum(axis=1).mean())
         parts.append((part * float(size) / rms / FLOW_STEPS, number))
     labels, affine = np.pad(volume.labels, PAD), volume.affine.copy()
     affine[:3, 3] -= affine[:3, :3].sum(axis=1) * PAD
     grid = np.stack(np.meshgrid(*(np.arange(0, n + COARSE, COARSE) for n in labels.shape), indexing="ij"))
     points = began = (transform_points(grid.reshape(3, -1).T, affine) - centre) * start_lengths / lengths
-    # a flow is one to one, whatever its size
+    # a flow is one-to-one at any size
     for _ in range(FLOW_STEPS):
         points = points + sum(factor * velocity(kind, number, points) for factor, number in parts if factor)
     moved = (points - began) * lengths / start_lengths @ np.linalg.inv(affine[:3, :3]).T
@@ -85,35 +86,36 @@ def deformed(volume: LabelVolume, start: LabelVolume, scheme: str, name: str, ke
     index += [map_coordinates(axis.reshape(grid.shape[1:]), index / COARSE, order=1) for axis in moved.T]
     largest, result = np.zeros(labels.shape, np.float32), np.zeros_like(labels)
     for label in np.unique(labels):
-        share = map_coordinates((labels == label).astype(np.float32), index, order=1)
-        result[share > largest], largest = label, np.maximum(largest, share)
+        weight = map_coordinates((labels == label).astype(np.float32), index, order=1)
+        result[weight > largest], largest = label, np.maximum(largest, weight)
     return LabelVolume(result, affine)
 
 
 def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float, dict[str, TriangleMesh]]:
-    """Return by week the shapes that a start would grow towards along the brains of an atlas."""
+    """Return the targets of a start brain along the brains of an atlas, by week."""
     chain = [brain, *atlas.values()]
     mesh = read_tetrahedral_mesh(folder / MESH["mesh"].format(brain=brain))
     poses = [read_pose(folder / PIAL["report"].format(brain=name)).world for name in chain]
-    registered = [folder / REGISTERED.format(earlier=one, later=other) for one, other in pairwise(chain)]
+    registered = [folder / REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairwise(chain)]
     pairs = [
         between_moved(read_correspondence(file), *pair) for file, pair in zip(registered, pairwise(poses), strict=True)
     ]
     surfaces = [read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]]
     carried, start = carry_sharply(mesh, pairs, surfaces)[1:], min(atlas)
     places = {
-        own: expected_positions(mesh, start, carried, list(atlas), smoothing_mm=own) for own in (0.0, *dict(GRID))
+        smoothing: expected_positions(mesh, start, carried, list(atlas), smoothing_mm=smoothing)
+        for smoothing in (0.0, *dict(GRID))
     }
-    (boundary, used), (weeks, everything) = boundary_surface(mesh), places[0.0]
+    (boundary, used), (weeks, unsmoothed) = boundary_surface(mesh), places[0.0]
     result: dict[float, dict[str, TriangleMesh]] = {}
     for number, week in enumerate(weeks):
-        shapes = {ALL: everything[number]}
-        for own, fading in GRID if week > start else []:
-            # linear in the part of what is finer that has faded
-            gone, gone_here = (-np.expm1((start - week) / time) for time in (fading, FADING_GW))
-            fades = places[own][1][number] - everything[number]
-            shapes[f"{own:g} mm {fading:g} GW"] = everything[number] + gone / gone_here * fades
-        result[week] = {name: TriangleMesh(at[used], boundary.faces) for name, at in shapes.items()}
+        shapes = {FULL: unsmoothed[number]}
+        for smoothing, fading in GRID if week > start else []:
+            # linear in the faded part of the finer differences
+            faded, faded_by_default = (-np.expm1((start - week) / time) for time in (fading, FADING_GW))
+            change = places[smoothing][1][number] - unsmoothed[number]
+            shapes[f"{smoothing:g} mm {fading:g} GW"] = unsmoothed[number] + faded / faded_by_default * change
+        result[week] = {name: TriangleMesh(points[used], boundary.faces) for name, points in shapes.items()}
     return result
 
 
@@ -121,27 +123,33 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--volumes", required=True, help="label volumes to deform, with {week} in their path")
-    parser.add_argument("--scheme", default="spina-bifida-atlas", help="of their labels")
-    parser.add_argument("--growth", nargs=2, required=True, metavar=("NAME", "FILES"), help="the atlas that predicts")
-    parser.add_argument("--accept-licence", action="store_true", help="of that atlas")
+    parser.add_argument("--scheme", default="spina-bifida-atlas", help="label scheme of these volumes")
+    parser.add_argument(
+        "--growth", nargs=2, required=True, metavar=("NAME", "FILES"), help="the atlas whose growth predicts"
+    )
+    parser.add_argument("--accept-licence", action="store_true", help="accept the licence of that atlas")
     parser.add_argument("--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS)
-    parser.add_argument("--weeks", type=int, nargs="+", default=[22, 26, 30], help="of the start, and later ones")
-    parser.add_argument("--no-folding", action="store_true", help="leave out the runs")
+    parser.add_argument(
+        "--weeks", type=int, nargs="+", default=[22, 26, 30], help="week of the start brains, and later weeks"
+    )
+    parser.add_argument("--no-folding", action="store_true", help="compare targets only, without runs")
     parser.add_argument("--cores", type=int, default=2)
-    given = parser.parse_args()
-    folder, weeks, start, scheme = given.folder.resolve(), sorted(given.weeks), min(given.weeks), given.scheme
+    arguments = parser.parse_args()
+    folder, scheme, weeks = arguments.folder.resolve(), arguments.scheme, sorted(arguments.weeks)
+    start = weeks[0]
     folder.mkdir(parents=True, exist_ok=True)
-    volumes = {week: read_label_volume(given.volumes.format(week=week), cropped=True) for week in weeks}
+    volumes = {week: read_label_volume(arguments.volumes.format(week=week), cropped=True) for week in weeks}
     brains, growing = [], list(range(start, weeks[-1] + 1))
-    for name, law, week in product(given.individuals, KEPT_GW, weeks):
-        if law == "kept" or week > start:
-            path, kept = folder / f"{name}-{law}-{week}.nii.gz", float(np.exp((start - week) / KEPT_GW[law]))
+    for name, persistence, week in product(arguments.individuals, KEPT_GW, weeks):
+        if persistence == "kept" or week > start:
+            path = folder / f"{name}-{persistence}-{week}.nii.gz"
+            share = float(np.exp((start - week) / KEPT_GW[persistence]))
             if not path.exists():
-                write_label_volume(path, deformed(volumes[week], volumes[start], scheme, name, kept))
-            brain = {"id": path.name[:-7], "week": week, "subject": f"{name}-{law}", "population": "invented"}
+                write_label_volume(path, deformed(volumes[week], volumes[start], scheme, name, share))
+            brain = {"id": path.name[:-7], "week": week, "subject": f"{name}-{persistence}", "population": "synthetic"}
             brains.append(brain | {"labels": str(path), "scheme": scheme})
-    starts = [f"{name}-kept-{start}" for name in given.individuals]
-    (atlas, data), accepted = given.growth, given.accept_licence
+    starts = [f"{name}-kept-{start}" for name in arguments.individuals]
+    (atlas, data), accepted = arguments.growth, arguments.accept_licence
     config = {
         "atlas": {"name": atlas, "folder": data, "weeks": growing, "accept_licence": accepted},
         "brains": brains,
@@ -153,26 +161,32 @@ def main() -> None:
     }
     files = [PIAL["whole"].format(brain=brain["id"]) for brain in brains]
     files += [TARGETS.format(brain=brain, origin="atlas") for brain in starts]
-    folded = [] if given.no_folding else product(starts, weeks[1:])
-    call(folder, config, given.cores, *files, *(RUN.format(brain=brain, week=week_tag(week)) for brain, week in folded))
+    folded = [] if arguments.no_folding else product(starts, weeks[1:])
+    call(
+        folder,
+        config,
+        arguments.cores,
+        *files,
+        *(RUN.format(brain=brain, week=week_tag(week)) for brain, week in folded),
+    )
     rows = []
-    for name, brain in zip(given.individuals, starts, strict=True):
+    for name, brain in zip(arguments.individuals, starts, strict=True):
         targets = targets_of(folder, brain, {float(week): f"{atlas}-{week}" for week in growing})
-        for law, week in product(KEPT_GW, weeks[1:]):
-            real = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{law}-{week}"))
-            own = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
-            models = targets[week] | {"atlas": scale_to_volume(own, signed_volume(targets[week][HERE]))}
-            if not given.no_folding:
+        for persistence, week in product(KEPT_GW, weeks[1:]):
+            observed = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}"))
+            atlas_brain = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
+            models = targets[week] | {"atlas": scale_to_volume(atlas_brain, signed_volume(targets[week][DEFAULT]))}
+            if not arguments.no_folding:
                 models["run"] = read_surface(folder / RUN.format(brain=brain, week=week_tag(week)))
-            folds = prepare_for_comparison(real, real)
+            folds = prepare_for_comparison(observed, observed)
             for model, surface in models.items():
-                row = {"law": law, "individual": name, "horizon": week - start, "model": model}
-                row["distance_mm"] = aligned_distances(surface, real)["distance_mm"]
-                values = interpolate_measures(prepare_for_comparison(surface, real), folds)[0]["shape_index"]
+                row = {"persistence": persistence, "individual": name, "horizon": week - start, "model": model}
+                row["distance_mm"] = aligned_distances(surface, observed)["distance_mm"]
+                values = interpolate_measures(prepare_for_comparison(surface, observed), folds)[0]["shape_index"]
                 row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
                 rows.append(row)
     for value in ("distance_mm", "r_shape_index"):
-        table = pd.DataFrame(rows).pivot_table(value, ["law", "individual", "horizon"], "model")
+        table = pd.DataFrame(rows).pivot_table(value, ["persistence", "individual", "horizon"], "model")
         print(value, table.to_string(float_format="%.3f"), sep="\n")
     print(json.dumps({"scores": rows}))
 

@@ -1,8 +1,8 @@
-"""Do the fast tests find one-line mistakes? Each mutant is put into a copy of the checkout, and its tests are run.
+"""Check that the fast tests find one-line mistakes: put each mutant into a copy of the checkout and run its tests.
 
     ./run python benchmarks/mutants.py [--only figures.py]
 
-A mutant is killed if its tests fail and survives if they pass. Two things are checked first: each text to be replaced
+A mutant is killed if its tests fail and survives if they pass. Two things are checked first: each text to replace
 occurs exactly once in its file, and the tests pass without a mutant. The last line is one JSON object.
 """
 

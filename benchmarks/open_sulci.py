@@ -1,7 +1,8 @@
-"""Sulci that voxels keep shut, on bodies of known area, depth and thickness and on shipped brains.
+"""Measure surfaces with fused and with opened sulci, on phantoms of known shape and on shipped brains.
 
-`python benchmarks/open_sulci.py [FOLDER …]`: phantoms, and with folders of `parcellation.nii.gz` in the labels of the
-spina bifida atlas, named by their week, the pial area over the cortex's volume by its thickness.
+`python benchmarks/open_sulci.py [FOLDER …]`: without folders, phantoms; with folders named by their week, each with a
+`parcellation.nii.gz` in the labels of the spina bifida atlas, pial area, thickness and the ratio of the area to the
+cortex's volume divided by its thickness.
 """
 
 import json
@@ -25,25 +26,25 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.gyrification import sulcal_depth
 
-# a ball with sulci all round it, at x = ±X + A sin(y/L), all in mm
+# a ball with sulci around it, at x = ±X + A sin(y/L), all in mm
 RADIUS_MM, DEPTH_MM, THICKNESS_MM = 20.0, 6.0, 2.0
 PLACES_MM, WAVE_MM, LENGTH_MM = (-6.0, 6.0), 1.5, 4.0
 WIDTHS_MM, VOXELS_MM, TURNS_DEG = (0.0, 0.2, 0.5, 1.0), (0.5, 0.8, 1.0), ((0, 0, 0), (20, 30, 10), (45, 35, 0))
-# cells into which a voxel is divided along each axis, of which most give its label
+# cells of a voxel along each axis; the label is that of most cells
 CELLS = 3
 EDGE_MM = 1.0
-WAYS = ("shut", "opened")
+SULCI = ("fused", "opened")
 
 
 def off_sulci(points: np.ndarray) -> np.ndarray:
-    """Return the distance of points (…, 3) in mm from the middle of the nearest sulcus."""
+    """Return the distance (mm) of (…, 3) points from the middle of the nearest sulcus."""
     wave = points[..., 1] / LENGTH_MM
-    across = (points[..., 0] - WAVE_MM * np.sin(wave)) / np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(wave)) ** 2)
-    return np.min([np.abs(across - place) for place in PLACES_MM], axis=0)
+    offset = (points[..., 0] - WAVE_MM * np.sin(wave)) / np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(wave)) ** 2)
+    return np.min([np.abs(offset - place) for place in PLACES_MM], axis=0)
 
 
 def truth(width_mm: float) -> dict[str, float]:
-    """Return the area of the ball with sulci of a width, mean depth below the hull, and gyrification."""
+    """Return the area of the ball with sulci of a width, its mean depth below the hull, and its gyrification."""
     step = 0.02
     y, z = np.meshgrid(*[np.arange(-RADIUS_MM, RADIUS_MM, step)] * 2, indexing="ij")
     stretch = np.sqrt(1.0 + (WAVE_MM / LENGTH_MM * np.cos(y / LENGTH_MM)) ** 2)
@@ -53,10 +54,10 @@ def truth(width_mm: float) -> dict[str, float]:
         below = RADIUS_MM - np.sqrt((place + WAVE_MM * np.sin(y / LENGTH_MM)) ** 2 + y**2 + z**2)
         wall = 2.0 * stretch * step**2 * ((below > 0) & (below < DEPTH_MM))
         walls, depth = walls + wall.sum(), depth + (wall * below).sum()
-    # what the sulci take from the ball, and their bottoms
+    # area of the sulci's mouths, which the ball loses, and of their bottoms
     height, turn = np.meshgrid(np.arange(-1, 1, 0.001) + 0.0005, np.arange(0, 2 * np.pi, 0.002), indexing="ij")
-    aside = np.sqrt(1.0 - height**2)
-    directions = np.stack([aside * np.cos(turn), aside * np.sin(turn), height], axis=-1)
+    radial = np.sqrt(1.0 - height**2)
+    directions = np.stack([radial * np.cos(turn), radial * np.sin(turn), height], axis=-1)
     mouth, bottom = (
         4.0 * np.pi * radius**2 * float((off_sulci(radius * directions) < 0.5 * width_mm).mean())
         for radius in (RADIUS_MM, RADIUS_MM - DEPTH_MM)
@@ -67,7 +68,7 @@ def truth(width_mm: float) -> dict[str, float]:
 
 
 def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]):
-    """Return the (i, j, k) masks of the body and of what is inside its cortex, and their affine."""
+    """Return the (i, j, k) masks of the body and of its core inside the cortex, and their affine."""
     count = int(np.ceil(RADIUS_MM / voxel_mm)) + 6
     axis = np.arange(-count, count + 1) * voxel_mm + 0.13
     cells = (axis[:, None] + voxel_mm * ((np.arange(CELLS) + 0.5) / CELLS - 0.5)).ravel()
@@ -75,7 +76,7 @@ def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, floa
     points = np.stack(np.meshgrid(cells, cells, cells, indexing="ij"), axis=-1) @ turn
     below = RADIUS_MM - np.linalg.norm(points, axis=-1)
     off = off_sulci(points)
-    # the distance to the middle of the sulci less half their width, and to the outside of the ball
+    # distance to the walls: that to the middle of the sulci less half their width
     middle = (off < 0.6 * voxel_mm / CELLS) & (below < DEPTH_MM)
     to_walls = ndimage.distance_transform_edt(~middle, sampling=voxel_mm / CELLS) - 0.5 * width_mm
     outside = (below < 0) | ((off < 0.5 * width_mm) & (below < DEPTH_MM))
@@ -87,39 +88,39 @@ def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, floa
     return body, core & body, affine
 
 
-def measured(mesh, body, core, affine) -> dict[str, float]:
-    """Return what a surface of the body has of what `truth` gives."""
+def measure(mesh, body, core, affine) -> dict[str, float]:
+    """Measure the quantities of `truth` on a surface of the body, and its Euler number."""
     hull, weights = convex_hull(mesh), vertex_areas(mesh)
     thickness = cortical_thickness(mesh, body, body & ~core, affine, fissure_x_mm=-1e3)
     depth = float(np.average(sulcal_depth(mesh, hull), weights=weights))
-    of_area = {"area_mm2": area(mesh), "depth_mm": depth, "gi": area(mesh) / area(hull)}
-    return of_area | {"thickness_mm": thickness.report["mean_mm"], "euler": euler_number(mesh)}
+    result = {"area_mm2": area(mesh), "depth_mm": depth, "gi": area(mesh) / area(hull)}
+    return result | {"thickness_mm": thickness.report["mean_mm"], "euler": euler_number(mesh)}
 
 
 def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]) -> dict:
-    """Return what today's surface of a phantom has, and that with its sulci opened."""
+    """Measure the surfaces of a phantom with fused and with opened sulci."""
     body, core, affine = phantom(width_mm, voxel_mm, turn_deg)
-    # as in a brain, where slits one voxel wide are opened again
+    # as for brains: slits one voxel wide are opened
     field, _ = remove_bridges(body, smooth_mask(body), np.zeros_like(body))
     volume = float(body.sum() * voxel_mm**3)
-    shut = surface_of_mask(field, affine, volume, EDGE_MM).mesh
+    fused = surface_of_mask(field, affine, volume, EDGE_MM).mesh
     field, fine, report = open_fused_sulci(field, affine, core)
     opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
     row = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
-    return row | {name: measured(mesh, body, core, affine) for name, mesh in zip(WAYS, (shut, opened), strict=True)}
+    return row | {name: measure(mesh, body, core, affine) for name, mesh in zip(SULCI, (fused, opened), strict=True)}
 
 
 def try_brain(path: Path, week: float) -> dict:
-    """Return area, thickness and their ratio to the cortex's volume of a brain, its sulci shut and opened."""
+    """Return area, thickness and area ratio of a brain with fused and with opened sulci."""
     volume, scheme, row = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"], {"week": week}
-    for name in WAYS:
-        begin = time.process_time()
+    for name in SULCI:
+        began = time.process_time()
         brain = from_labels(volume.labels, volume.affine, scheme, week=week, open_sulci=name == "opened")
-        taken = time.process_time() - begin
-        place = brain.whole, brain.pose, brain.fissure_x_mm
-        report = thickness_from_labels(volume.labels, volume.affine, scheme, *place).report
+        seconds = time.process_time() - began
+        surface = brain.whole, brain.pose, brain.fissure_x_mm
+        report = thickness_from_labels(volume.labels, volume.affine, scheme, *surface).report
         found = {"area_cm2": brain.report["area_cm2"]["whole"], "thickness_mm": report["mean_mm"]}
-        row[name] = found | {"area_ratio": report["area_ratio"], "euler": brain.report["euler_number"], "s": taken}
+        row[name] = found | {"area_ratio": report["area_ratio"], "euler": brain.report["euler_number"], "s": seconds}
     return row
 
 
@@ -127,8 +128,10 @@ if __name__ == "__main__":
     true, phantoms, brains = {width: truth(width) for width in WIDTHS_MM}, [], {}
     for voxel, width, turn in product(VOXELS_MM, WIDTHS_MM, TURNS_DEG) if not sys.argv[1:] else []:
         phantoms.append(row := try_phantom(width, voxel, turn))
-        shut, opened = ({k: f"{row[n][k] / known - 1:+.1%}" for k, known in true[width].items()} for n in WAYS)
-        print(f"{voxel} mm voxels, {width} mm wide, turned {turn}: shut {shut}, opened {opened}", flush=True)
+        fused, opened = (
+            {key: f"{row[name][key] / exact - 1:+.1%}" for key, exact in true[width].items()} for name in SULCI
+        )
+        print(f"{voxel} mm voxels, {width} mm wide, rotated {turn}: fused {fused}, opened {opened}", flush=True)
     for folder in sys.argv[1:]:
         week = re.findall(r"\d+", Path(folder).name)[0]
         brains[Path(folder).name] = row = try_brain(Path(folder) / "parcellation.nii.gz", float(week))

@@ -1,12 +1,12 @@
-"""How well hemispheres are posed: surfaces in known wrong poses against the truth, as one line of JSON.
+"""Measure the errors of hemispheres' poses: surfaces in known wrong poses against the truth, as one line of JSON.
 
-FOLDER holds pairs of surfaces whose names differ by `left` and `right` only, and `truth.json`: for each file the rigid
-motion `to_ras` (4, 4) back to RAS+ mm and whether it is `inside_out`.
+FOLDER contains pairs of surfaces whose names differ only in `left` and `right`, and `truth.json`: for each file the
+rigid motion `to_ras` (4, 4) back to RAS+ mm and whether the surface is `inside_out`.
 
-With --move OUT another such folder is made instead, with hemispheres moved at random: PLY files, which say nothing of
-their coordinates, every other one inside out, and their `truth.json`. FOLDER needs none where it is in RAS+ mm. With
---asymmetry the right hemispheres are deformed first, smoothly and at random; what of this is a rigid motion is taken
-off again, so that the truth remains one.
+--move OUT writes such a folder instead, with hemispheres moved at random: PLY files, which do not define their
+coordinates, every other one inside out, and their `truth.json`. FOLDER needs no `truth.json` if it is in RAS+ mm.
+--asymmetry first deforms the right hemispheres smoothly and at random, without a rigid motion, so that the truth stays
+the same.
 """
 
 import argparse
@@ -40,18 +40,20 @@ Files = tuple[Path, Path]
 SIDES = ("left", "right")
 WEEKS = np.arange(18.0, 45.5, 0.5)
 FAR_MM = 50.0
-# of deformations: the stretch, and how many waves there are, of how many radians per cube root of the volume
+# deformations: stretch, number of waves, and their radians per cube root of the volume
 STRETCH, WAVES, WAVE_NUMBER = 0.04, 60, 2.0
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--move", type=Path, metavar="OUT", help="folder for hemispheres that are moved at random")
+    parser.add_argument("--move", type=Path, metavar="OUT", help="write hemispheres moved at random to this folder")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--together", action="store_true", help="one motion for both hemispheres of a brain")
-    parser.add_argument("--asymmetry", type=float, default=0.0, metavar="MM", help="root mean square deformation")
-    parser.add_argument("--scale", type=float, default=1.0, help="size of the brains, in their own")
+    parser.add_argument(
+        "--asymmetry", type=float, default=0.0, metavar="MM", help="root mean square deformation of right hemispheres"
+    )
+    parser.add_argument("--scale", type=float, default=1.0, help="factor that scales the brains")
     arguments = parser.parse_args()
     folder = arguments.folder
     truth = read_json(folder / "truth.json") if (folder / "truth.json").exists() else {}
@@ -78,7 +80,7 @@ def pairs_of_files(folder: Path) -> list[Files]:
 
 
 def posed(brain: Files) -> PialSurface:
-    """Return the pial surface of two files, coarse, as the workflow makes it."""
+    """Return the coarse pial surface of two files, made as in the workflow."""
     left, right, declared = read_hemispheres(*brain)
     edge = max(1.2, abs(signed_volume(left)) ** (1 / 3) / 25)
     settings = {"week": _week(left), "edge_length_mm": edge, "max_asymmetry": 0.05}
@@ -88,45 +90,45 @@ def posed(brain: Files) -> PialSurface:
 def errors(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, float]:
     """Return the worst errors in degrees and mm.
 
-    Pitch, about x, and tilt, about the other axes, are the parts of the angles. Those `of_study` are what is left once
-    one rotation, the same for all, has been taken off: absolute pitch is a convention. Offset and gap are the places of
-    left and right relative to each other: within the sagittal plane, and along x.
+    Pitch is the rotation about x, tilt that about the other axes. Values `of_study` are without the mean rotation of
+    all brains, since absolute pitch is a convention. Offset and gap are the errors of the right hemisphere's position
+    relative to the left: within the sagittal plane, and along x.
     """
-    turns, away = [], []
+    turns, shifts = [], []
     for brain, surface in surfaces.items():
         for path, side in zip(brain, SIDES, strict=True):
             true = np.array(truth[path.name]["to_ras"])
             centre = true[:3, :3] @ read_surface(path).vertices.mean(axis=0) + true[:3, 3]
-            left = surface.pose.of_file(side) @ np.linalg.inv(true)
-            turns.append(Rotation.from_matrix(left[:3, :3]))
-            away.append(left[:3, :3] @ centre + left[:3, 3] - centre)
+            error = surface.pose.of_file(side) @ np.linalg.inv(true)
+            turns.append(Rotation.from_matrix(error[:3, :3]))
+            shifts.append(error[:3, :3] @ centre + error[:3, 3] - centre)
     vectors = np.degrees([turn.as_rotvec() for turn in turns])
     common = Rotation.concatenate(turns).mean()
-    of_study = np.degrees([(turn * common.inv()).as_rotvec() for turn in turns])
-    apart = np.diff(np.reshape(away, (-1, 2, 3)), axis=1)[:, 0]
+    relative = np.degrees([(turn * common.inv()).as_rotvec() for turn in turns])
+    between = np.diff(np.reshape(shifts, (-1, 2, 3)), axis=1)[:, 0]
     return {
         "worst_pitch_deg": _worst(np.abs(vectors[:, 0])),
         "worst_tilt_deg": _worst(np.linalg.norm(vectors[:, 1:], axis=1)),
-        "worst_pitch_of_study_deg": _worst(np.abs(of_study[:, 0])),
-        "worst_tilt_of_study_deg": _worst(np.linalg.norm(of_study[:, 1:], axis=1)),
-        "worst_offset_mm": _worst(np.linalg.norm(apart[:, 1:], axis=1)),
-        "worst_gap_mm": _worst(np.abs(apart[:, 0])),
+        "worst_pitch_of_study_deg": _worst(np.abs(relative[:, 0])),
+        "worst_tilt_of_study_deg": _worst(np.linalg.norm(relative[:, 1:], axis=1)),
+        "worst_offset_mm": _worst(np.linalg.norm(between[:, 1:], axis=1)),
+        "worst_gap_mm": _worst(np.abs(between[:, 0])),
     }
 
 
 def counts(surfaces: dict[Files, PialSurface], truth: dict) -> dict[str, int]:
-    """Return how many files were recognised as inside out or not, and how many brains are two closed pieces."""
-    right, closed = 0, 0
+    """Count the files correctly recognised as inside out or not, and the brains that are two closed pieces."""
+    correct, closed = 0, 0
     for brain, surface in surfaces.items():
         closed += [is_closed(piece) and euler_number(piece) == 2 for piece in pieces(surface.whole)] == [True, True]
         for side, path in zip(SIDES, brain, strict=True):
             turned = surface.report[f"repair_{side}"]["pieces_turned_outward"] > 0
-            right += signed_volume(getattr(surface, side)) > 0 and turned == truth[path.name]["inside_out"]
-    return {"inside_out_right": right, "merged_closed": closed}
+            correct += signed_volume(getattr(surface, side)) > 0 and turned == truth[path.name]["inside_out"]
+    return {"inside_out_correct": correct, "merged_closed": closed}
 
 
 def _week(left: TriangleMesh) -> float:
-    """Return the week whose brains are nearest in size."""
+    """Return the week whose expected brain volume is closest."""
     volume = 2e-3 * abs(signed_volume(left))
     return float(min(WEEKS, key=lambda week: abs(np.log(expected_volume_ml(week) / volume))))
 
@@ -135,13 +137,13 @@ def _worst(values: Floats) -> float:
     return round(float(np.max(values)), 3)
 
 
-def moved_at_random(arguments: argparse.Namespace, known: dict) -> dict[str, dict]:
-    """Write the hemispheres of a folder, moved, and return their truth; `known` is that of the folder, or empty."""
+def moved_at_random(arguments: argparse.Namespace, poses: dict) -> dict[str, dict]:
+    """Write moved hemispheres of a folder and return their truth; `poses` is the folder's own truth, or empty."""
     random, truth = np.random.default_rng(arguments.seed), {}
     for files in pairs_of_files(arguments.folder):
         shared = any_motion(random)
         for path, side in zip(files, SIDES, strict=True):
-            mesh = transformed(read_surface(path), np.array(known[path.name]["to_ras"]) if known else np.eye(4))
+            mesh = transformed(read_surface(path), np.array(poses[path.name]["to_ras"]) if poses else np.eye(4))
             mesh = flipped(mesh) if signed_volume(mesh) < 0 else mesh
             mesh = TriangleMesh(arguments.scale * mesh.vertices, mesh.faces)
             if arguments.asymmetry and side == "right":
@@ -156,7 +158,7 @@ def moved_at_random(arguments: argparse.Namespace, known: dict) -> dict[str, dic
 
 
 def any_motion(random: np.random.Generator) -> np.ndarray:
-    """Return a random rigid motion, (4, 4): any rotation, and a shift of a few centimetres."""
+    """Return a random (4, 4) rigid motion: any rotation and a shift of a few centimetres."""
     return motion(Rotation.random(random_state=random).as_matrix(), random.normal(0.0, FAR_MM, 3))
 
 
@@ -172,11 +174,11 @@ def deformed(mesh: TriangleMesh, rms_mm: float, random: np.random.Generator) -> 
     bends = np.cos(phases) @ random.normal(0.0, 1.0, (WAVES, 3))
     bends -= bends.mean(axis=0)
     bends *= rms_mm / np.sqrt((bends**2).sum(axis=1).mean())
-    there = (points - centre) * (1.0 + random.uniform(-STRETCH, STRETCH, 3)) + bends
-    there -= there.mean(axis=0)
-    there *= size / signed_volume(TriangleMesh(there, mesh.faces)) ** (1 / 3)
-    back, _ = Rotation.align_vectors(points - centre, there)
-    return TriangleMesh(back.apply(there) + centre, mesh.faces)
+    bent = (points - centre) * (1.0 + random.uniform(-STRETCH, STRETCH, 3)) + bends
+    bent -= bent.mean(axis=0)
+    bent *= size / signed_volume(TriangleMesh(bent, mesh.faces)) ** (1 / 3)
+    back, _ = Rotation.align_vectors(points - centre, bent)
+    return TriangleMesh(back.apply(bent) + centre, mesh.faces)
 
 
 if __name__ == "__main__":

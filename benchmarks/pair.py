@@ -1,10 +1,10 @@
-"""A folding run by two checkouts in turn: processor time, iterations, memory, and how far their positions differ.
+"""Run a simulation with two checkouts in turn: processor time, iterations, memory and difference of positions.
 
     git worktree add ../before 864ee12
     ./run python benchmarks/pair.py ../before MESH PARAMS --maps MAPS --end-week 22 --out pair
 
 MESH, PARAMS and MAPS are `mesh/brain.xdmf` of a brain, and `params.yaml` and `folding/maps.h5` of a run from it; MAPS
-is left out where the run has none. Of `--repeats` runs in turn the least processor time of each checkout is kept. The
+is left out if the run has none. The checkouts run in turn `--repeats` times; the fastest run of each is reported. The
 last line is one JSON object.
 """
 
@@ -42,7 +42,7 @@ def main() -> None:
     write_yaml(params, values | {"end_week": end, "output_weeks": weeks})
     program = ["mpiexec", "-n", str(arguments.ranks), "python", "-m", "gyriflow.folding", str(arguments.mesh.resolve())]
     program += ["--params", str(params), *(["--maps", str(arguments.maps.resolve())] if arguments.maps else [])]
-    least: dict[str, dict] = {}
+    fastest: dict[str, dict] = {}
     for _ in range(arguments.repeats):
         for name, checkout in (("before", arguments.before), ("now", CHECKOUT)):
             out = arguments.out.resolve() / name
@@ -50,11 +50,11 @@ def main() -> None:
             environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
             subprocess.run(["./run", *program, "--out", str(out)], cwd=checkout, env=environment, check=True)
             summary = read_json(out / "summary.json")
-            least[name] = min(least.get(name, summary), summary, key=lambda one: one["cpu_seconds"])
-    before, now = (read_positions(arguments.out / name / "frames.h5", end) for name in ("before", "now"))
-    kept = ("dofs", "steps", "newton", "krylov", "cpu_seconds", "peak_memory_MiB")
-    result = {name: {key: summary[key] for key in kept} for name, summary in least.items()}
-    print(json.dumps(result | {"largest_difference_mm": float(np.linalg.norm(now - before, axis=1).max())}))
+            fastest[name] = min(fastest.get(name, summary), summary, key=lambda summary: summary["cpu_seconds"])
+    before, after = (read_positions(arguments.out / name / "frames.h5", end) for name in ("before", "now"))
+    reported = ("dofs", "steps", "newton", "krylov", "cpu_seconds", "peak_memory_MiB")
+    result = {name: {key: summary[key] for key in reported} for name, summary in fastest.items()}
+    print(json.dumps(result | {"largest_difference_mm": float(np.linalg.norm(after - before, axis=1).max())}))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""What voxels do to curvature, before terraces are taken out and after: on bodies of known shape and on brains.
+"""Measure what voxels do to curvature with and without the removal of terraces, on known shapes and on brains.
 
-An ellipsoid and folded spheres are cut into voxels, and surfaces are made from these as from labels. On the ellipsoid
-mean curvature and shape index are compared with the analytic ones, as root mean square errors; on folded spheres mean
-curvature with that of the exact surface by the same quadrics: its correlation, and the slope of its regression on the
-exact one. The smooth surface of a shipped brain is cut into voxels twice, the second time shifted and turned: the
-correlation between the maps of both is the repeatability. One line of JSON for each is printed, then all.
+An ellipsoid and folded spheres are voxelised, and surfaces are made from the voxels as from labels. On the ellipsoid,
+mean curvature and shape index are compared with the analytic values (root mean square errors). On folded spheres, mean
+curvature is compared with that of the exact surface, by the same quadrics: correlation, and slope of the regression on
+the exact values. The smooth surface of a shipped brain is voxelised twice, the second time shifted and rotated; the
+correlation between both maps is the repeatability. One line of JSON is printed for each case, then all cases.
 """
 
 import argparse
@@ -35,7 +35,7 @@ ATLAS = SHIPPED / "atlases" / "spina-bifida"
 SEMI_AXES = np.array([32.0, 42.0, 26.0])
 RADIUS = 35.0
 FOLDS = {"A 1, λ 8 mm": (1.0, 8.0), "A 2, λ 12 mm": (2.0, 12.0), "A 0.5, λ 12 mm": (0.5, 12.0)}
-# where the lattice lies: no plane of it in the middle of a body
+# offset of the voxel grid, in voxels, so that no plane of it is in the middle of a body
 OFFSET = np.array([0.13, 0.37, 0.21])
 FINE_MM = 0.8
 
@@ -43,12 +43,14 @@ FINE_MM = 0.8
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--voxels", type=float, nargs="+", default=[0.5, 0.8, 1.0], metavar="MM")
-    parser.add_argument("--edge", type=float, default=1.0, metavar="MM", help="edges of the surfaces")
-    parser.add_argument("--brains", nargs="*", default=["23_notoperated", "29_operated"], help="of the shipped atlas")
+    parser.add_argument("--edge", type=float, default=1.0, metavar="MM", help="edge length of the surfaces")
+    parser.add_argument(
+        "--brains", nargs="*", default=["23_notoperated", "29_operated"], help="brains of the shipped atlas"
+    )
     arguments = parser.parse_args()
     rows: list[dict] = []
 
-    def tell(body: str, voxel: float, mask: np.ndarray, affine: Floats, judge: Callable) -> None:
+    def report(body: str, voxel: float, mask: np.ndarray, affine: Floats, judge: Callable) -> None:
         row = {"body": body, "voxel_mm": voxel}
         for name, made in (("before", surface_with_terraces), ("after", surface_of_voxels)):
             found = judge(lambda mask, affine, made=made: made(mask, affine, arguments.edge), mask, affine)
@@ -57,7 +59,7 @@ def main() -> None:
         print(json.dumps(row, ensure_ascii=False), flush=True)
 
     for voxel in arguments.voxels:
-        tell("ellipsoid", voxel, *ellipsoid(voxel), lambda made, *volume: errors_on_ellipsoid(made(*volume)))
+        report("ellipsoid", voxel, *ellipsoid(voxel), lambda made, *volume: errors_on_ellipsoid(made(*volume)))
     for name, fold in FOLDS.items():
         exact = exact_sphere(*fold)
         bend = curvature(exact)
@@ -67,18 +69,18 @@ def main() -> None:
             return {"area": area(mesh) / area(exact)} | agreement(mesh, exact, curvature(mesh), bend)
 
         for voxel in arguments.voxels:
-            tell(name, voxel, *folded_sphere(*fold, voxel), against)
+            report(name, voxel, *folded_sphere(*fold, voxel), against)
     for brain in arguments.brains:
         volume = read_label_volume(ATLAS / f"fetal_SB_atlas_GA{brain}" / "parcellation.nii.gz", cropped=True)
         scheme, week = SCHEMES["spina-bifida-atlas"], float(brain[:2])
         body = from_labels(volume.labels, volume.affine, scheme, week=week, edge_length_mm=FINE_MM).whole
         for voxel in arguments.voxels:
-            tell(brain, voxel, *voxels_of(body, voxel), partial(repeated, body, voxel))
+            report(brain, voxel, *voxels_of(body, voxel), partial(repeated, body, voxel))
     print(json.dumps(rows, ensure_ascii=False))
 
 
 def surface_of_voxels(mask: np.ndarray, affine: Floats, edge_mm: float) -> TriangleMesh:
-    """Return the even surface around an (i, j, k) mask as it is made around labels."""
+    """Return the surface of an (i, j, k) mask, made as from labels."""
     volume = float(mask.sum() * abs(np.linalg.det(affine[:3, :3])))
     mesh = repair.surface_of_mask(smooth_mask(mask), affine, volume, edge_mm).mesh
     repair.require_sound(mesh)
@@ -106,7 +108,7 @@ def ellipsoid(voxel_mm: float) -> tuple[np.ndarray, Floats]:
 
 
 def errors_on_ellipsoid(mesh: TriangleMesh) -> dict[str, float]:
-    """Return the root mean square errors of mean curvature (1/mm) and shape index, and the area in that of the body."""
+    """Return the root mean square errors of mean curvature (1/mm) and shape index, and the area over the exact area."""
     squares = SEMI_AXES**2
     on = mesh.vertices / np.linalg.norm(mesh.vertices / SEMI_AXES, axis=1, keepdims=True)
     scale = (on**2 / squares**2).sum(axis=1)
@@ -121,7 +123,7 @@ def errors_on_ellipsoid(mesh: TriangleMesh) -> dict[str, float]:
 
 
 def radius(points: Floats, height_mm: float, wavelength_mm: float) -> Floats:
-    """Return the radius of a folded sphere, a spherical harmonic of that height on it, in the (…, 3) directions."""
+    """Return the radius of a folded sphere (a spherical harmonic of that height on a sphere) in (…, 3) directions."""
     degree = round(2 * np.pi * RADIUS / wavelength_mm)
 
     def harmonic(polar: Floats, azimuth: Floats) -> Floats:
@@ -133,28 +135,28 @@ def radius(points: Floats, height_mm: float, wavelength_mm: float) -> Floats:
 
 
 def exact_sphere(height_mm: float, wavelength_mm: float) -> TriangleMesh:
-    """Return a folded sphere, its vertices on the shape."""
+    """Return a folded sphere with its vertices on the exact shape."""
     mesh = shape_surface((RADIUS,) * 3, edge_length_mm=FINE_MM, noise_mm=0.0)
-    for again in (True, False):
+    for is_remeshed in (True, False):
         directions = unit(mesh.vertices)
         vertices = directions * radius(directions, height_mm, wavelength_mm)[:, None]
         mesh = TriangleMesh(vertices, mesh.faces)
-        mesh = remesh(mesh, FINE_MM) if again else mesh
+        mesh = remesh(mesh, FINE_MM) if is_remeshed else mesh
     return mesh
 
 
 def folded_sphere(height_mm: float, wavelength_mm: float, voxel_mm: float) -> tuple[np.ndarray, Floats]:
     """Return the mask of a folded sphere, and its affine."""
     centres, affine = lattice(np.full(3, RADIUS + height_mm), voxel_mm)
-    away = np.linalg.norm(centres, axis=-1)
-    mask, near = away < RADIUS, np.abs(away - RADIUS) <= height_mm
-    mask[near] = away[near] < radius(centres[near], height_mm, wavelength_mm)
+    radii = np.linalg.norm(centres, axis=-1)
+    mask, near = radii < RADIUS, np.abs(radii - RADIUS) <= height_mm
+    mask[near] = radii[near] < radius(centres[near], height_mm, wavelength_mm)
     return mask, affine
 
 
-def agreement(mesh: TriangleMesh, other: TriangleMesh, bend: Curvature, exact: Curvature) -> dict[str, float]:
-    """Return how well the curvature of a surface agrees with that at the nearest vertices of another."""
-    _, nearest = cKDTree(other.vertices).query(mesh.vertices)
+def agreement(mesh: TriangleMesh, reference: TriangleMesh, bend: Curvature, exact: Curvature) -> dict[str, float]:
+    """Return how well the curvature of a surface agrees with that at the nearest vertices of a reference."""
+    _, nearest = cKDTree(reference.vertices).query(mesh.vertices)
     return {
         "r_mean_curvature": float(np.corrcoef(bend.mean, exact.mean[nearest])[0, 1]),
         "slope": float(np.polyfit(exact.mean[nearest], bend.mean, 1)[0]),
@@ -169,7 +171,7 @@ def voxels_of(body: TriangleMesh, voxel_mm: float) -> tuple[np.ndarray, Floats]:
 
 
 def repeated(body: TriangleMesh, voxel_mm: float, made: Callable, *volume: Floats) -> dict[str, float]:
-    """Return how well two surfaces of one body agree that is cut into voxels as it lies, and shifted and turned."""
+    """Return how well two surfaces of one body agree: voxelised as it is, and shifted and rotated."""
     pose = motion(Rotation.from_rotvec(np.radians([11.0, -17.0, 23.0])).as_matrix(), OFFSET * voxel_mm)
     first, second = made(*volume), made(*voxels_of(transformed(body, pose), voxel_mm))
     second = transformed(second, np.linalg.inv(pose))

@@ -1,9 +1,9 @@
-"""Verification of the folding solver: cases whose answers are known, with the numbers that docs/verification.md shows.
+"""Verify the folding solver on cases with known answers; makes the numbers of docs/verification.md.
 
     ./run python benchmarks/verification.py --figures docs/images
 
-Cases and literature: docs/verification.md. The solver runs on two MPI ranks, and on one, two and three where these are
-compared. The last line is one JSON object with all that was measured.
+Cases and literature: docs/verification.md. The solver runs on two MPI ranks; part `ranks` compares one, two and three.
+The last line is one JSON object with all results.
 """
 
 import argparse
@@ -19,22 +19,22 @@ import numpy as np
 
 ORDERS = {1: "linear", 2: "quadratic"}
 MANUFACTURED_CELLS = {1: (6, 12, 24), 2: (3, 6, 12)}
-"""Cells along a side by the order of the elements: as many unknowns of both."""
+"""Cells along a side by element order: both orders have the same number of unknowns."""
 ELEMENTS = {1: (2, 4, 8), 2: (1, 2, 4)}
-"""Cells to a cortical thickness by the order of the elements, of which error and price are compared."""
+"""Cells per cortical thickness by element order; their error and cost are compared."""
 POISSON_RATIOS = (0.45, 0.48, 0.49, 0.499)
 CONTRASTS = (5.0, 20.0, 50.0)
 SLAB_CELLS = (2, 4, 8, 16)
-"""Cells to a cortical thickness."""
+"""Cells per cortical thickness."""
 RATE_GROWTH = 1e-3
-"""Growth of the step from which rates are taken."""
+"""Growth of the step that gives the rates."""
 MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS = 20.0, 0.004, 12
 MEMORIES = (0.0, 0.05, np.inf)
 TWO_WEEKS = 2e-7 * 2 * 604_800
-"""Growth of the reference model."""
+"""Growth of the reference model in two weeks."""
 STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 56}
 RANKS = (1, 2, 3)
-ALONE = ("theory", "elements")
+SERIAL = ("theory", "elements")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -56,21 +56,21 @@ def manufactured() -> dict:
         for case in CASES:
             errors = [solved(case, cells, order=order) for cells in MANUFACTURED_CELLS[order]]
             found[name][case] = {
-                "displacement_errors": [one.displacement for one in errors],
-                "gradient_errors": [one.gradient for one in errors],
+                "displacement_errors": [error.displacement for error in errors],
+                "gradient_errors": [error.gradient for error in errors],
                 "orders": rates(errors),
             }
     return found
 
 
 def elements() -> list[dict]:
-    """Measure error and price of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
+    """Measure error and cost of the fastest wave by element, mesh and Poisson's ratio, at the reference contrast."""
     from verification_cases.slab import Waved, fastest_wave
 
     found = []
     for order, counts in ELEMENTS.items():
         for cells in counts:
-            # the coarsest meshes also where tissue is nearly incompressible
+            # nearly incompressible tissue on the coarsest meshes only
             for poisson_ratio in POISSON_RATIOS[: 4 if cells == counts[0] else 2]:
                 case = Waved(CONTRASTS[0], RATE_GROWTH, 1, poisson_ratio=poisson_ratio, order=order)
                 found.append(fastest_wave(case, cells))
@@ -90,7 +90,7 @@ def symmetry() -> dict:
 
 
 def ranks() -> dict:
-    """Return where all vertices went in some steps, in m, with tight tolerances and with those of a run."""
+    """Return the displacement of all vertices (m) after four steps, with tight tolerances and with those of a run."""
     from verification_cases.mirrored import folded, hemisphere, reflected_and_merged, rounded
 
     linear, quadratic = hemisphere(8), rounded(hemisphere(4))
@@ -107,7 +107,7 @@ def ranks() -> dict:
 
 
 def theory() -> dict:
-    """Work out the linearised theory in limits that are known in closed form, and what longer steps do to it."""
+    """Compare the linearised theory with limits known in closed form, and measure the effect of longer steps."""
     from scipy.optimize import minimize_scalar
     from verification_cases.closed_forms import BIOT_STRETCH, short_wave_rate, thin_film
     from verification_cases.modes import Slab, amplifications, critical_growth, growth_rates
@@ -175,7 +175,7 @@ PARTS = {part.__name__: part for part in (consistency, manufactured, elements, s
 
 
 def run(part: str, ranks: int) -> dict:
-    """Measure a part in an MPI run of its own."""
+    """Run a part as a separate MPI program and return its results."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         program = [sys.executable, __file__, "--inside-mpi", part, "--into", str(file)]
@@ -196,13 +196,13 @@ def inside_mpi(part: str, into: Path) -> None:
 
 
 def differences_between_ranks() -> dict:
-    """Return the largest distance of a vertex between two numbers of ranks, over the largest displacement."""
+    """Return the largest difference of a vertex between two numbers of ranks, over the largest displacement."""
     runs = [run("ranks", count) for count in RANKS]
     found = {}
     for name in runs[0]:
-        one, *others = (np.array(result[name]) for result in runs)
-        largest = np.linalg.norm(one, axis=1).max()
-        found[name] = [float(np.linalg.norm(other - one, axis=1).max() / largest) for other in others]
+        serial, *parallel = (np.array(result[name]) for result in runs)
+        largest = np.linalg.norm(serial, axis=1).max()
+        found[name] = [float(np.linalg.norm(moved - serial, axis=1).max() / largest) for moved in parallel]
     return found
 
 
@@ -211,15 +211,15 @@ def main(only: list[str], figures: Path | None) -> None:
 
     found: dict = {}
     for part in only:
-        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in ALONE else 2)
+        found[part] = differences_between_ranks() if part == "ranks" else run(part, 1 if part in SERIAL else 2)
         print(f"{part}: done", flush=True)
     if figures and "rates" in found:
         figures.mkdir(parents=True, exist_ok=True)
         draw(found["rates"], SLAB_CELLS, figures)
     if "rates" in found:
-        found["rates"] = {contrast: rates_of(float(contrast), one) for contrast, one in found["rates"].items()}
+        found["rates"] = {contrast: rates_of(float(contrast), case) for contrast, case in found["rates"].items()}
     if "memory" in found:
-        found["memory"] = {tau: memory_of(one) for tau, one in found["memory"].items()}
+        found["memory"] = {tau: memory_of(case) for tau, case in found["memory"].items()}
     print(json.dumps(plain(found)), flush=True)
 
 

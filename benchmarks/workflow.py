@@ -1,4 +1,4 @@
-"""The workflow, called for a configuration that a script has made."""
+"""Call the workflow for a configuration made by a script."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def call(folder: Path, config: dict[str, Any], cores: int, *targets: str) -> None:
-    """Run targets in a folder; GyriflowError where one fails."""
+    """Run targets in a folder; GyriflowError if one fails."""
     write_yaml(folder / "study.yaml", config)
     command = [sys.executable, "-m", "gyriflow.running.launch", "--cores", str(cores), *targets, "--snakefile"]
     command += [str(ROOT / "Snakefile"), "--configfile", str(folder / "study.yaml"), "--directory", str(folder)]

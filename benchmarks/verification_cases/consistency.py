@@ -1,4 +1,4 @@
-"""Energy, forces and stiffness that belong together: Taylor's remainders, and the patch test."""
+"""Consistency of energy, forces and stiffness: Taylor remainders and the patch test."""
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +23,7 @@ LENGTHS = 0.4 * 0.5 ** np.arange(5)
 
 
 def cube(order: int) -> TetrahedralMesh:
-    """Return a cube around the origin, in mm, whose inner vertices are moved at random (seeded): sides are curved."""
+    """Return a cube (mm) around the origin with inner vertices moved at random (seeded), so that sides are curved."""
     mesh = grid([np.linspace(-SIDE_MM / 2, SIDE_MM / 2, 5)] * 3)
     mesh = _shaken(mesh, 0.3)
     return mesh if order == 1 else _shaken(quadratic(mesh), 0.08)
@@ -37,7 +37,7 @@ def _shaken(mesh: TetrahedralMesh, by: float) -> TetrahedralMesh:
 
 
 def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> NonlinearProblem:
-    """Return a problem on the cube with zones by the facets' centroids, growth, oblique normals and kept stretch."""
+    """Return a problem on the cube with growth, oblique normals, remembered stretch and zones by facet centroid."""
     mesh = cube(order)
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, zone_of(mesh.vertices[facets].mean(axis=1)), np.ones(len(mesh.vertices)), 0.0, (-3.2, 3.2))
@@ -55,10 +55,10 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> NonlinearP
 
 
 def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Floats:
-    """Return the (4, 2) orders in which Taylor's remainders fall, of a problem with all parts.
+    """Return the (4, 2) orders of convergence of the Taylor remainders of a problem with all terms.
 
-    These are |E(u + hv) − E(u) − h E'(u)v| and |r(u + hv) − r(u) − h K(u)v| at `LENGTHS`, with layers, kept stress, a
-    clamped base and both planes.
+    These are |E(u + hv) − E(u) − h E'(u)v| and |r(u + hv) − r(u) − h K(u)v| at `LENGTHS`, with layers, remembered
+    stress, a clamped base and both planes.
     """
 
     def zone_of(centre):
@@ -70,7 +70,7 @@ def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Flo
 
     problem = problem_of(zone_of, comm, uniform=False, order=order)
     domain = problem.domain
-    # walls at -3 and 3 mm that may not be left of 3.2 and right of -3.2 mm: contact acts all along
+    # sides at -3 and 3 mm, planes at 3.2 and -3.2 mm: contact is active everywhere
     x = domain.local(domain.positions) * 1e3
     u = 2e-4 * np.stack([np.sin(0.3 * x[:, 1]), np.cos(0.25 * x[:, 2]), np.sin(0.05 * x[:, 0] * x[:, 1])], axis=1)
     v = np.ascontiguousarray(u[:, [2, 0, 1]]) / 2
@@ -82,14 +82,14 @@ def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Flo
     tangent.mult(direction, change)
     remainders = []
     for h in LENGTHS:
-        of_energy = abs(problem.energy(u + h * v) - energy - h * domain.dot(residual.owned, owned))
-        of_forces = domain.norm(problem.residual(u + h * v).owned - residual.owned - h * change.array_r)
-        remainders.append([of_energy, of_forces])
+        energy_remainder = abs(problem.energy(u + h * v) - energy - h * domain.dot(residual.owned, owned))
+        force_remainder = domain.norm(problem.residual(u + h * v).owned - residual.owned - h * change.array_r)
+        remainders.append([energy_remainder, force_remainder])
     return np.diff(np.log(remainders), axis=0) / np.diff(np.log(LENGTHS))[:, None]
 
 
 def patch_residual(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> float:
-    """Return the force left inside a uniform body under an affine displacement, over that on its surface."""
+    """Return the residual inside a uniform body under an affine displacement, over the force on its surface."""
     norms = []
     for zone in (CLAMPED, FREE):
         problem = problem_of(lambda centre, zone=zone: np.full(len(centre), zone), comm, uniform=True, order=order)

@@ -1,4 +1,4 @@
-"""Manufactured solutions: body forces that make a given displacement the exact answer, and the error that is left.
+"""Manufactured solutions: body forces that make a given displacement exact, and the error of the solver.
 
 The stress is written out by hand, so that a wrong energy in the solver would not converge to the given displacement.
 """
@@ -27,7 +27,7 @@ POISSON_RATIO = 0.45
 SIDE_MM = 10.0
 UNIFORM, GRADED, STRETCHED = "uniform", "graded", "stretched"
 CASES = (UNIFORM, GRADED, STRETCHED)
-"""Growth and stiffness that are uniform, or smooth functions of the position; or uniform on a stretch kept before."""
+"""Uniform growth and stiffness; smooth functions of the position; or uniform with a remembered stretch."""
 STRETCH = np.array([[1.06, 0.03, 0.0], [0.03, 0.96, -0.02], [0.0, -0.02, 1.01]])
 QUADRATURE = 5
 """Degree for the body force and the errors, far finer than the solver's own."""
@@ -43,7 +43,7 @@ class Errors:
 
 
 def cube(cells: int, order: int) -> TetrahedralMesh:
-    """Return a cube in mm whose inner vertices are moved smoothly: on an even grid, errors could cancel."""
+    """Return a cube (mm) with inner vertices moved smoothly, since errors could cancel on an even grid."""
     x = grid([np.linspace(0.0, 1.0, cells + 1)] * 3)
     x = x if order == 1 else quadratic(x)
     bubble = np.sin(np.pi * x.vertices).prod(axis=1)[:, None]
@@ -52,7 +52,7 @@ def cube(cells: int, order: int) -> TetrahedralMesh:
 
 
 class BodyForce:
-    """A force f per volume of the updated reference as a part of the energy, −∫ f·u dV."""
+    """A force f per volume of the updated reference configuration, with the energy −∫ f·u dV."""
 
     def __init__(self, problem: NonlinearProblem, density) -> None:
         self.problem = problem
@@ -79,7 +79,7 @@ class BodyForce:
 
 
 def layers(case: str, x, sin):
-    """Return μ in Pa, dg, dr and the angle of the normal in radians at x, in sides, for any kind of sine."""
+    """Return μ (Pa), dg, dr and the angle of the normal (rad) at x (in side lengths), for NumPy's or UFL's sine."""
     if case == GRADED:
         wave = sin(2 * x[0] + x[1])
         return 900 + 600 * wave, 0.10 + 0.05 * sin(3 * x[2] + x[0]), -0.04 + 0.03 * wave, 0.8 * x[2] + 0.5 * x[0]
@@ -87,7 +87,7 @@ def layers(case: str, x, sin):
 
 
 def exact_displacement(x):
-    """Return the given displacement, in sides, at x in sides: zero on the surface, gradients up to 0.4."""
+    """Return the given displacement at x, both in side lengths: zero on the surface, gradients up to 0.4."""
     bubble = ufl.sin(ufl.pi * x[0]) * ufl.sin(ufl.pi * x[1]) * ufl.sin(ufl.pi * x[2])
     return bubble * ufl.as_vector([0.1 * ufl.cos(2 * x[1]), 0.08 - 0.1 * x[0], 0.06 + 0.08 * x[1] * x[2]])
 
@@ -98,7 +98,7 @@ def normal_at(angle):
 
 
 def first_piola_stress(u, mu, dg, dr, N, V):
-    """Return P = ∂ψ/∂F of Fe = F·V·Fg⁻¹ and ψ per volume of the state without stress, divided by det V, in Pa."""
+    """Return P = ∂ψ/∂F (Pa) of Fe = F·V·Fg⁻¹; ψ is per volume of the stress-free state, divided by det V."""
     K = 2 * mu * (1 + POISSON_RATIO) / (3 * (1 - 2 * POISSON_RATIO))
     F = ufl.Identity(3) + ufl.grad(u)
     growth = (1 + dg) * (ufl.Identity(3) - ufl.outer(N, N)) + (1 + dr) * ufl.outer(N, N)
@@ -111,13 +111,13 @@ def first_piola_stress(u, mu, dg, dr, N, V):
 
 
 def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Errors:
-    """Return the errors of the solver with elements of an order, on the cube with a case's body force."""
+    """Solve the cube with a case's body force and return the errors."""
     mesh = cube(cells, order)
     facets = boundary_faces(mesh)[0]
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     domain = Domain(comm, mesh)
-    kept = case == STRETCHED
-    problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=kept)
+    has_stretch = case == STRETCHED
+    problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=has_stretch)
 
     side = SIDE_MM * 1e-3
     nodes, to_points = domain.local(domain.positions) / side, problem.points.smooth.T
@@ -127,11 +127,11 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(angle.shape, 0.8)], axis=2)
     mu, dg, dr = (values[domain.cells] @ to_points for values in (mu, dg, dr))
     V = np.tile(STRETCH, (*points.shape[:2], 1, 1))
-    problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), normals), V if kept else None)
+    problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), normals), V if has_stretch else None)
 
     x = ufl.SpatialCoordinate(domain.mesh) / side
     exact = side * exact_displacement(x)
-    V = ufl.as_matrix((STRETCH if kept else np.eye(3)).tolist())
+    V = ufl.as_matrix((STRETCH if has_stretch else np.eye(3)).tolist())
     mu, dg, dr, angle = layers(case, x, ufl.sin)
     stress = first_piola_stress(exact, mu, dg, dr, normal_at(angle), V)
     problem.contributions.append(BodyForce(problem, -ufl.div(stress)))

@@ -1,4 +1,4 @@
-"""Two hemispheres that are each other's mirror image, folded: what the solver may not tell apart."""
+"""Fold two hemispheres that are mirror images: the result must stay symmetric."""
 
 from dataclasses import dataclass
 
@@ -19,15 +19,15 @@ SEMI_AXES_MM = np.array([7.0, 12.0, 9.0])
 MIDDLE_MM = 7.5
 """Distance of a hemisphere's centre from the midline."""
 GAP_MM = 1.9
-"""Width of the fissure for the contact planes, which the hemispheres all but touch at the start."""
+"""Width of the fissure for the contact planes, which the hemispheres almost touch at the start."""
 STEP_S = 86_400.0
 TURNED = {1: [0, 1, 3, 2], 2: [0, 1, 3, 2, 4, 8, 7, 6, 5, 9]}
-"""An element's nodes, by its order, once corners 2 and 3 have changed places."""
+"""An element's nodes, by its order, after exchanging corners 2 and 3."""
 
 
 @dataclass(frozen=True)
 class Asymmetry:
-    """How far two mirrored hemispheres are from each other after some steps.
+    """Asymmetry of two mirrored hemispheres after some steps.
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class Asymmetry:
 
 
 def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
-    """Return a right half in mm: an ellipsoid beside the midline, its vertices moved by up to `by` of a cell.
+    """Return a right half (mm): an ellipsoid right of the midline, its vertices moved by up to `by` of a cell.
 
-    Moved at random (seeded), so that hardly any point has two nearest pial vertices.
+    They are moved at random (seeded), so that hardly any point has two nearest pial vertices.
     """
     cube = grid([np.linspace(-1.0, 1.0, cells + 1)] * 3)
     shell = np.abs(cube.vertices).max(axis=1, keepdims=True)
@@ -59,7 +59,7 @@ def hemisphere(cells: int, by: float = 0.05) -> TetrahedralMesh:
 
 
 def rounded(half: TetrahedralMesh, part: float = 0.5) -> TetrahedralMesh:
-    """Return a `hemisphere` as quadratic elements, whose outer edges go a part of the way to the ellipsoid."""
+    """Return a `hemisphere` with quadratic elements whose outer edges are curved a part of the way to the ellipsoid."""
     straight = quadratic(half)
     pial = np.unique(boundary_faces(straight)[0])
     x = (straight.vertices[pial] - [MIDDLE_MM, 0.0, 0.0]) / SEMI_AXES_MM
@@ -75,9 +75,9 @@ def block(cells: int) -> TetrahedralMesh:
 
 
 def reflected_and_merged(half: TetrahedralMesh) -> TetrahedralMesh:
-    """Return a half and its mirror image at x = 0 side by side; vertex i of the first has its partner at n + i."""
+    """Return a half with its mirror image at x = 0; the partner of vertex i is vertex n + i."""
     image = half.vertices * [-1.0, 1.0, 1.0]
-    # a mirrored element is inside out until two of its corners change places, and so do nodes on its edges
+    # a mirrored element is inside out: exchange two of its corners and the nodes on their edges
     tets = half.tets[:, TURNED[half.order]] + len(half.vertices)
     return TetrahedralMesh(np.concatenate([half.vertices, image]), np.concatenate([half.tets, tets]))
 
@@ -101,15 +101,15 @@ def parameters(**changes) -> FoldingParameters:
 
 
 def asymmetry(mesh: TetrahedralMesh, state: State, zones: Zones) -> Asymmetry:
-    """Return what tells the halves of a `reflected_and_merged` mesh apart in a state."""
-    one, other = np.split(state.positions * MM_PER_M, 2)
+    """Measure the asymmetry of a `reflected_and_merged` mesh in a state."""
+    right, left = np.split(state.positions * MM_PER_M, 2)
     moved = np.linalg.norm(state.positions * MM_PER_M - mesh.vertices, axis=1).max()
-    gap = np.linalg.norm(one - other * [-1.0, 1.0, 1.0], axis=1).max()
+    gap = np.linalg.norm(right - left * [-1.0, 1.0, 1.0], axis=1).max()
     return Asymmetry(float(gap / moved), float(moved), zones.penetration_mm(state.positions * MM_PER_M))
 
 
 def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, **changes) -> tuple[State, Asymmetry]:
-    """Return the state after some steps of a half and its mirror image, and how much the two differ then."""
+    """Fold a half with its mirror image and return the state and its asymmetry after some steps."""
     mesh = reflected_and_merged(half)
     p = parameters(**changes)
     zones = zones_of_run(mesh, p)

@@ -1,13 +1,12 @@
-"""Small waves on a growing slab: the model's steps linearised around the flat state, and nothing else neglected.
+"""Small waves on a growing slab: the model's steps, linearised around the flat state without other approximations.
 
-The slab is flat and wide, clamped at its base and held at its sides. Its surface carries waves h·cos(kx), so small that
-they do not feel each other. All that changes in a step is then a function of depth times cos(kx) or sin(kx), and the
-step is a system in depth alone: the terms of first order of the model's own step, with its finite growth, weights that
-follow the surface, normals of the surface, the compressible material and remembered stress. Derivatives are complex
-steps, exact to rounding.
+The slab is flat and wide, clamped at its base and held at its sides. Its surface has waves h·cos(kx), so small that
+they do not interact. Every change in a step is then a function of depth times cos(kx) or sin(kx), and the step is a
+system in depth alone: the first-order terms of the model's own step, with its finite growth, weights that follow the
+surface, surface normals, compressible material and remembered stress. Derivatives are complex steps, exact to rounding.
 
-Tensors hold amplitudes as imaginary parts: those of cos(kx) on the diagonal, of sin(kx) at xz and zx. Lengths are in
-cortical thicknesses H, shear moduli in that of the core, and time is the growth of the cortex since the start.
+Tensors contain amplitudes as imaginary parts: of cos(kx) on the diagonal, of sin(kx) at xz and zx. Lengths are in
+cortical thicknesses H, shear moduli relative to the core, and time is the growth of the cortex since the start.
 """
 
 from dataclasses import dataclass, replace
@@ -20,25 +19,25 @@ from scipy.linalg import LinAlgError, cholesky_banded, solve_banded
 Floats = NDArray[np.float64]
 
 TINY = 1e-30
-"""The complex step: its error is of the square."""
+"""The complex step; the error is of second order."""
 ENTRIES = ((0, 0), (0, 2), (2, 0), (2, 2))
-"""Entries xx, xz, zx, zz: those of a gradient in the plane of a wave."""
+"""Entries xx, xz, zx, zz of a gradient in the plane of a wave."""
 
 
 @dataclass(frozen=True)
 class Slab:
-    """A slab and how it is resolved.
+    """A slab and its resolution.
 
     Attributes
     ----------
     contrast
         Shear modulus of the cortex over that of the core.
     memory
-        Growth in which stress relaxes; 0 forgets it each step, infinity keeps it.
+        Growth during which stress relaxes; 0 releases it at each step, infinity keeps it.
     steepness
-        Of the cortical weight, 10 in the model; infinite for a sharp border.
+        Steepness of the cortical weight, 10 in the model; infinite for a sharp border.
     thickness
-        1, or infinity where all of the slab is cortex.
+        1, or infinity if the whole slab is cortex.
     finest
         Height of the elements near the surface.
     """
@@ -59,12 +58,12 @@ class Waves:
     Attributes
     ----------
     z : (n + 1,) float
-        Heights of the flat slab's nodes, the base first, the surface last.
+        Heights of the flat slab's nodes, from the base to the surface.
     stretch : (n, 3) float
         Elastic stretch V of the flat slab's elements: xx, yy, zz.
     wavenumber : (k,) float
     moved : (k, n + 1, 2) float
-        Amplitudes of the nodes' places: along x of sin(kx), along z of cos(kx).
+        Amplitudes of the nodes' positions: of sin(kx) along x, of cos(kx) along z.
     stretched : (k, n, 3, 3) float
         Amplitudes of V.
     """
@@ -82,7 +81,7 @@ class Waves:
 
 
 class Fields(NamedTuple):
-    """What a step starts with in each element of each wave, (k, n, …): flat values plus imaginary amplitudes.
+    """State at the start of a step in each element of each wave, (k, n, …): flat values plus imaginary amplitudes.
 
     `place` is the gradient of the present shape x(X) over the flat slab X.
     """
@@ -100,10 +99,10 @@ def at_start(slab: Slab, wavenumber: Floats) -> Waves:
     while sum(heights) < slab.depth:
         heights.append(heights[-1] * (1 + 1.5 * slab.finest if sum(heights) > 2 else 1.0))
     z = -np.concatenate([[0.0], np.cumsum(heights)])[::-1]
-    # only below the cortex, whose border is to lie between two elements
+    # only below the cortex, so that its border stays between two elements
     z = np.where(z < -2, -2 + (z + 2) * (slab.depth - 2) / (-z[0] - 2), z)
     moved = np.zeros((len(wavenumber), len(z), 2))
-    # without stress, any way in which the inside follows the surface will do
+    # without stress, it does not matter how the inside follows the surface
     moved[:, :, 1] = (1 - z / z[0]) ** 2
     count = len(z) - 1
     return Waves(z, np.ones((count, 3)), np.asarray(wavenumber), moved, np.zeros((len(wavenumber), count, 3, 3)))
@@ -120,9 +119,9 @@ def weight(slab: Slab, depth: NDArray) -> NDArray:
 
 
 def fields_of(slab: Slab, waves: Waves, growth: float) -> Fields:
-    """Return the fields of a step in which the cortex grows by `growth`."""
+    """Return the fields of a step with this growth of the cortex."""
     middle, _ = values_in_elements(waves.moved, waves.z)
-    # depth below the waved surface of an element that has been moved itself
+    # depth of a moved element below the wavy surface
     depth = waves.z[-1] - (waves.z[1:] + waves.z[:-1]) / 2 + 0j
     w = weight(slab, depth + 1j * TINY * (waves.height[:, None] - middle[:, :, 1]))
     normal = np.zeros((*w.shape, 3), dtype=complex)
@@ -150,9 +149,9 @@ def gradient(waves: Waves, nodal: Floats) -> Floats:
 
 
 def elastic_parts(after: NDArray, fields: Fields) -> tuple[NDArray, NDArray]:
-    """Return B = G⁻¹·V·Fg⁻¹ and Fe = A·B, with A and G the gradients of the shapes after and before a step."""
-    across = fields.normal[..., :, None] * fields.normal[..., None, :]
-    growth_inverse = (np.eye(3) - across) / (1 + fields.growth) + across
+    """Return B = G⁻¹·V·Fg⁻¹ and Fe = A·B; A and G are the gradients of the shapes after and before a step."""
+    along_normal = fields.normal[..., :, None] * fields.normal[..., None, :]
+    growth_inverse = (np.eye(3) - along_normal) / (1 + fields.growth) + along_normal
     before = np.linalg.inv(fields.place) @ fields.stretch @ growth_inverse
     return before, after @ before
 
@@ -205,7 +204,7 @@ def banded_system(waves: Waves, index: int, tangents: Floats, forces: Floats) ->
 
 
 def step(slab: Slab, waves: Waves, growth: float) -> Waves:
-    """Return the waves after a step in which the cortex grows by `growth`."""
+    """Return the waves after a step with this growth of the cortex."""
     fields = fields_of(slab, waves, growth)
     A, tangents = flat_step(slab, fields)
     rows, columns = np.transpose(ENTRIES)
@@ -248,17 +247,17 @@ def amplifications(slab: Slab, wavenumber: Floats, growth: float, steps: int) ->
 
 
 def growth_rates(slab: Slab, wavenumber: Floats, growth: float = 1e-6) -> Floats:
-    """Return the (k,) rates ln(h'/h)/growth of the first step: where stress is forgotten, those of all steps."""
+    """Return the (k,) rates ln(h'/h)/growth of the first step; without stress memory, they are those of all steps."""
     return np.log(amplifications(slab, wavenumber, growth, 1)[1]) / growth
 
 
-def critical_growth(slab: Slab, wavenumber: Floats, growth: float, most: float) -> Floats:
-    """Return the growth at which the flat slab no longer resists each of the waves; NaN where that is beyond `most`.
+def critical_growth(slab: Slab, wavenumber: Floats, growth: float, max_growth: float) -> Floats:
+    """Return the growth at which the flat slab becomes unstable to each wave; NaN if it is beyond `max_growth`.
 
-    Where stress is kept: the tangent of a step without growth is no longer positive definite.
+    With stress kept, the tangent of a step without growth is then no longer positive definite.
     """
     waves, found, grown = at_start(slab, wavenumber), np.full(len(wavenumber), np.nan), 0.0
-    while np.isnan(found).any() and grown <= most:
+    while np.isnan(found).any() and grown <= max_growth:
         _, tangents = flat_step(slab, fields_of(slab, waves, 0.0))
         for index in np.flatnonzero(np.isnan(found)):
             bands, _ = banded_system(waves, index, tangents, np.zeros((len(tangents), 4)))

@@ -1,8 +1,8 @@
-"""A growing slab with small waves on its surface, folded by the solver: `modes` says how they must grow.
+"""Fold a growing slab with small waves on its surface; `modes` predicts how they grow.
 
-One mesh carries waves of many lengths at once, cos(nπx/width), which fit between its sliding sides. They are so small
-that each grows as it would alone; a cosine transform of the surface tells them apart. A slab without waves shows what
-the mesh itself adds, which is taken off. All lengths are in mm, and the cortex is 1 mm thick.
+One mesh has waves of many lengths, cos(nπx/width), which fit between its sliding sides. They are so small that they do
+not interact; a cosine transform of the surface separates them. The waves of a flat slab, due to the mesh itself, are
+subtracted. All lengths are in mm, and the cortex is 1 mm thick.
 """
 
 import time
@@ -32,19 +32,19 @@ REFERENCE_GROWTH = 0.0086
 RATE_PER_S = 1e-7
 FINE_DEPTH_MM = 2.0
 COARSENING = 1.8
-"""Ratio of neighbouring elements' heights below, to the power of one over the cells to a cortical thickness."""
-LARGEST = 8
+"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
+MAX_COARSENING = 8
 """Height of the deepest elements over that of the finest."""
 ROWS = 2
-"""Corners across the slab; all lie on sides that keep them from moving across it."""
+"""Corners across the slab; all are on sides where they cannot move across it."""
 
 
 @dataclass(frozen=True)
 class Waved:
-    """A slab with waves, and steps in which its cortex grows by `growth` each.
+    """A slab with waves, whose cortex grows by `growth` in each step.
 
-    `memory` is the growth in which stress relaxes; width and depth hold two waves of the length that grows fastest.
-    `order` is that of the elements.
+    `memory` is the growth during which stress relaxes, `order` the element order. Width and depth are two wavelengths
+    of the fastest wave.
     """
 
     contrast: float
@@ -96,11 +96,11 @@ class Waved:
 
 
 def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
-    """Return a slab with `cells` cells to a cortical thickness, coarser below, and waves of a height on top."""
+    """Return a slab with `cells` cells per cortical thickness, coarser below, and waves of a height on top."""
     down, size = [0.0], 1 / cells
     while down[-1] < case.width_mm:
         if down[-1] >= FINE_DEPTH_MM - 1e-9:
-            size = min(size * COARSENING ** (1 / cells), LARGEST / cells)
+            size = min(size * COARSENING ** (1 / cells), MAX_COARSENING / cells)
         down.append(down[-1] + size)
     down = np.array(down)
     down = np.where(
@@ -118,11 +118,11 @@ def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
 
 
 def fastest_wave(case: Waved, cells: int, timed_steps: int = 4) -> dict[str, float]:
-    """Return what a mesh makes of the wave that grows fastest, and at what price, on one rank.
+    """Return error and cost of a mesh for the fastest wave, on one rank.
 
-    `rate_error` is that of its rate of growth in the first step, relative to the theory; `unknowns_per_mm` and
-    `seconds_per_mm`, the processor time of a step with usual tolerances, are for each mm across the slab. The first
-    steps, which compile and set up, are not counted.
+    `rate_error` is the error of the growth rate in the first step, relative to the theory. `unknowns_per_mm` and
+    `seconds_per_mm` are per mm across the slab; the latter is the processor time of a step with usual tolerances. The
+    first steps, which compile and set up, are not counted.
     """
     comm = MPI.COMM_SELF
     mesh, p = mesh_of(case, cells, HEIGHT_MM), case.parameters()
@@ -133,25 +133,25 @@ def fastest_wave(case: Waved, cells: int, timed_steps: int = 4) -> dict[str, flo
         began = time.process_time()
         state = folding.step(state, p.step_s)
         seconds.append(time.process_time() - began)
-    across = (ROWS - 1) / cells
+    width_mm = (ROWS - 1) / cells
     return {
         "order": case.order,
         "cells": cells,
         "poisson_ratio": case.poisson_ratio,
         "rate_error": rate_error(case, cells, comm),
-        "unknowns_per_mm": 3 * len(mesh.vertices) / across,
-        "seconds_per_mm": float(np.median(seconds[2:])) / across,
+        "unknowns_per_mm": 3 * len(mesh.vertices) / width_mm,
+        "seconds_per_mm": float(np.median(seconds[2:])) / width_mm,
     }
 
 
 def rate_error(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> float:
-    """Return the relative error of the rate of the wave that grows fastest, in the first step."""
+    """Return the relative error of the fastest wave's rate in the first step."""
     exact = np.log(case.expected()[1])
     return float((np.log(amplified(case, cells, comm)[1]) / exact - 1)[exact.argmax()])
 
 
 def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats:
-    """Return the (steps + 1, waves) heights in mm of the waves at the start and after each step."""
+    """Return the (steps + 1, waves) heights (mm) of the waves at the start and after each step."""
     mesh = mesh_of(case, cells, height_mm)
     p = case.parameters()
     folding = Folding(comm, mesh, zones_of_run(mesh, p), p)
@@ -163,12 +163,12 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
     # evenly spaced along x, several across
     spacings = case.order * round(case.width_mm * cells)
     column = np.rint(flat[top, 0] * spacings / case.width_mm).astype(int)
-    across = np.bincount(column)
-    surface = np.array([np.bincount(column, state.positions[top, 2]) / across for state in states])
+    counts = np.bincount(column)
+    surface = np.array([np.bincount(column, state.positions[top, 2]) / counts for state in states])
     return (dct(surface, type=1, axis=1) / spacings)[:, WAVES] * MM_PER_M
 
 
 def amplified(case: Waved, cells: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Floats:
-    """Return the (steps + 1, waves) heights over those at the start, less what a flat slab shows."""
+    """Return the (steps + 1, waves) heights over those at the start, less those of a flat slab."""
     flat, waved = (heights(case, cells, height, comm) for height in (0.0, HEIGHT_MM))
     return (waved - flat) / waved[0]

@@ -1,4 +1,4 @@
-"""What `verification.py` prints and draws of waves: which grows fastest, and its growth mesh by mesh."""
+"""Summaries and figure of waves for `verification.py`: the fastest wave, and its growth on each mesh."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ MARKERS = "os^D"
 
 
 def fastest(lengths: ArrayLike, values: ArrayLike) -> tuple[float, float]:
-    """Return the length of the largest value and that value, by cubic splines between waves of a slab."""
+    """Return the length of the fastest wave and its value, by cubic splines between the waves of a slab."""
     waves = 1 / np.asarray(lengths)
     spline = CubicSpline(waves, values)
     fine = np.linspace(waves.min(), waves.max(), 20_001)
@@ -27,17 +27,17 @@ def fastest(lengths: ArrayLike, values: ArrayLike) -> tuple[float, float]:
 
 
 def orders(errors: ArrayLike) -> Floats:
-    """Return the observed orders from each mesh to the next of twice as many cells."""
+    """Return the observed orders of convergence from each mesh to the next, with twice as many cells."""
     values = np.abs(np.asarray(errors))
     return np.log2(values[:-1] / values[1:])
 
 
 def rates_of(contrast: float, found: dict) -> dict:
-    """Sum up the wave that grows fastest where stress is forgotten: closed form, theory, and mesh by mesh."""
+    """Summarise the fastest wave without stress memory: closed form, theory, and each mesh."""
     film = thin_film(Slab(contrast))
     expected = np.array(found["expected"])
     length, rate = fastest(found["lengths"], expected)
-    peaks = [fastest(found["lengths"], measured) for measured in found["measured"]]
+    peaks = [fastest(found["lengths"], values) for values in found["measured"]]
     errors = np.array(found["measured"]) / expected - 1
     return {
         "thin_film_wavelength": film.wavelength,
@@ -52,21 +52,21 @@ def rates_of(contrast: float, found: dict) -> dict:
 
 
 def memory_of(found: dict) -> dict:
-    """Sum up the largest amplification, that expected and that on each mesh, and errors of its logarithm."""
-    expected, measured = np.array(found["expected"])[-1], np.array(found["measured"])[:, -1]
+    """Summarise the largest amplification: expected, on each mesh, and the errors of its logarithm."""
+    expected, simulated = np.array(found["expected"])[-1], np.array(found["measured"])[:, -1]
     wave = int(expected.argmax())
-    errors = np.log(measured[:, wave]) / np.log(expected[wave]) - 1
+    errors = np.log(simulated[:, wave]) / np.log(expected[wave]) - 1
     return {
         "wavelength": found["lengths"][wave],
         "expected": expected[wave],
-        "measured": measured[:, wave],
+        "measured": simulated[:, wave],
         "relative_errors_of_logarithm": errors,
         "orders": orders(errors),
     }
 
 
 def plain(value, digits: int = 4):
-    """Return a value for JSON: arrays as lists, all numbers at so many significant digits."""
+    """Return a value for JSON: arrays as lists, numbers rounded to significant digits."""
     if isinstance(value, dict):
         return {key: plain(item, digits) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -76,7 +76,7 @@ def plain(value, digits: int = 4):
 
 
 def draw(found: dict, slab_cells: tuple[int, ...], folder: Path) -> None:
-    """Draw the rates of growth by wavelength where stress is forgotten into a folder, a panel for each contrast."""
+    """Draw growth rates by wavelength without stress memory into a folder, one panel per contrast."""
     with mpl.rc_context(MATPLOTLIB_SETTINGS):
         figure = new_figure(FULL_WIDTH_IN, 2.6)
         panels = figure.subplots(1, len(found))
