@@ -5,14 +5,14 @@ from pathlib import Path
 from snakemake.utils import min_version
 
 min_version("9.0")
-# beside this file in a checkout; an installed package holds this file
+# next to this file in a checkout; in an installed package this file is inside the package
 CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
 SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
 from gyriflow.running.reruns import rerun_on_changes
 
-# a configuration given on the command line replaces the demo instead of being mixed with it
+# a configuration from the command line replaces that of the demo; they are not merged
 if not workflow.overwrite_configfiles:
     own = Path("config/config.yaml")
     demo = own.resolve() if own.is_file() else Path(workflow.basedir, own)

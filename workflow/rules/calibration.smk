@@ -1,7 +1,7 @@
 # Calibration: rounds of runs, each round's parameters chosen from the scores of the earlier ones.
 #
-# How many runs there are is known beforehand, their parameters are not: those of a round stand in a table that its runs
-# read. What is there is not made again, so that an interrupted calibration goes on.
+# The number of runs is fixed; their parameters are not: those of a round are in a table, which its runs read. Finished
+# runs are not repeated, so an interrupted calibration continues.
 CALIBRATED = study.calibration
 
 
@@ -76,7 +76,7 @@ rule calibration_score:
     conda:
         ENVIRONMENT
     params:
-        # how many of the real brains belong to each of the simulated ones
+        # number of observed brains of each simulated one
         compared=lambda w: list(map(len, CALIBRATED.real.values())),
         week=lambda w: CONFIG.calibrate.compare_week,
         weights=lambda w: CONFIG.calibrate.score,

@@ -1,4 +1,4 @@
-# What all rules share: the validated configuration, names, and where results lie.
+# Shared by all rules: the validated configuration, names and paths of results.
 import os
 
 from gyriflow.errors import GyriflowError
@@ -11,7 +11,7 @@ from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VA
 from gyriflow.running.provenance import input_contents, check_results_belong_to
 from gyriflow.step import record_exit_code
 
-# scripts and programs find the package without its being installed, in conda environments of single rules too
+# scripts and programs find the package without an installation, also in conda environments of single rules
 shell.prefix(
     f'set -euo pipefail; export PYTHONPATH="{SOURCE}${{{{PYTHONPATH:+:$PYTHONPATH}}}}"; '
     if CHECKED_OUT
@@ -19,14 +19,14 @@ shell.prefix(
 )
 
 
-# whether this is the process that runs the study; others run a job of it, or only look
+# whether this process runs the study; other processes run one job, or are dry runs
 RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
 
 
 def validated_study():
-    """Return the study without refused brains, and what the input files hold.
+    """Return the study without refused brains, and the contents of the input files.
 
-    Ends with a message and exit code 2 where the configuration is not valid.
+    Ends with a message and exit code 2 if the configuration is not valid.
     """
     from gyriflow.study.loading import load
     from gyriflow.io.yaml_files import read_keys
@@ -34,7 +34,7 @@ def validated_study():
     try:
         base = Path.cwd()
         for path in workflow.configfiles:
-            # Snakemake's own reading keeps the last of two equal keys
+            # Snakemake itself keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
                 base = file.resolve().parent
@@ -52,17 +52,17 @@ def validated_study():
 
 study, CONTENTS = validated_study()
 CONFIG = study.config
-# brains that an earlier pass of this call has refused, and why; without them it finishes the study
+# brains refused in an earlier pass of this call, with the cause; the study is finished without them
 KNOWN = {brain.id for brain in CONFIG.brains}
 REFUSED = {brain: cause for brain, cause in refused_brains().items() if brain in KNOWN}
 if REFUSED and workflow.is_main_process:
-    # each has told its cause
+    # the causes have been printed
     rest = "finishing the study without" if study.brains else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not study.brains:
     sys.exit(0)
-# Brains of one hemisphere have fewer files, and rules of their own with the same script: the files of the whole have no
-# wildcard for the side, and Snakemake asks all files of a rule to have the same wildcards.
+# Brains of one hemisphere have fewer files, so they have separate rules with the same script: in Snakemake all output
+# files of a rule must have the same wildcards, and files of whole brains have no wildcard for the side.
 PARTS_OF_BRAINS = {"": SIDES, "_left": ("left",), "_right": ("right",)}
 FIGURES = figures_of(study)
 if workflow.is_main_process:
@@ -71,27 +71,27 @@ if workflow.is_main_process:
     for row in CONFIG.left_out.values():
         print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
 
-# held as long as this process lives: how `gyriflow.running.launch` tells a live run from one that was interrupted
+# held as long as this process lives, so that `gyriflow.running.launch` can distinguish a live from an interrupted run
 if RUNS:
     LOCK = hold_lock(Path.cwd())
 
 
-# the environment of each rule, for Snakemake's own deployment with conda
+# the environment of each rule, for Snakemake's software deployment with conda
 ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"
 
 
 def brain_of(wildcards):
-    """Return the brain that the wildcards name."""
+    """Return the brain of the wildcards."""
     return study.brains[wildcards.brain]
 
 
 def simulation_of(wildcards):
-    """Return the run from a brain that the wildcards name."""
+    """Return the simulation of the wildcards."""
     return study.simulations[wildcards.run, wildcards.brain]
 
 
 def brains_with(condition):
-    """Return a pattern for the ids of the brains that meet a condition."""
+    """Return a regular expression that matches the ids of the brains that meet a condition."""
     return one_of(brain.id for brain in study.brains.values() if condition(brain))
 
 

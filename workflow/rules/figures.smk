@@ -1,9 +1,9 @@
-# Figures and tables of the registry, `gyriflow.study.figures`: each kind has a rule; kinds with the same `job` share one.
+# Figures and tables of the registry, `gyriflow.study.figures`: a rule per kind; kinds with the same `job` share it.
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 
 def inputs_of(figure):
-    """Return the inputs of a figure; which members of studies have come to their week is known once they are solved."""
+    """Return the inputs of a figure, without runs of sweeps that diverged before their week."""
     ended = (run for run, brain, week in figure.may_end if not reaches(run, brain, week))
     return figure.inputs_without(ended)
 
@@ -55,7 +55,7 @@ rule influence_figures:
         asked_for(FIGURES, "influence_figures"),
 
 
-# the figures and tables of the paper; brains are measured at the weeks of comparison only
+# figures and tables of the paper; brains are measured only at the weeks of comparison
 rule paper:
     input:
         asked_for(FIGURES, "paper"),

@@ -1,18 +1,18 @@
-# The folding simulation of each run from each brain that it folds, and its surfaces at the output weeks.
+# Simulations: each run from each of its start brains.
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
 from gyriflow.settings.varying import files_of
 
 
 def map_sources(wildcards):
-    """Return the user's files of each parameter that has a map, under "map" and "surface"."""
+    """Return, for each parameter with a map, the user's files as "map" and "surface"."""
     mapped = simulation_of(wildcards).mapped
     return {
         name: {"map": files_of(value.map), "surface": files_of(value.surface)} for name, value in mapped.items()
     }
 
 
-# Runs of a calibration have their parameters from its rounds, and their maps from its base.
+# Runs of a calibration have the parameters of its rounds and the maps of its base run.
 for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
 
     rule:
@@ -25,7 +25,7 @@ for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
             surface=PIAL["report"],
             curves=lambda w: simulation_of(w).curves,
             targets=lambda w: simulation_of(w).targets,
-            # the hemispheres of the folded brain are those of the measured one
+            # the simulated brain has the hemispheres of its start brain
             sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
         output:
             **maps,
@@ -48,7 +48,7 @@ for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
             settings=lambda w: simulation_of(w).parameters,
             weeks=lambda w: simulation_of(w).weeks,
             series=lambda w: simulation_of(w).followed_series,
-            # volumes of maps are read like those of the brain
+            # volumes of maps are read like label volumes
             affine_from=lambda w: brain_of(w).given.affine_from,
             maps=map_sources,
         script:
@@ -60,14 +60,14 @@ SOLVED_FROM = {
     "data": MESH["data"],
     "params": PARAMETERS,
     "maps": lambda w: simulation_of(w).maps,
-    # impossible zones are refused with them, before the ranks start
+    # made before the ranks start, so that impossible zones are refused early
     "regions": REGIONS["mesh"],
 }
 SOLVE = (
-    # one BLAS thread per rank: Snakemake gives every process as many as the rule has threads
+    # one BLAS thread per rank; Snakemake would give each rank all threads of the rule
     "export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1; "
     'log={log:q}; progress=${{log%.log}}.jsonl; rm -f "$progress"; '
-    # on this machine no more ranks than cores; a cluster's profile sets no launcher for a single rank
+    # no more ranks than cores on this machine; a cluster's profile sets no launcher for a single rank
     "launch='{resources.mpi}'; ranks={resources.tasks}; "
     '[ "$launch" != mpiexec ] || ranks={threads}; '
     "${{launch:+$launch -n $ranks}}"
@@ -78,7 +78,7 @@ SOLVE = (
 FOLDING_CODE = code_hash(Path(SOURCE, "gyriflow", "folding", "__main__.py"))
 
 
-# what both rules of a folding ask of a cluster: ranks, memory in MiB and minutes
+# resources of both rules on a cluster: ranks, memory (MiB) and minutes
 LIMITED = {
     "mpi": "mpiexec",
     "tasks": lambda w: simulation_of(w).settings.ranks,
@@ -88,7 +88,7 @@ LIMITED = {
 
 
 def solve_options(*more):
-    """Return the options of the folding program: the maps of a run where it has some, and `more`."""
+    """Return an input function: options of the folding program, with the maps of a run if it has any, and `more`."""
     return lambda wildcards, input: [
         *(["--maps", input.maps] if input.maps else []),
         *more,
@@ -106,7 +106,7 @@ rule simulate:
         f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(CONFIG.runs),
-    # the runs that all else is compared with, and the longest: members of studies fill the cores beside them
+    # these are the longest and start first; runs of sweeps use the remaining cores
     priority: 1
     conda:
         ENVIRONMENT
@@ -121,8 +121,8 @@ rule simulate:
         SOLVE
 
 
-# A run of a study or a calibration may diverge: it then ends well with the weeks that it has reached, and only what
-# needs those is made of it. What is needed is known once the summary is there.
+# A run of a sweep or a calibration may diverge. The job then succeeds with the weeks that were reached, and only
+# results of these weeks are made. They are known once the summary exists.
 checkpoint simulate_member:
     input:
         **SOLVED_FROM,
@@ -148,7 +148,7 @@ checkpoint simulate_member:
 
 
 def reaches(run, brain, week):
-    """Return whether a run from a brain has come to a week; runs of a study are solved before that is known."""
+    """Return whether a simulation has reached a week; runs of sweeps are solved first."""
     if run in CONFIG.runs:
         return True
     summary = checkpoints.simulate_member.get(run=run, brain=brain).output.summary

@@ -1,4 +1,4 @@
-# The brains that runs start from as tetrahedral meshes.
+# Tetrahedral meshes of start brains.
 MESH_GATES = {key: value for key, value in CONFIG.mesh.model_dump().items() if key.startswith(("min_", "max_"))}
 
 

@@ -1,4 +1,4 @@
-# Metrics of brains, measured and simulated, by one script: both go through the same code with the same settings.
+# Metrics of observed and simulated brains, by the same script with the same settings.
 MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"})
 
 
@@ -33,7 +33,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         script:
             "../scripts/measure.py"
 
-    # with its surfaces, the facets that were those of the hemispheres at the start
+    # also writes the surfaces: the facets of the start brain's hemispheres
     rule:
         name:
             f"measure_simulated{suffix}"
@@ -78,7 +78,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         params:
             columns=lambda w: brain_of(w).measured.labels,
             labels=lambda w: brain_of(w).labels,
-            # exchanged files are the same inputs to Snakemake
+            # also parameters, since swapped input files do not trigger a rerun
             white=lambda w: brain_of(w).given.white_files,
             surface=surface_settings("edge_length_mm", "max_hole_mm"),
             curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,

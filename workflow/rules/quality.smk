@@ -1,6 +1,6 @@
-# What is drawn of each measured brain, before any solve: quality control with a verdict, its maps, and small pictures.
+# Figures of each measured brain, made before simulations: quality control with a verdict, maps and small pictures.
 def quality_columns(name):
-    """Return what the table of quality says of a brain before it is looked at, also of a refused one."""
+    """Return the columns of the quality table that come from the configuration, also of a refused brain."""
     given = CONFIG.brain(name)
     known = {key: getattr(given, key) for key in ("week", "population", "source")}
     return (
@@ -11,7 +11,7 @@ def quality_columns(name):
 
 
 def surface_log(wildcards):
-    """Return the log of the step that has made a brain's surface and thickness."""
+    """Return the log of the job that made a brain's surface and thickness."""
     brain = brain_of(wildcards)
     (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
     return f"{BRAIN}/logs/{rule}{'_with_thickness' if brain.has_thickness else ''}.log".format(brain=brain.id)

@@ -1,5 +1,5 @@
-# Regions of the cortex: given on some brains, carried to others by registration, and to simulated ones with the tissue;
-# where none are given, named sulci. Maps of all brains at the vertices of one, the template.
+# Regions of the cortex: given on some brains, carried to others by registration, to simulated brains with the tissue.
+# If no regions are given, named sulci are carried. Maps of all brains are also written at the vertices of the template.
 from gyriflow.settings.atlas import SULCI
 
 
@@ -27,12 +27,12 @@ rule given_regions:
 
 
 def region_pair(wildcards):
-    """Return the brain whose regions are carried, and the one that gets them."""
+    """Return the brain on which regions are given, and the brain to which they are carried."""
     return study.giver_of_regions(wildcards.brain), brain_of(wildcards)
 
 
 def regions_to_carry(wildcards):
-    """Return the regions of the brain that gives them, and the surfaces that they are on."""
+    """Return the given regions and the surfaces of their brain."""
     giver, _ = region_pair(wildcards)
     return {**giver.regions, **{f"given_{side}": giver.measured.parts[side] for side in SIDES}}
 
@@ -107,7 +107,7 @@ rule simulated_regions:
 
 
 def place_of(wildcards):
-    """Return the brain that is measured in the folder that the wildcards name."""
+    """Return the brain that is measured in the folder of the wildcards."""
     return study.places[wildcards.where]
 
 
@@ -134,12 +134,12 @@ rule region_metrics:
 
 
 def on_template(wildcards):
-    """Return the template, and the brain whose maps are to be had at its vertices."""
+    """Return the template, and the brain whose maps are moved to its vertices."""
     return study.brains[CONFIG.metrics.template], study.brains[place_of(wildcards).subject]
 
 
 def mapped_surface(wildcards):
-    """Return a hemisphere of a brain with maps; of a simulated one that of its start, whose vertices it keeps."""
+    """Return the hemisphere with a brain's maps; for a simulated brain that of its start, with the same vertices."""
     row, brain = place_of(wildcards), study.brains[place_of(wildcards).subject]
     if row.run in CONFIG.runs:
         row = study.simulations[row.run, brain.id].at(brain.week)
@@ -147,7 +147,7 @@ def mapped_surface(wildcards):
 
 
 def template_correspondence(wildcards):
-    """Return where the template's points are in a brain, nothing for the template itself."""
+    """Return the correspondence of the template with a brain; none for the template itself."""
     template, brain = on_template(wildcards)
     return [] if brain is template else [study.series.correspondence(template, brain)]
 

@@ -1,4 +1,4 @@
-# Correspondence between brains of successive weeks: where each point of a start brain goes in the real ones.
+# Correspondences between brains of successive weeks, and the targets of start brains.
 if workflow.is_main_process:
     for series, cause in study.unmatched_starts.items():
         print(
@@ -25,7 +25,7 @@ rule surface_mask:
 
 
 def pair_of(wildcards):
-    """Return the two brains that the wildcards name."""
+    """Return the two brains of the wildcards."""
     return study.brains[wildcards.earlier], study.brains[wildcards.later]
 
 
@@ -49,7 +49,7 @@ rule register:
         "../scripts/register.py"
 
 
-# the surfaces as they are given, with all their vertices, in the pose of the mesh
+# the original surfaces with all their vertices, in the pose of the mesh
 rule match_surfaces:
     input:
         lambda w: [path for brain in pair_of(w) for path in brain.given.files],
@@ -69,11 +69,11 @@ rule match_surfaces:
 
 
 def chain_of(wildcards):
-    """Return the brains behind the growth of the start that the wildcards name."""
+    """Return the brains on which the growth of a start brain was measured."""
     return study.chains[wildcards.brain, wildcards.origin]
 
 
-# the shapes that the mesh of a start brain is to have in later weeks, for runs that grow towards them
+# shapes of a start brain's mesh in later weeks, for runs that grow towards them
 rule targets:
     input:
         mesh=MESH["mesh"],

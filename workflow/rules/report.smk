@@ -1,5 +1,5 @@
-# What the jobs took and warned of, and the report: an HTML page of the study and one of each brain, with the figures and
-# tables of the registry.
+# Resources and warnings of all jobs, and the report: an HTML page of the study and one of each brain, with the figures
+# and tables of the registry.
 from itertools import takewhile
 
 from gyriflow.running.reruns import benchmark_patterns
@@ -8,10 +8,10 @@ from gyriflow.settings.terms import run_names
 PAGE = f"{workflow.basedir}/workflow/report/page"
 
 
-# the report's own too: they are there where its page cannot be made
+# also of the report's own tables, so that they exist if the page cannot be made
 rule study_records:
     input:
-        # logs and the files of benchmarks are no inputs: a lost one would have its stage run again
+        # logs and benchmark files are not inputs, since a missing one would repeat its job
         rules.figures.input,
         asked_for(FIGURES, "brain", "small"),
         rules.metrics.input,
@@ -28,7 +28,7 @@ rule study_records:
         runs=study.files(f"{RUN}/provenance.json"),
         report=f"{REPORT}/provenance.json",
         methods=f"{REPORT}/methods.rst",
-        # the configuration with its paths, for those who have the files
+        # the configuration with the paths of its files
         config=f"{REPORT}/config.yaml",
     log:
         f"{STUDY}/logs/study_records.log",
@@ -38,7 +38,7 @@ rule study_records:
         ENVIRONMENT
     params:
         config=study.used_settings,
-        # refused ones too
+        # also refused brains
         known_brains=[brain.id for brain in CONFIG.brains],
         brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         files=[
@@ -52,12 +52,12 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        # by rule, what the paths of its benchmark files look like; files of earlier configurations do not match
+        # pattern of the benchmark files of each rule; files of earlier configurations do not match
         benchmarks=lambda w: benchmark_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
         growth_of=[study.growth_of(one) for one in study.folded],
-        # of which the text of the methods speaks
+        # used by the methods text
         method={
             "brains": [brain for brain in study.described_brains if brain["id"] in study.brains],
             "surface": CONFIG.surface.model_dump(mode="json", include={"edge_length_mm", "open_sulci"}),
@@ -69,7 +69,7 @@ rule study_records:
 
 
 def figures_on_page(brain=None):
-    """Return what the page of a brain, or that of the study, says of its figures."""
+    """Return the figures of the page of a brain or of the study, with their captions."""
     shown = [figure for figure in FIGURES if figure.kind.section]
     alone = [figure for figure in shown if figure.kind.target in ("quality", "brain")]
     if brain is None:

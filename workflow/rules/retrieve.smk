@@ -1,5 +1,5 @@
-# Files of atlases that are not there yet. A file that exists is an input like any other: no rule makes it, so that no
-# copy of a user's own is ever deleted or replaced.
+# Downloads missing files of atlases. No rule makes a file that exists, so a user's own copy is never deleted or
+# replaced.
 from gyriflow.study.atlases import retrieval_note, used_atlases
 
 ATLAS_FILES = {
@@ -14,7 +14,7 @@ if workflow.is_main_process:
 
 rule atlas_file:
     output:
-        # a file that appeared meanwhile is not deleted before the job, but checked by it
+        # a file that has appeared meanwhile is checked by the job instead of deleted before it
         update("/{file}"),
     log:
         f"{STUDY}/logs/atlas_file/{{file}}.log",

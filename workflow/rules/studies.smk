@@ -1,10 +1,10 @@
-# Studies: runs that differ from one in a few parameters, measured at one week and compared with real brains of it.
+# Sweeps (key `studies`): runs that differ from a base run in a few parameters, compared with observed brains at a week.
 #
-# results/study/STUDY/ holds members (a row a run: values, resolution, outcome with its cause, time), comparison (how far
-# each is from each real brain by each measure), and nearest (which is nearest by each measure). A run that has diverged
-# before the week of comparison is in `members` alone.
+# results/study/STUDY/ has members (per run: values, resolution, outcome with its cause, time), comparison (distance of
+# each run from each observed brain by each measure) and nearest (the nearest run by each measure). A run that diverged
+# before the week of comparison is only in `members`.
 def files_of_member(wildcards):
-    """Return the files of a run at the week of comparison and of the real brains, none where it has not come there."""
+    """Return the files of a run at the week of comparison and of the observed brains; none if it has not reached it."""
     compared = study.comparisons[wildcards.study]
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
@@ -19,14 +19,14 @@ def files_of_member(wildcards):
 
 
 def from_members(pattern):
-    """Return an input function: a file of each member of a study."""
+    """Return an input function: a file of each run of a sweep."""
     return lambda w: [one.file(pattern, study=w.study) for one, _ in study.comparisons[w.study].members]
 
 
 rule compare_member:
     input:
         unpack(files_of_member),
-        # solved in any case
+        # solved even if it diverges
         summary=FOLDING["summary"],
     output:
         COMPARED_MEMBER,
@@ -70,7 +70,7 @@ rule study_tables:
         "../scripts/study_tables.py"
 
 
-# each result of the paper beside the same here, with a verdict
+# each result of the paper, the result here, and a verdict
 rule replication:
     input:
         **{

@@ -1,4 +1,4 @@
-# The tables of a study: of all measured brains, of all runs, and what is handed on.
+# Tables of a study: all measured brains and all runs; and the export.
 PLACES = study.measured.values()
 WITH_WHITE = [brain.id for brain in study.brains.values() if brain.has_white]
 LABELLED = [brain for brain in study.brains.values() if brain.labels]
@@ -16,7 +16,7 @@ rule metrics_tables:
         + expand(white_of()["metrics"], brain=WITH_WHITE),
         spectra=[f"{row.folder}/spectra.csv" for row in PLACES],
         regions=[f"{row.folder}/regions.csv" for row in PLACES if row.regions],
-        # which have the volumes of labels
+        # they contain the volumes of labels
         labelled=[brain.report for brain in LABELLED],
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
     output:
@@ -65,7 +65,7 @@ rule run_tables:
 EXPORTED = study.exported
 
 
-# a target of its own: what a study is handed on as
+# a separate target
 rule export:
     input:
         [
@@ -86,7 +86,7 @@ rule export:
         long=rules.metrics_tables.output.metrics_long,
         wide=rules.metrics_tables.output.metrics_wide,
     output:
-        # a folder would hold a file of Snakemake's
+        # a file, since Snakemake writes its own file into an output folder
         "results/export/dataset_description.json",
     log:
         f"{STUDY}/logs/export.log",

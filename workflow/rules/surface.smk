@@ -1,9 +1,9 @@
-# Pial surfaces: from label volumes, hemisphere surfaces or closed surfaces to clean ones in RAS+ mm.
+# Pial surfaces in RAS+ mm, from label volumes, hemisphere surfaces or closed surfaces.
 from itertools import product
 
 from gyriflow.running.cost import surface_memory_mib
 
-# the rules that make pial surfaces, by name: the source of the brains, and the hemispheres that they have
+# rules that make pial surfaces, by name: source of the brains, and their hemispheres
 PIAL_RULES = {
     "pial_from_labels": ("labels", SIDES),
     "pial_from_hemispheres": ("hemispheres", SIDES),
@@ -12,25 +12,25 @@ PIAL_RULES = {
     "pial_from_left_hemisphere": ("hemisphere", ("left",)),
     "pial_from_right_hemisphere": ("hemisphere", ("right",)),
 }
-# how unequal and how asymmetric hemispheres may be, besides what is usual
+# no limits on unequal or asymmetric hemispheres with `surface.asymmetric`
 LIMITS = (
     dict.fromkeys(("max_hemisphere_ratio", "max_asymmetry"), float("inf")) if CONFIG.surface.asymmetric else {}
 )
 
 
 def surface_memory(wildcards):
-    """Return the memory in MiB that a brain's surface may need, of labels foreseen from their header."""
+    """Return the memory (MiB) that a brain's surface may need; for labels it is estimated from their header."""
     brain = brain_of(wildcards)
     return surface_memory_mib(brain.labels.path, brain.week) if brain.labels else 4000
 
 
 def surface_settings(*names):
-    """Return the surface settings that one kind of data needs."""
+    """Return the surface settings for one kind of data."""
     return CONFIG.surface.model_dump(include=set(names))
 
 
 def pial_settings(wildcards):
-    """Return the surface settings that the data of a brain needs."""
+    """Return the surface settings for the data of a brain."""
     brain = brain_of(wildcards)
     if brain.given.source == "shape":
         return {}
@@ -39,7 +39,7 @@ def pial_settings(wildcards):
     return surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci}
 
 
-# a simple shape in the place of a brain
+# a simple shape instead of a brain
 rule shape:
     output:
         SHAPE,
@@ -57,7 +57,7 @@ rule shape:
         "../scripts/shape.py"
 
 
-# with the thickness of the cortex, where labels of the cortex or white surfaces tell it
+# with the cortical thickness, if there are labels of the cortex or white surfaces
 for (name, (source, sides)), (suffix, thickness) in product(
     PIAL_RULES.items(), {"": {}, "_with_thickness": THICKNESS}.items()
 ):
@@ -90,7 +90,7 @@ for (name, (source, sides)), (suffix, thickness) in product(
             side=sides[0] if len(sides) == 1 else None,
             coordinates=lambda w: brain_of(w).given.coordinates,
             labels=lambda w: brain_of(w).labels,
-            # exchanged files are the same inputs to Snakemake
+            # also parameters, since swapped input files do not trigger a rerun
             white=lambda w: brain_of(w).given.white_files,
             checksums=lambda w: brain_of(w).checksums,
             settings=pial_settings,

@@ -1,5 +1,5 @@
-# Accuracy of simulations: each simulated brain is compared with the observed one of its week, with the scaled start as
-# baseline.
+# Accuracy of simulations: each simulated brain is compared with the observed brain of its week; the scaled start brain
+# is the baseline.
 rule prepared_surfaces:
     input:
         real=lambda w: study.references[w.brain, float(w.week)][0].pial,
@@ -20,7 +20,7 @@ rule prepared_surfaces:
 
 
 def prepared_files(start, weeks):
-    """Return the files that `prepared_surfaces` writes for a start brain by kind, one for each of the weeks."""
+    """Return the files that `prepared_surfaces` writes for a start brain, by kind, one per week."""
     return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in PREPARED.items()}
 
 
@@ -30,7 +30,7 @@ rule validation:
         simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
         whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
         params=PARAMETERS,
-        # what the errors of runs that follow no curve are errors against
+        # reference for the errors of runs that follow no curve
         curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
     output:
         table=VALIDATION,
@@ -80,14 +80,14 @@ rule prediction:
 
 
 def deviating(wildcards):
-    """Return the start brain, the run from it at its first week and at another, and the real brain of that week."""
+    """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
     one, week = simulation_of(wildcards), float(wildcards.week)
     simulated = {"first": one.at(one.start.week), "expected": one.at(week)}
     return {"start": one.start.measured, **simulated, "real": one.real[week].measured}
 
 
 def deviation_labels(wildcards):
-    """Return the first columns of the table of deviations."""
+    """Return the first columns of the deviation table."""
     run, start, week = wildcards.run, wildcards.brain, float(wildcards.week)
     real = study.simulations[run, start].real[week]
     names = {"run": run, "start": start, "week": week}
@@ -97,7 +97,7 @@ def deviation_labels(wildcards):
 rule deviation:
     input:
         unpack(lambda w: {name: row.parts["whole"] for name, row in deviating(w).items()}),
-        # in the order of the surfaces, where all of them have one
+        # in the order of the surfaces; only if all of them have one
         thickness=lambda w: (
             [row.thickness for row in deviating(w).values()]
             if all(row.thickness for row in deviating(w).values())
@@ -120,7 +120,7 @@ rule deviation:
         "../scripts/deviation.py"
 
 
-# the start brain's mesh as registration alone carries it to later weeks: no run can come much nearer
+# the start brain's mesh carried to later weeks by registration alone: an upper limit of accuracy
 rule registration_ceiling:
     input:
         unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
@@ -153,14 +153,14 @@ rule registration_ceiling:
 
 
 def onset_surfaces(wildcards):
-    """Return the hemispheres of a run and of the real brains that follow its start, and the last one's regions."""
+    """Return the hemispheres of a run and of the observed brains after its start, and the regions of the last brain."""
     one, real = simulation_of(wildcards), study.chains[wildcards.brain, "self"].brains
     run_files = {f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides}
     real_files = {f"real_{side}": [brain.measured.parts[side] for brain in real] for side in one.start.sides}
     return {**run_files, **real_files, **real[-1].regions}
 
 
-# the weeks in which sulci begin, in a simulated brain and in the real ones that follow its start
+# onset weeks of sulci in a simulated brain and in the observed brains after its start
 rule onset:
     input:
         unpack(onset_surfaces),
@@ -185,7 +185,7 @@ rule onset:
         "../scripts/onset.py"
 
 
-# the tables of validation, and the files that each is joined from
+# tables of validation, and the files that are joined in each
 JOINED = {
     "prediction": [one.file(PREDICTION) for one in study.predictions],
     "deviation": [one.file(DEVIATION["table"], week=week) for one in study.expected for week in one.real],
@@ -215,7 +215,7 @@ rule validation_tables:
         ENVIRONMENT
     params:
         individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
-        # whether the growth of a run came from the same registrations
+        # whether the growth of a run was measured by the same registrations
         carried=[(one.run, one.follows_registration) for one in study.validated_carried],
     script:
         "../scripts/validation_tables.py"

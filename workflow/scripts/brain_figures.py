@@ -1,4 +1,4 @@
-"""Draw a measured brain: its page of quality control, with its row of the table, its maps and its small pictures."""
+"""Draw a measured brain: page and table row of quality control, maps and small pictures."""
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.anatomy.thickness import posed_whites

@@ -1,4 +1,4 @@
-"""Parameters of the runs of a round: spread over the bounds in the first, later where the surrogate expects most."""
+"""Choose the parameters of a round's runs: first spread over the bounds, later where improvement is expected."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Score of a run of the calibration against the observed brains; none if the run has diverged."""
+"""Score a run of the calibration against the observed brains; no score if it diverged."""
 
 from itertools import islice
 
@@ -24,7 +24,7 @@ with step(snakemake.log[0]):
     values = read_table(files.design).set_index("run").loc[run].to_dict()
     causes = [summary["diverged"] for summary in map(read_json, files.summaries) if summary["diverged"]]
     observed = map(read_surface, files.real)
-    # a run that has diverged has not come to the week
+    # a diverged run has not reached the week
     simulated = [] if causes else map(surface_at_week, files.regions, files.frames)
     pairs = [
         (surface, brain)

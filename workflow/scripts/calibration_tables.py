@@ -1,4 +1,4 @@
-"""The runs of a calibration with their scores, and the optimum."""
+"""Write the runs of a calibration with their scores, and the optimum."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Regions at the vertices of a brain's hemispheres, carried from the brain that they are given on."""
+"""Carry regions to the vertices of a brain's hemispheres from the brain on which they are given."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from gyriflow.step import step
 
 files, reports = snakemake.input, (snakemake.input.given_report, snakemake.input.report)
 with step(snakemake.log[0]):
-    # brains correspond in the world of their files
+    # correspondences are in the coordinates of the files
     back = [
         np.eye(4) if posed else read_pose(report).inverse
         for report, posed in zip(reports, snakemake.params.posed, strict=True)

@@ -1,4 +1,4 @@
-"""Distances of a run of a sweep from the observed brains of its week; no rows if it has not reached that week."""
+"""Compare a run of a sweep with the observed brains of its week; no rows if it has not reached that week."""
 
 from itertools import batched
 

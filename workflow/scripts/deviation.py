@@ -1,4 +1,4 @@
-"""Deviation of the observed brain of a week from the one that a run expects: maps on that surface, and a table."""
+"""Measure how an observed brain deviates from a run's prediction: maps on the predicted surface, and a table."""
 
 from gyriflow.compare.deviation import deviation_maps, deviation_table, thickness_difference
 from gyriflow.geometry.alignment import align

@@ -32,11 +32,11 @@ READERS = {
     "frames.h5": read_pial_frames,
     "regions.h5": read_boundary,
 }
-"""How files are read, by the ends of their names."""
+"""Functions that read files, by the end of the file name."""
 
 
 def read(inputs):
-    """Return nested dictionaries and lists of files with the content of the files."""
+    """Return nested dictionaries and lists with each path replaced by the content of its file."""
     match inputs:
         case str():
             return next(reader for end, reader in READERS.items() if inputs.endswith(end))(inputs)

@@ -1,4 +1,4 @@
-"""Surfaces, maps, regions and tables of a study in one folder to hand on."""
+"""Export surfaces, maps, regions and tables of a study as a BIDS derivative."""
 
 from pathlib import Path
 

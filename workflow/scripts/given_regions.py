@@ -1,4 +1,4 @@
-"""Regions at the vertices of a brain's hemispheres, from a label volume or label files that a user gives."""
+"""Write regions at the vertices of a brain's hemispheres, from the user's label volume or label files."""
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from gyriflow.settings.terms import SIDES, STRUCTURES
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
-given = [file for name in ("volume", "left_labels", "right_labels") if (file := files.get(name))]
-with step(snakemake.log[0], *given):
+sources = [file for name in ("volume", "left_labels", "right_labels") if (file := files.get(name))]
+with step(snakemake.log[0], *sources):
     pose = read_pose(files.report)
     meshes = {side: read_surface(files[side]) for side in SIDES}
     if files.get("volume"):

@@ -1,4 +1,4 @@
-"""Cortical areas and brain volumes of all brains, and the growth rates between their weeks."""
+"""Measure cortical areas and brain volumes of all brains, and growth rates between their weeks."""
 
 import pandas as pd
 
@@ -16,8 +16,8 @@ with step(snakemake.log[0]):
     areas["area_cm2"] = list(map(area_cm2, surfaces))
     areas["thickness_mm"] = areas["subject"].map({name: read_json(path)["mean_mm"] for name, path in thickness.items()})
     areas["volume_ml"] = list(map(volume_ml, surfaces))
-    known = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
+    tissues = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
     for tissue in TISSUES:
-        areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in known]
+        areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in tissues]
     write_table(output.areas, areas)
     write_table(output.rates, rates_of_series(areas))

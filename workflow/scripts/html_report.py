@@ -14,8 +14,8 @@ TABLES = ("quality", "metrics", "centiles", "warnings", "runs", "validation")
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 
-def shown(figures):
-    """Return figures and tables with their content, as a page shows them."""
+def with_content(figures):
+    """Return the figures and tables of a page with their content."""
     paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
@@ -33,12 +33,12 @@ with step(snakemake.log[0]):
     origin = Origin(read_json(files.provenance), read_text(files.methods), yaml_text(hide_paths(params.config)))
     brains = {brain["id"]: brain for brain in params.brains}
     for path, (name, figures) in zip(output.brains, params.brain_figures.items(), strict=True):
-        page = brain_page(brains[name], tables, origin, shown(figures), norm=params.norm)
+        page = brain_page(brains[name], tables, origin, with_content(figures), norm=params.norm)
         write_text(path, report_page(template, parts, {"groups": []}, **page))
     small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
     prediction = params.prediction and params.prediction | {"worth": read_yaml(files.worth)}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
-    page = study_page(params.brains, tables, origin, shown(params.figures), **about)
+    page = study_page(params.brains, tables, origin, with_content(params.figures), **about)
     runs, real = params.surfaces["runs"], params.surfaces["real"]
     runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
     view = surfaces_view(runs, read_weeks(real), measured=params.measured)

@@ -1,4 +1,4 @@
-"""The metrics of one brain, measured or simulated, at one week; of a simulated one its surfaces and thickness, too."""
+"""Measure an observed or a simulated brain at a week; of a simulated brain, also write surfaces and thickness."""
 
 from gyriflow.folding.start_regions import folded_surfaces
 from gyriflow.io.files import read_json, write_table

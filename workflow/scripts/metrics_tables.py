@@ -1,4 +1,4 @@
-"""The metrics of all brains in one table each, and what follows: change, asymmetry, norms, distances of spectra."""
+"""Join the metrics of all brains into tables, and write change, asymmetry, norms and distances between spectra."""
 
 import pandas as pd
 
@@ -33,9 +33,9 @@ with step(snakemake.log[0]):
         "spectral_distance": spectral_distances(tables["spectra"]),
     }
     if files.labelled:
-        volumes = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
-        volumes = [{int(label): ml for label, ml in of_labels.items()} for of_labels in volumes]
-        brains = [LabelledBrain(*brain, of) for brain, of in zip(params.labelled, volumes, strict=True)]
+        reports = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]
+        volumes = [{int(label): ml for label, ml in report.items()} for report in reports]
+        brains = [LabelledBrain(*brain, by_label) for brain, by_label in zip(params.labelled, volumes, strict=True)]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
     for name, path in snakemake.output.items():

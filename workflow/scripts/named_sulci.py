@@ -1,4 +1,4 @@
-"""Named sulci at the vertices of a brain's hemispheres, carried by registration from the brain they are drawn on."""
+"""Carry named sulci by registration to the vertices of a brain's hemispheres."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Onset week of each sulcus of the last observed brain: in the observed brains, and in a run."""
+"""Measure the onset week of each sulcus of the last observed brain, in the observed brains and in a run."""
 
 import pandas as pd
 
@@ -24,7 +24,7 @@ with step(snakemake.log[0]):
             carry_to_pose(mesh, poses[number], pairs[number:], poses[-1])
             for number, mesh in enumerate(observed.values())
         ]
-        # the run keeps the vertices of its start
+        # a run has the same vertices as its start brain
         start = carry_to_pose(next(iter(simulated.values())), poses[0], pairs, poses[-1])
         on_last = {MEASURED: carried, params.run: [start for _ in simulated]}
         for run, surfaces in ((MEASURED, observed), (params.run, simulated)):

@@ -1,4 +1,4 @@
-"""The clean pial surface of a brain and of its hemispheres in RAS+ mm, from what it is given as, and its thickness."""
+"""Make the pial surface of a brain and of its hemispheres in RAS+ mm, and its thickness, from labels or surfaces."""
 
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, from_surface
 from gyriflow.anatomy.thickness import thickness_from_labels, thickness_from_white

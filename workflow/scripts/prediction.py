@@ -1,4 +1,4 @@
-"""A run that predicts a brain, and the simplest ways to do so, compared with the observed brains."""
+"""Compare a run that predicts a brain, and simple baselines, with the observed brains."""
 
 from gyriflow.compare.prediction import prediction_table, simple_predictions
 from gyriflow.compare.shapes import PreparedSurface
@@ -20,7 +20,7 @@ with step(snakemake.log[0]):
         observed[week] = read_surface(files.whole[number])
         prepared[week] = PreparedSurface(read_surface(files.real[number]), **read_vertex_maps(files.real_maps[number]))
         models[week] = {"run": read_surface(files.simulated[number])}
-        # the simple ways are the same for all runs from this brain, and written with the run that grows as the atlas
+        # baselines are the same for all runs from this brain; they are written with the run that grows as the atlas
         if params.of_atlas:
             at = targets.index(week)
             target = TriangleMesh(targets.positions[at][used], start.faces)

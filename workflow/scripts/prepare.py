@@ -1,4 +1,4 @@
-"""What a run is solved with: its parameters, their maps on the start mesh, and its zones and fields there."""
+"""Prepare a run: write its parameters, their maps on the start mesh, and the mesh's zones and fields."""
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.folding.start_regions import start_regions
@@ -32,11 +32,11 @@ with step(snakemake.log[0]):
     if files.targets:
         targets = read_weekly_shapes(files.targets)
         weekly = targets.weeks.tolist()
-        sizes = {name: dict(zip(weekly, of.tolist(), strict=True)) for name, of in targets.sizes.items()}
+        sizes = {name: dict(zip(weekly, values.tolist(), strict=True)) for name, values in targets.sizes.items()}
         maps |= target_maps(targets.weeks[1:], targets.positions[1:])
     curves = read_table(files.curves) if files.curves else None
-    known = params.settings, params.weeks, read_json(files.surface), sizes, curves, params.series
-    write_yaml(output.params, parameters := run_parameters(*known))
+    inputs = params.settings, params.weeks, read_json(files.surface), sizes, curves, params.series
+    write_yaml(output.params, parameters := run_parameters(*inputs))
     if maps:
         write_maps(output.maps, maps)
     regions = start_regions(

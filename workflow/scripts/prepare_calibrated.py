@@ -1,4 +1,4 @@
-"""What a run of the calibration is solved with: the parameters of the base run with the values of its round."""
+"""Prepare a run of the calibration: the parameters of the base run with the values of its round."""
 
 from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.compare.calibration import calibrated_parameters

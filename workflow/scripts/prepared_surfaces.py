@@ -1,4 +1,4 @@
-"""Surfaces that all runs from a start brain are compared with in a week, prepared for comparison."""
+"""Prepare the surfaces with which all runs from a start brain are compared at a week."""
 
 from gyriflow.compare.shapes import prepare_for_comparison
 from gyriflow.io.surfaces import read_surface, write_surface, write_vertex_maps

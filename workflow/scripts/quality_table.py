@@ -1,4 +1,4 @@
-"""The verdict on every brain of the study, with what it rests on; refused brains with their cause."""
+"""Write the table of verdicts: every brain of the study with its checks, refused brains with their cause."""
 
 from gyriflow.io.files import read_json, write_table
 from gyriflow.report.quality import quality_table

@@ -1,4 +1,4 @@
-"""The metrics of a brain by region."""
+"""Measure the regions of a brain."""
 
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
@@ -6,7 +6,7 @@ from gyriflow.metrics.regions import region_metrics
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
-files, given = snakemake.input, snakemake.params.labels
+files, columns = snakemake.input, snakemake.params.labels
 with step(snakemake.log[0]):
     regions = {side: read_vertex_labels(files[f"{side}_regions"]) for side in SIDES}
     table = region_metrics(
@@ -15,4 +15,4 @@ with step(snakemake.log[0]):
         {side: labels for side, (labels, _) in regions.items()},
         {number: name for _, names in regions.values() for number, name in names.items()},
     )
-    write_table(snakemake.output[0], table.assign(**given)[[*given, *table.columns]])
+    write_table(snakemake.output[0], table.assign(**columns)[[*columns, *table.columns]])

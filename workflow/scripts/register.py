@@ -1,4 +1,4 @@
-"""The registration of a brain with one of a later week, refused where it has failed."""
+"""Register a brain with one of a later week; refuse a failed registration."""
 
 from dataclasses import asdict
 

@@ -1,4 +1,4 @@
-"""Comparison with what the paper reports: two tables, and a page with the verdicts."""
+"""Compare a study with the results of the paper: two tables, and a page with the verdicts."""
 
 from markupsafe import Markup
 

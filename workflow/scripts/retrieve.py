@@ -1,4 +1,4 @@
-"""One file of an atlas, fetched and checked."""
+"""Download one file of an atlas and check it."""
 
 import logging
 

@@ -1,4 +1,4 @@
-"""Parameters, zones and summaries of all runs, a row each and as a table for the report, and their displacements."""
+"""Write parameters, zones and summaries of all runs, also as a table of the report, and their displacements."""
 
 import pandas as pd
 
@@ -17,16 +17,16 @@ BEFORE_THE_SOLVE = ("clamped_share", "initial_penetration_mm", "elements_through
 files, output, folded = snakemake.input, snakemake.output, snakemake.params.folded
 with step(snakemake.log[0]):
     rows, runs, displacements = [], {}, []
-    of_files = zip(files.params, files.summaries, files.zones, files.steps, files.frames, strict=True)
-    of_runs = zip(run_names(folded), folded, snakemake.params.growth_of, of_files, strict=True)
-    for name, (run, brain), grown, (params, summary, zones, steps, frames) in of_runs:
+    files_of_runs = zip(files.params, files.summaries, files.zones, files.steps, files.frames, strict=True)
+    runs_and_files = zip(run_names(folded), folded, snakemake.params.growth_of, files_of_runs, strict=True)
+    for name, (run, brain), grown, (params, summary, zones, steps, frames) in runs_and_files:
         report = read_json(zones)
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
         resolved = resolution_over_steps(report["order"], read_table(steps))
         settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
         settings["growth_of"] = grown
         rows.append({"run": run, "subject": brain, **settings, **found})
-        # the shapes that a run grows towards are in files
+        # targets are in files
         settings.pop("targets", None)
         runs[name] = settings | {key: value for key, value in found.items() if key in OF_EVERY_RUN}
         weeks = read_weeks(frames)

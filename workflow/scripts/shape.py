@@ -1,4 +1,4 @@
-"""A simple geometry as a closed surface in the place of a brain's."""
+"""Write a simple shape as a closed surface instead of a brain's."""
 
 from gyriflow.anatomy.shapes import shape_surface
 from gyriflow.io.surfaces import write_surface

@@ -1,4 +1,4 @@
-"""Regions at the vertices of a run's hemispheres: those of the start, which the tissue keeps."""
+"""Write the regions of a run's hemispheres: those of the start brain, which move with the tissue."""
 
 from gyriflow.geometry.triangles import TriangleMesh, submesh
 from gyriflow.growth.carried_regions import regions_from_surface

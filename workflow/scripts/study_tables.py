@@ -1,4 +1,4 @@
-"""The tables of a sweep: its runs and how they ended, how far they are from observed brains, and which are nearest."""
+"""Write the tables of a sweep: its runs and their outcome, distances to observed brains, and the nearest runs."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""The inside of a brain's pial surface as a label volume, for the registration of brains that have no labels."""
+"""Write the inside of a brain's pial surface as a label volume, for the registration of brains without labels."""
 
 from gyriflow.geometry.matching import surface_mask
 from gyriflow.io.surfaces import read_surface

@@ -1,4 +1,4 @@
-"""The shapes that the mesh of a start brain is to have in later weeks."""
+"""Write the targets of a start brain: the shapes of its mesh in later weeks."""
 
 from itertools import pairwise
 
@@ -15,19 +15,19 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh = read_tetrahedral_mesh(files.mesh)
     surfaces = [read_surface(path) for path in files.surfaces]
-    # mesh and surfaces are in their poses; brains correspond there, or in the worlds of their files
+    # mesh and surfaces are posed; correspondences are too, or are in the coordinates of the files
     poses = pairwise(read_pose(path).world for path in (files.report, *files.reports))
     pairs = [
         between_moved(
             read_correspondence(path),
-            *(np.eye(4) if there else pose for there, pose in zip(posed, pair, strict=True)),
+            *(np.eye(4) if is_posed else pose for is_posed, pose in zip(posed, pair, strict=True)),
         )
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
     if snakemake.wildcards.origin == "self":
-        weeks, positions, others = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
+        weeks, positions, further = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
     else:
-        known = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, others = predict_shapes(mesh, *known)
-    targets = WeeklyShapes(np.array(weeks), positions, sizes_of(mesh, positions), others)
+        inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
+        weeks, positions, further = predict_shapes(mesh, *inputs)
+    targets = WeeklyShapes(np.array(weeks), positions, sizes_of(mesh, positions), further)
     write_weekly_shapes(snakemake.output[0], targets)

@@ -1,4 +1,4 @@
-"""The maps of a brain's hemisphere at the vertices of the study's template."""
+"""Write the maps of a brain's hemisphere at the vertices of the study's template."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from gyriflow.step import step
 files = snakemake.input
 with step(snakemake.log[0]):
     between = [read_correspondence(path) for path in files.get("correspondence", [])]
-    # brains correspond in the world of their files
+    # correspondences are in the coordinates of the files
     places = zip(
         (files.template, files.surface), (files.template_report, files.report), snakemake.params.posed, strict=True
     )

@@ -1,4 +1,4 @@
-"""The start brain's pial surface filled with tetrahedra; a refused mesh is kept aside for inspection."""
+"""Fill the start brain's pial surface with tetrahedra; a refused mesh is kept for inspection."""
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.tetrahedra import boundary_surface

@@ -1,4 +1,4 @@
-"""Validation of a run, or of the start brain's mesh, which is carried by registration, week by week."""
+"""Validate a run, or the start brain's mesh carried by registration, week by week."""
 
 import numpy as np
 
@@ -35,7 +35,7 @@ with step(snakemake.log[0]):
     }
     if files.get("correspondences"):
         mesh, pose, sizes = read_tetrahedral_mesh(files.mesh), read_pose(files.report), {}
-        # brains correspond in the world of their files, the mesh has a pose
+        # correspondences are in the coordinates of the files, the mesh is posed
         start = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
         positions = carry_mesh(start, [read_correspondence(path) for path in files.correspondences])
         write_weekly_shapes(output.carried, WeeklyShapes(np.array(params.carried_weeks), positions))

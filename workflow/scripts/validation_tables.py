@@ -1,4 +1,4 @@
-"""Tables of validation of all runs, the agreement of their displacements, and the scores of deviations."""
+"""Write the validation of all runs, the agreement of their displacements, and the scores of deviations."""
 
 import pandas as pd
 
@@ -19,8 +19,8 @@ def agreement(run, registered, frames, carried):
     shared = [week for week in weeks if week in carried.weeks]
     surface, pial = boundary_surface(TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames)))
     simulated = [read_positions(frames, week)[pial] for week in shared]
-    measured = [carried.positions[carried.index(week)][pial] for week in shared]
-    table = displacement_table(shared, simulated, measured, surface.faces, registered=registered)
+    observed = [carried.positions[carried.index(week)][pial] for week in shared]
+    table = displacement_table(shared, simulated, observed, surface.faces, registered=registered)
     return table.assign(run=run, start_week=weeks[0])[["run", "start_week", *table.columns]]
 
 

@@ -1,4 +1,4 @@
-"""The white surfaces of a brain, from its labels or from given files, the maps on them and their metrics."""
+"""Make the white surfaces of a brain from its labels or from given files, and measure them."""
 
 from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
