@@ -34,9 +34,9 @@ class Mutant(NamedTuple):
 BY_TESTS = {
     # which brain, side or setting is chosen
     "study/test_which_brain.py": [
-        ("src/gyriflow/study/study.py", "max(before, key", "min(before, key"),
-        ("src/gyriflow/study/study.py", "return min(given, key", "return max(given, key"),
-        ("src/gyriflow/study/records.py", " and one.sides == self.sides", ""),
+        ("src/gyriflow/study/study.py", "max(earlier, key", "min(earlier, key"),
+        ("src/gyriflow/study/study.py", "return min(sources, key", "return max(sources, key"),
+        ("src/gyriflow/study/records.py", "brain.sides == self.sides", "True"),
         ("src/gyriflow/study/series.py", "all(brain.sides == start.sides for brain in brains)", "True"),
         ("src/gyriflow/study/figures.py", "MAX_SERIES = 5, 4", "MAX_SERIES = 9, 4"),
     ],

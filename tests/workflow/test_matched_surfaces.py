@@ -132,7 +132,7 @@ def test_sulci_of_real_brains_and_of_a_run_begin_in_their_weeks(workflow):
     name = workflow.write("study.yaml", config)
     study = resolve(load(config, workflow.directory))
     chain, run = study.chains["b", "self"], study.simulations["reference", "b"]
-    brains = {"real": [brain.measured for brain in chain.brains], "reference": run.measured}
+    brains = {"real": [brain.measurement for brain in chain.brains], "reference": run.measurements}
     weeks = {"real": [22, 24, 27], "reference": [22, 24, 26, 27]}
     assert list(run.weeks) == weeks["reference"]
     shapes = {who: [groove(rate * (week - 22)) for week in weeks[who]] for who, rate in MM_PER_WEEK.items()}

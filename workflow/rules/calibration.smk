@@ -63,7 +63,7 @@ rule calibration_score:
         regions=from_bases(REGIONS["mesh"]),
         data=from_bases(REGIONS["data"]),
         summaries=from_bases(FOLDING["summary"]),
-        real=lambda w: [real.pial for brains in CALIBRATED.real.values() for real in brains],
+        real=lambda w: [real.pial for brains in CALIBRATED.observed.values() for real in brains],
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
@@ -77,7 +77,7 @@ rule calibration_score:
         ENVIRONMENT
     params:
         # number of observed brains of each simulated one
-        compared=lambda w: list(map(len, CALIBRATED.real.values())),
+        compared=lambda w: list(map(len, CALIBRATED.observed.values())),
         week=lambda w: CONFIG.calibrate.compare_week,
         weights=lambda w: CONFIG.calibrate.score,
         round=lambda w: CALIBRATED.rounds[w.run],

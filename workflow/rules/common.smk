@@ -97,7 +97,7 @@ def brains_with(condition):
 
 wildcard_constraints:
     **dict.fromkeys(("brain", "earlier", "later"), one_of(study.brains)),
-    study=one_of(study.comparisons),
+    study=one_of(study.sweeps),
     run=one_of([*CONFIG.runs, *study.may_diverge]),
     week=r"\d+\.\d+",
     side="|".join(SIDES),

@@ -59,6 +59,6 @@ rule influence_figures:
 rule paper:
     input:
         asked_for(FIGURES, "paper"),
-        rules.growth_rates.output if study.growing else [],
-        rules.replication.output if study.folded else [],
+        rules.growth_rates.output if study.growth_brains else [],
+        rules.replication.output if study.run_simulations else [],
         rules.studies.input,

@@ -38,9 +38,9 @@ for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
             f"{RUN}/benchmarks/prepare{suffix}.tsv"
         wildcard_constraints:
             run=one_of(
-                one.run
-                for one in study.simulations.values()
-                if one.base == one.run and bool(one.maps) == bool(maps)
+                simulation.run
+                for simulation in study.simulations.values()
+                if simulation.base == simulation.run and bool(simulation.maps) == bool(maps)
             ),
         conda:
             ENVIRONMENT
@@ -49,7 +49,7 @@ for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
             weeks=lambda w: simulation_of(w).weeks,
             series=lambda w: simulation_of(w).followed_series,
             # volumes of maps are read like label volumes
-            affine_from=lambda w: brain_of(w).given.affine_from,
+            affine_from=lambda w: brain_of(w).config.affine_from,
             maps=map_sources,
         script:
             "../scripts/prepare.py"

@@ -1,8 +1,8 @@
 # Growth rates of the cortex, from the areas of the brains' pial surfaces over the weeks.
 rule growth_rates:
     input:
-        whole=[brain.pial for _, brain in study.growing],
-        reports=[brain.report for _, brain in study.growing],
+        whole=[brain.pial for _, brain in study.growth_brains],
+        reports=[brain.report for _, brain in study.growth_brains],
         thickness=expand(THICKNESS["summary"], brain=study.with_thickness_curve),
     output:
         **GROWTH,
@@ -13,10 +13,10 @@ rule growth_rates:
     conda:
         ENVIRONMENT
     params:
-        series=[series for series, _ in study.growing],
-        brains=[brain.id for _, brain in study.growing],
+        series=[series for series, _ in study.growth_brains],
+        brains=[brain.id for _, brain in study.growth_brains],
         with_thickness=study.with_thickness_curve,
-        weeks=[brain.week for _, brain in study.growing],
+        weeks=[brain.week for _, brain in study.growth_brains],
     script:
         "../scripts/growth_rates.py"
 
@@ -38,5 +38,5 @@ rule growth_curves:
 
 rule growth:
     input:
-        rules.growth_rates.output if study.growing else [],
+        rules.growth_rates.output if study.growth_brains else [],
         asked_for(FIGURES, "growth"),

@@ -5,7 +5,7 @@ MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spang
 def labels_or_white(wildcards):
     """Return the labels of a brain, or its white surfaces."""
     brain = brain_of(wildcards)
-    return brain.labels.path if brain.labels else list(brain.given.white_files.values())
+    return brain.labels.path if brain.labels else list(brain.config.white_files.values())
 
 
 for suffix, sides in PARTS_OF_BRAINS.items():
@@ -14,8 +14,8 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         name:
             f"measure{suffix}"
         input:
-            unpack(lambda w: brain_of(w).measured.parts),
-            thickness=lambda w: brain_of(w).measured.thickness,
+            unpack(lambda w: brain_of(w).measurement.parts),
+            thickness=lambda w: brain_of(w).measurement.thickness,
             report=PIAL["report"],
         output:
             **measures_in(f"{BRAIN}/metrics", *sides),
@@ -28,7 +28,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         conda:
             ENVIRONMENT
         params:
-            labels=lambda w: brain_of(w).measured.labels,
+            labels=lambda w: brain_of(w).measurement.labels,
             settings=MEASURED_WITH,
         script:
             "../scripts/measure.py"
@@ -62,7 +62,7 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         name:
             f"white{suffix}"
         input:
-            unpack(lambda w: brain_of(w).measured.parts),
+            unpack(lambda w: brain_of(w).measurement.parts),
             report=PIAL["report"],
             given=labels_or_white,
         output:
@@ -76,10 +76,10 @@ for suffix, sides in PARTS_OF_BRAINS.items():
         conda:
             ENVIRONMENT
         params:
-            columns=lambda w: brain_of(w).measured.labels,
+            columns=lambda w: brain_of(w).measurement.labels,
             labels=lambda w: brain_of(w).labels,
             # also parameters, since swapped input files do not trigger a rerun
-            white=lambda w: brain_of(w).given.white_files,
+            white=lambda w: brain_of(w).config.white_files,
             surface=surface_settings("edge_length_mm", "max_hole_mm"),
             curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
         script:

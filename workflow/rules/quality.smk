@@ -13,7 +13,7 @@ def quality_columns(name):
 def surface_log(wildcards):
     """Return the log of the job that made a brain's surface and thickness."""
     brain = brain_of(wildcards)
-    (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.given.source, brain.sides)]
+    (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.config.source, brain.sides)]
     return f"{BRAIN}/logs/{rule}{'_with_thickness' if brain.has_thickness else ''}.log".format(brain=brain.id)
 
 
@@ -22,12 +22,12 @@ rule brain_figures:
         surface=PIAL["whole"],
         report=PIAL["report"],
         labels=lambda w: brain_of(w).labels.path if brain_of(w).labels else [],
-        image=lambda w: brain_of(w).given.image or [],
-        white=lambda w: list(brain_of(w).given.white_files.values()),
-        thickness=lambda w: brain_of(w).measured.thickness,
+        image=lambda w: brain_of(w).config.image or [],
+        white=lambda w: list(brain_of(w).config.white_files.values()),
+        thickness=lambda w: brain_of(w).measurement.thickness,
         measured=lambda w: THICKNESS["summary"].format(brain=w.brain) if brain_of(w).has_thickness else [],
-        hemispheres=lambda w: brain_of(w).measured.hemispheres,
-        maps=lambda w: brain_of(w).measured.maps,
+        hemispheres=lambda w: brain_of(w).measurement.hemispheres,
+        maps=lambda w: brain_of(w).measurement.maps,
     output:
         quality=f"{BRAIN}/figures/quality.png",
         quality_pdf=f"{BRAIN}/figures/quality.pdf",
@@ -43,7 +43,7 @@ rule brain_figures:
     conda:
         ENVIRONMENT
     params:
-        white_files=lambda w: brain_of(w).given.white_files,
+        white_files=lambda w: brain_of(w).config.white_files,
         labels=lambda w: brain_of(w).labels,
         columns=lambda w: quality_columns(w.brain),
         side=lambda w: brain_of(w).sides[0],

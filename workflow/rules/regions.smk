@@ -20,7 +20,7 @@ rule given_regions:
     conda:
         ENVIRONMENT
     params:
-        affine_from=lambda w: brain_of(w).given.affine_from,
+        affine_from=lambda w: brain_of(w).config.affine_from,
         names=lambda w: CONFIG.metrics.regions[w.brain].names,
     script:
         "../scripts/given_regions.py"
@@ -28,13 +28,13 @@ rule given_regions:
 
 def region_pair(wildcards):
     """Return the brain on which regions are given, and the brain to which they are carried."""
-    return study.giver_of_regions(wildcards.brain), brain_of(wildcards)
+    return study.region_source(wildcards.brain), brain_of(wildcards)
 
 
 def regions_to_carry(wildcards):
     """Return the given regions and the surfaces of their brain."""
     giver, _ = region_pair(wildcards)
-    return {**giver.regions, **{f"given_{side}": giver.measured.parts[side] for side in SIDES}}
+    return {**giver.regions, **{f"given_{side}": giver.measurement.parts[side] for side in SIDES}}
 
 
 rule carried_regions:
@@ -108,7 +108,7 @@ rule simulated_regions:
 
 def place_of(wildcards):
     """Return the brain that is measured in the folder of the wildcards."""
-    return study.places[wildcards.where]
+    return study.all_measurements[wildcards.where]
 
 
 rule region_metrics:
@@ -124,7 +124,7 @@ rule region_metrics:
     benchmark:
         f"{PLACE}/benchmarks/region_metrics.tsv"
     wildcard_constraints:
-        where=one_of(where for where, row in study.places.items() if row.regions),
+        where=one_of(where for where, row in study.all_measurements.items() if row.regions),
     conda:
         ENVIRONMENT
     params:
@@ -154,7 +154,7 @@ def template_correspondence(wildcards):
 
 rule template_maps:
     input:
-        template=lambda w: on_template(w)[0].measured.parts[w.side],
+        template=lambda w: on_template(w)[0].measurement.parts[w.side],
         template_report=lambda w: on_template(w)[0].report,
         surface=mapped_surface,
         report=lambda w: on_template(w)[1].report,
@@ -167,7 +167,7 @@ rule template_maps:
     benchmark:
         f"{PLACE}/benchmarks/template_maps.{{side}}.tsv"
     wildcard_constraints:
-        where=one_of(study.measured),
+        where=one_of(study.measurements),
     conda:
         ENVIRONMENT
     params:

@@ -32,7 +32,7 @@ def pair_of(wildcards):
 rule register:
     input:
         brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-        images=lambda w: [brain.given.image for brain in pair_of(w) if brain.given.image],
+        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
     output:
         REGISTERED,
     log:
@@ -44,7 +44,7 @@ rule register:
         ENVIRONMENT
     params:
         brains=lambda w: [brain.registered for brain in pair_of(w)],
-        images=lambda w: [brain.given.image for brain in pair_of(w)],
+        images=lambda w: [brain.config.image for brain in pair_of(w)],
     script:
         "../scripts/register.py"
 
@@ -52,7 +52,7 @@ rule register:
 # the original surfaces with all their vertices, in the pose of the mesh
 rule match_surfaces:
     input:
-        lambda w: [path for brain in pair_of(w) for path in brain.given.files],
+        lambda w: [path for brain in pair_of(w) for path in brain.config.files],
         reports=lambda w: [brain.report for brain in pair_of(w)],
     output:
         MATCHED,
@@ -63,7 +63,7 @@ rule match_surfaces:
     conda:
         ENVIRONMENT
     params:
-        files=lambda w: [brain.given.files for brain in pair_of(w)],
+        files=lambda w: [brain.config.files for brain in pair_of(w)],
     script:
         "../scripts/match_surfaces.py"
 

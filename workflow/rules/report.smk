@@ -40,14 +40,14 @@ rule study_records:
         config=study.used_settings,
         # also refused brains
         known_brains=[brain.id for brain in CONFIG.brains],
-        brains=[brain.given.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
+        brains=[brain.config.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
         files=[
             (brain.id, what, path)
             for brain in study.brains.values()
             for what, paths in (
-                (brain.given.source, brain.given.files),
-                ("image", [brain.given.image] if brain.given.image else []),
-                ("white", list(brain.given.white_files.values())),
+                (brain.config.source, brain.config.files),
+                ("image", [brain.config.image] if brain.config.image else []),
+                ("white", list(brain.config.white_files.values())),
             )
             for path in paths
         ],
@@ -56,10 +56,10 @@ rule study_records:
         benchmarks=lambda w: benchmark_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
-        growth_of=[study.growth_of(one) for one in study.folded],
+        growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
         # used by the methods text
         method={
-            "brains": [brain for brain in study.described_brains if brain["id"] in study.brains],
+            "brains": [brain for brain in study.brain_descriptions if brain["id"] in study.brains],
             "surface": CONFIG.surface.model_dump(mode="json", include={"edge_length_mm", "open_sulci"}),
             "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
             "metrics": CONFIG.metrics.model_dump(mode="json", include={"curvature_radius_mm"}),
@@ -81,14 +81,16 @@ def figures_on_page(brain=None):
 VIEWED = [
     brain
     for brain in study.brains.values()
-    if study.starts and brain.given.population == study.starts[0].given.population
+    if study.starts and brain.config.population == study.starts[0].config.population
 ]
 SURFACES = {
     "runs": {
-        name: [[row.week, halves_of(row)] for row in simulation.measured]
-        for name, simulation in zip(run_names(study.pairs), study.folded)
+        name: [[row.week, halves_of(row)] for row in simulation.measurements]
+        for name, simulation in zip(run_names(study.pairs), study.run_simulations)
     },
-    "real": [[brain.week, halves_of(brain.measured)] for brain in sorted(VIEWED, key=lambda brain: brain.week)],
+    "real": [
+        [brain.week, halves_of(brain.measurement)] for brain in sorted(VIEWED, key=lambda brain: brain.week)
+    ],
 }
 
 
@@ -102,7 +104,7 @@ rule html_report:
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
         warnings=rules.study_records.output.warnings,
-        runs=rules.run_tables.output.csv if study.folded else [],
+        runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
@@ -128,7 +130,7 @@ rule html_report:
     params:
         figures=figures_on_page(),
         brain_figures={brain: figures_on_page(brain) for brain in study.brains},
-        brains=study.described_brains,
+        brains=study.brain_descriptions,
         prediction=study.prediction_facts,
         surfaces=SURFACES,
         measured=measured_name(VIEWED),

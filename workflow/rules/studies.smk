@@ -5,11 +5,11 @@
 # before the week of comparison is only in `members`.
 def files_of_member(wildcards):
     """Return the files of a run at the week of comparison and of the observed brains; none if it has not reached it."""
-    compared = study.comparisons[wildcards.study]
+    compared = study.sweeps[wildcards.study]
     if not reaches(wildcards.run, wildcards.brain, compared.week):
         return {}
-    simulated, real = simulation_of(wildcards).at(compared.week), compared.real[wildcards.brain]
-    rows = [simulated, *(brain.measured for brain in real)]
+    simulated, real = simulation_of(wildcards).at(compared.week), compared.observed[wildcards.brain]
+    rows = [simulated, *(brain.measurement for brain in real)]
     return {
         "metrics": [f"{row.folder}/metrics.csv" for row in rows],
         "spectra": [f"{row.folder}/spectra.csv" for row in rows],
@@ -20,7 +20,9 @@ def files_of_member(wildcards):
 
 def from_members(pattern):
     """Return an input function: a file of each run of a sweep."""
-    return lambda w: [one.file(pattern, study=w.study) for one, _ in study.comparisons[w.study].members]
+    return lambda w: [
+        simulation.file(pattern, study=w.study) for simulation, _ in study.sweeps[w.study].members
+    ]
 
 
 rule compare_member:
@@ -37,7 +39,7 @@ rule compare_member:
     conda:
         ENVIRONMENT
     params:
-        real=lambda w: {real.id: real.population for real in study.comparisons[w.study].real[w.brain]},
+        real=lambda w: {real.id: real.population for real in study.sweeps[w.study].observed[w.brain]},
         population=lambda w: brain_of(w).population,
         parts=lambda w: ["whole", *brain_of(w).sides],
     script:
@@ -62,10 +64,10 @@ rule study_tables:
         ENVIRONMENT
     params:
         members=lambda w: [
-            {"run": one.run, "subject": one.start.id, "values": dict(values)}
-            for one, values in study.comparisons[w.study].members
+            {"run": simulation.run, "subject": simulation.start.id, "values": dict(values)}
+            for simulation, values in study.sweeps[w.study].members
         ],
-        week=lambda w: study.comparisons[w.study].week,
+        week=lambda w: study.sweeps[w.study].week,
     script:
         "../scripts/study_tables.py"
 
@@ -74,7 +76,7 @@ rule study_tables:
 rule replication:
     input:
         **{
-            name: expand(f"{SWEEP}/{name}.csv", study=study.comparisons)
+            name: expand(f"{SWEEP}/{name}.csv", study=study.sweeps)
             for name in ("members", "comparison", "nearest")
         },
         published=PUBLISHED,
@@ -94,7 +96,7 @@ rule replication:
         studies={
             name: {"varied": list(asked.vary), "week": asked.compare_week}
             for name, asked in CONFIG.studies.items()
-            if name in study.comparisons
+            if name in study.sweeps
         },
         run=next(iter(study.pairs), (None, None)),
     script:
@@ -103,4 +105,4 @@ rule replication:
 
 rule studies:
     input:
-        expand(list(rules.study_tables.output), study=study.comparisons),
+        expand(list(rules.study_tables.output), study=study.sweeps),

@@ -1,5 +1,5 @@
 # Tables of a study: all measured brains and all runs; and the export.
-PLACES = study.measured.values()
+PLACES = study.measurements.values()
 WITH_WHITE = [brain.id for brain in study.brains.values() if brain.has_white]
 LABELLED = [brain for brain in study.brains.values() if brain.labels]
 METRICS_TABLES = [
@@ -30,9 +30,9 @@ rule metrics_tables:
     params:
         labelled=[(brain.id, brain.week, brain.sides, brain.labels.scheme) for brain in LABELLED],
         scans=study.scans,
-        covariates={brain.id: brain.given.covariates for brain in study.brains.values()},
+        covariates={brain.id: brain.config.covariates for brain in study.brains.values()},
         reference=study.norm_reference,
-        individuals=study.individuals(study.norm_reference),
+        individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
     script:
         "../scripts/metrics_tables.py"
@@ -57,7 +57,7 @@ rule run_tables:
         ENVIRONMENT
     params:
         folded=study.pairs,
-        growth_of=[study.growth_of(one) for one in study.folded],
+        growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
     script:
         "../scripts/run_tables.py"
 
@@ -102,7 +102,7 @@ rule export:
 
 rule metrics:
     input:
-        [f"{brain.measured.folder}/metrics.csv" for brain in study.brains.values()],
+        [f"{brain.measurement.folder}/metrics.csv" for brain in study.brains.values()],
         rules.metrics_tables.output,
-        rules.run_tables.output if study.folded else [],
+        rules.run_tables.output if study.run_simulations else [],
         rules.validate.input,

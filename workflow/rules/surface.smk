@@ -32,7 +32,7 @@ def surface_settings(*names):
 def pial_settings(wildcards):
     """Return the surface settings for the data of a brain."""
     brain = brain_of(wildcards)
-    if brain.given.source == "shape":
+    if brain.config.source == "shape":
         return {}
     if not brain.labels:
         return surface_settings("edge_length_mm", "max_hole_mm")
@@ -48,11 +48,11 @@ rule shape:
     benchmark:
         f"{BRAIN}/benchmarks/shape.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.given.source == "shape"),
+        brain=brains_with(lambda brain: brain.config.source == "shape"),
     conda:
         ENVIRONMENT
     params:
-        shape=lambda w: brain_of(w).given.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
+        shape=lambda w: brain_of(w).config.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
         "../scripts/shape.py"
 
@@ -66,8 +66,8 @@ for (name, (source, sides)), (suffix, thickness) in product(
         name:
             f"{name}{suffix}"
         input:
-            given=[SHAPE] if source == "shape" else lambda w: brain_of(w).given.files,
-            white=lambda w: list(brain_of(w).given.white_files.values()),
+            given=[SHAPE] if source == "shape" else lambda w: brain_of(w).config.files,
+            white=lambda w: list(brain_of(w).config.white_files.values()),
         output:
             **pial_of(*sides),
             **thickness,
@@ -77,7 +77,7 @@ for (name, (source, sides)), (suffix, thickness) in product(
             f"{BRAIN}/benchmarks/{name}{suffix}.tsv"
         wildcard_constraints:
             brain=brains_with(
-                lambda brain: (brain.given.source, brain.sides, brain.has_thickness)
+                lambda brain: (brain.config.source, brain.sides, brain.has_thickness)
                 == (source, sides, bool(thickness))
             ),
         conda:
@@ -88,10 +88,10 @@ for (name, (source, sides)), (suffix, thickness) in product(
             source=source,
             week=lambda w: brain_of(w).week,
             side=sides[0] if len(sides) == 1 else None,
-            coordinates=lambda w: brain_of(w).given.coordinates,
+            coordinates=lambda w: brain_of(w).config.coordinates,
             labels=lambda w: brain_of(w).labels,
             # also parameters, since swapped input files do not trigger a rerun
-            white=lambda w: brain_of(w).given.white_files,
+            white=lambda w: brain_of(w).config.white_files,
             checksums=lambda w: brain_of(w).checksums,
             settings=pial_settings,
             limits=LIMITS if source == "hemispheres" else {},

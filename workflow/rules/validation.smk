@@ -26,9 +26,9 @@ def prepared_files(start, weeks):
 
 rule validation:
     input:
-        unpack(lambda w: prepared_files(w.brain, simulation_of(w).real)),
-        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
-        whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
+        unpack(lambda w: prepared_files(w.brain, simulation_of(w).observed)),
+        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).observed],
+        whole=lambda w: [real.pial for real in simulation_of(w).observed.values()],
         params=PARAMETERS,
         # reference for the errors of runs that follow no curve
         curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
@@ -43,9 +43,9 @@ rule validation:
     params:
         start_week=lambda w: brain_of(w).week,
         series=lambda w: simulation_of(w).series,
-        weeks=lambda w: list(simulation_of(w).real),
+        weeks=lambda w: list(simulation_of(w).observed),
         run=lambda w: w.run,
-        real=lambda w: [brain.id for brain in simulation_of(w).real.values()],
+        real=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
         kind=lambda w: simulation_of(w).kind,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -54,9 +54,9 @@ rule validation:
 
 rule prediction:
     input:
-        unpack(lambda w: prepared_files(w.brain, simulation_of(w).real)),
-        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).real],
-        whole=lambda w: [real.pial for real in simulation_of(w).real.values()],
+        unpack(lambda w: prepared_files(w.brain, simulation_of(w).observed)),
+        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).observed],
+        whole=lambda w: [real.pial for real in simulation_of(w).observed.values()],
         atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
         mesh=MESH["mesh"],
         data=MESH["data"],
@@ -71,9 +71,9 @@ rule prediction:
         ENVIRONMENT
     params:
         start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: list(simulation_of(w).real),
+        weeks=lambda w: list(simulation_of(w).observed),
         atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
-        of_atlas=lambda w: simulation_of(w).from_others_only,
+        of_atlas=lambda w: simulation_of(w).is_atlas_prediction,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/prediction.py"
@@ -81,15 +81,15 @@ rule prediction:
 
 def deviating(wildcards):
     """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
-    one, week = simulation_of(wildcards), float(wildcards.week)
-    simulated = {"first": one.at(one.start.week), "expected": one.at(week)}
-    return {"start": one.start.measured, **simulated, "real": one.real[week].measured}
+    simulation, week = simulation_of(wildcards), float(wildcards.week)
+    simulated = {"first": simulation.at(simulation.start.week), "expected": simulation.at(week)}
+    return {"start": simulation.start.measurement, **simulated, "real": simulation.observed[week].measurement}
 
 
 def deviation_labels(wildcards):
     """Return the first columns of the deviation table."""
     run, start, week = wildcards.run, wildcards.brain, float(wildcards.week)
-    real = study.simulations[run, start].real[week]
+    real = study.simulations[run, start].observed[week]
     names = {"run": run, "start": start, "week": week}
     return names | {"real": real.id, "subject": real.subject}
 
@@ -154,9 +154,13 @@ rule registration_ceiling:
 
 def onset_surfaces(wildcards):
     """Return the hemispheres of a run and of the observed brains after its start, and the regions of the last brain."""
-    one, real = simulation_of(wildcards), study.chains[wildcards.brain, "self"].brains
-    run_files = {f"run_{side}": [row.parts[side] for row in one.measured] for side in one.start.sides}
-    real_files = {f"real_{side}": [brain.measured.parts[side] for brain in real] for side in one.start.sides}
+    simulation, real = simulation_of(wildcards), study.chains[wildcards.brain, "self"].brains
+    run_files = {
+        f"run_{side}": [row.parts[side] for row in simulation.measurements] for side in simulation.start.sides
+    }
+    real_files = {
+        f"real_{side}": [brain.measurement.parts[side] for brain in real] for side in simulation.start.sides
+    }
     return {**run_files, **real_files, **real[-1].regions}
 
 
@@ -187,24 +191,28 @@ rule onset:
 
 # tables of validation, and the files that are joined in each
 JOINED = {
-    "prediction": [one.file(PREDICTION) for one in study.predictions],
-    "deviation": [one.file(DEVIATION["table"], week=week) for one in study.expected for week in one.real],
-    "validation": [one.file(VALIDATION) for one in study.validated],
-    "registration_ceiling": expand(CEILING, brain=study.carried),
-    "onset": [one.file(ONSET) for one in study.validated_carried],
+    "prediction": [simulation.file(PREDICTION) for simulation in study.predictions],
+    "deviation": [
+        simulation.file(DEVIATION["table"], week=week)
+        for simulation in study.atlas_predictions
+        for week in simulation.observed
+    ],
+    "validation": [simulation.file(VALIDATION) for simulation in study.validated],
+    "registration_ceiling": expand(CEILING, brain=study.registered_starts),
+    "onset": [simulation.file(ONSET) for simulation in study.validated_registered],
 }
 VALIDATION_TABLES = [
     *(name for name, files in JOINED.items() if files),
-    *(["deviation_centiles"] if study.expected else []),
-    *(["displacement_agreement"] if study.carried else []),
+    *(["deviation_centiles"] if study.atlas_predictions else []),
+    *(["displacement_agreement"] if study.registered_starts else []),
 ]
 
 
 rule validation_tables:
     input:
         **JOINED,
-        frames=[one.file(FOLDING["frames"]) for one in study.validated_carried],
-        carried=[one.file(CARRIED_MESH) for one in study.validated_carried],
+        frames=[simulation.file(FOLDING["frames"]) for simulation in study.validated_registered],
+        carried=[simulation.file(CARRIED_MESH) for simulation in study.validated_registered],
     output:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     log:
@@ -214,9 +222,11 @@ rule validation_tables:
     conda:
         ENVIRONMENT
     params:
-        individuals=study.individuals({real.id for one in study.expected for real in one.real.values()}),
+        individuals=study.are_individuals(
+            {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}
+        ),
         # whether the growth of a run was measured by the same registrations
-        carried=[(one.run, one.follows_registration) for one in study.validated_carried],
+        carried=[(simulation.run, simulation.follows_registration) for simulation in study.validated_registered],
     script:
         "../scripts/validation_tables.py"
 

@@ -22,7 +22,7 @@ from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.status import format_duration
-from ..settings.brains import Brain
+from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
 from ..settings.terms import ELEMENTS_NEEDED
@@ -127,10 +127,10 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
 def _contents(study: Study) -> str:
     runs = list(study.config.runs)
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
-    brains, folded = len(study.brains), len(study.folded)
+    brains, folded = len(study.brains), len(study.run_simulations)
     parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
     parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
-    parts += [f"{len(compared.members)} of study {name}" for name, compared in study.comparisons.items()]
+    parts += [f"{len(compared.members)} of study {name}" for name, compared in study.sweeps.items()]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")
     return ", ".join(parts)
@@ -140,7 +140,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
     """Yield for each run, before anything is solved, whether its mesh is too coarse for its cortex at the start."""
     mesh = study.config.mesh
     needed = ELEMENTS_NEEDED[mesh.order]
-    for one in study.folded:
+    for one in study.run_simulations:
         thickness = one.settings.thickness_mm
         # maps and measured thicknesses are known once the surface is made
         if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
@@ -167,7 +167,7 @@ def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
             yield f"brain {brain.id}: {error}", True
 
 
-def _check_files(brain: Brain, config: Config) -> Iterator[str]:
+def _check_files(brain: BrainConfig, config: Config) -> Iterator[str]:
     checksums = known_checksums(config)
     files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
     require_checksums({path: checksums[path] for path in files})
@@ -186,7 +186,7 @@ def _check_files(brain: Brain, config: Config) -> Iterator[str]:
                 read_one_hemisphere(file, brain.hemisphere.side)
 
 
-def _check_labels(volume: str, brain: Brain, scheme: LabelScheme) -> Iterator[str]:
+def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:
     memory = surface_memory_mib(volume, brain.week)
     if memory > max(_memory_mib(), MIN_SURFACE_MIB):
         yield f"needs about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: resample it to larger voxels"

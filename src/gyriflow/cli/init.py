@@ -11,11 +11,11 @@ from ..io.files import read_json, write_json, write_text
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import validated
-from ..settings.brains import Brain
+from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
 from ..study.loading import OF_FOLDING, load
-from ..study.series import why_unmatched
+from ..study.series import unmatched_reason
 from .recognition import SUBJECT_AND_SESSION, UNSET, Recognised, recognise, recognise_labels, scheme_reasons
 
 HEAD = f"""\
@@ -228,7 +228,7 @@ def _leads(scans: Sequence[Recognised], folder: Path) -> bool:
     if all("labels" in brain.entry for brain in scans):
         return True
     dated = [brain.entry for brain in scans if brain.entry["week"] != UNSET and UNSET not in brain.entry.values()]
-    return why_unmatched([validated(Brain, _absolute(entry, folder), entry["id"]) for entry in dated]) is None
+    return unmatched_reason([validated(BrainConfig, _absolute(entry, folder), entry["id"]) for entry in dated]) is None
 
 
 def _absolute(value: object, folder: Path) -> object:

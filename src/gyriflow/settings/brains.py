@@ -44,7 +44,7 @@ class OneHemisphere(Settings):
     """The hemisphere, `left` or `right`."""
 
 
-class Brain(Settings):
+class BrainConfig(Settings):
     """One brain, made from exactly one of `labels`, `hemispheres`, `hemisphere`, `pial` and `shape`."""
 
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)

@@ -6,10 +6,10 @@ from pydantic import Field, PrivateAttr, field_validator
 
 from .atlas import AtlasSettings
 from .base import Settings
-from .brains import Brain
+from .brains import BrainConfig
 from .folding import FoldingSettings
 from .participants import ParticipantsSettings
-from .runs import Calibration, GrowthSettings, Run, RunName, Start, Study, StudyName
+from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings
 from .schemes import SchemeSettings
 from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 
@@ -17,7 +17,7 @@ from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 class Config(Settings):
     """All keys stand in these sections; `folding` is the base of every run."""
 
-    brains: tuple[Brain, ...] = ()
+    brains: tuple[BrainConfig, ...] = ()
     """The brains: those to fold, and others to compare with and to estimate growth from."""
     atlas: tuple[AtlasSettings, ...] = ()
     """Atlases whose weeks are brains: a name, the `atlas.yaml` of your own, a section, or a list of these."""
@@ -37,9 +37,9 @@ class Config(Settings):
     """Folding simulation; `null`, and no `start` or other key of folding: brains are measured only."""
     runs: dict[RunName, Run] = Field({})
     """Runs by name, each with its `start` and what differs from `folding`; `{}`: one run named `reference`."""
-    studies: dict[StudyName, Study] = Field({})
+    studies: dict[StudyName, SweepSettings] = Field({})
     """Studies by name: runs that differ in a few parameters, compared with real brains."""
-    calibrate: Calibration | None = None
+    calibrate: CalibrationSettings | None = None
     """A search for the parameters that meet a real brain best."""
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
@@ -50,7 +50,7 @@ class Config(Settings):
     def _one_or_several(cls, value: Any) -> Any:
         return [value] if isinstance(value, str | dict) else value
 
-    def brain(self, name: str) -> Brain:
+    def brain(self, name: str) -> BrainConfig:
         """Return the brain of an id; KeyError if there is none."""
         for brain in self.brains:
             if brain.id == name:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from .base import KeyProblem, Settings
-from .brains import Brain
+from .brains import BrainConfig
 from .folding import FoldingSettings
 from .growth import SIZES
 from .terms import MAX_NAME_LENGTH, SCORES, Score
@@ -113,18 +113,18 @@ class GrowthSettings(Settings):
 
 
 def growth_series(
-    brains: Sequence[Brain], given: Sequence[str] | Mapping[str, Sequence[str]] | None
+    brains: Sequence[BrainConfig], given: Sequence[str] | Mapping[str, Sequence[str]] | None
 ) -> dict[str, list[str]]:
     """Return the ids of the brains of each growth series that has two weeks or more.
 
     `given` is the setting `brains`; its ids must exist. Only a named series may combine several subjects or
     populations; `all` stands for all brains. Single hemispheres and whole brains are never in one series.
     """
-    series: dict[str, Sequence[Brain]] = {}
+    series: dict[str, Sequence[BrainConfig]] = {}
     if isinstance(given, Mapping):
         series = {name: [brain for brain in brains if brain.id in ids or ALL in ids] for name, ids in given.items()}
     else:
-        groups: dict[tuple[str | None, str | None, str], list[Brain]] = {}
+        groups: dict[tuple[str | None, str | None, str], list[BrainConfig]] = {}
         for brain in brains:
             if given is None or brain.id in given:
                 side = f"{brain.sides[0]} hemisphere" if len(brain.sides) == 1 else ""
@@ -138,16 +138,16 @@ def growth_series(
     return {name: [brain.id for brain in members] for name, members in series.items() if _ages(members) > 1}
 
 
-def _series_by_kind(brains: Sequence[Brain]) -> dict[str, Sequence[Brain]]:
+def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainConfig]]:
     volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
-    by_kind: dict[str, Sequence[Brain]] = {"surface": surfaces, "volume": volumes}
+    by_kind: dict[str, Sequence[BrainConfig]] = {"surface": surfaces, "volume": volumes}
     given = {kind: members for kind, members in by_kind.items() if members}
     # a kind with a single week can only be compared across kinds
     return given if len(given) == 1 or all(_ages(members) > 1 for members in given.values()) else {"all": brains}
 
 
-def _ages(brains: Sequence[Brain]) -> int:
+def _ages(brains: Sequence[BrainConfig]) -> int:
     return len({brain.week for brain in brains})
 
 
@@ -167,7 +167,7 @@ MIN_FIRST_ROUND, MAX_RUNS = 3, 40
 """Limits of a calibration."""
 
 
-class Compared(Settings):
+class ComparisonSettings(Settings):
     """The observed brains of one week that runs are compared with."""
 
     base: str
@@ -179,7 +179,7 @@ class Compared(Settings):
     it has none."""
 
 
-class Study(Compared):
+class SweepSettings(ComparisonSettings):
     """A sweep: a run for each combination of the varied values, compared with observed brains of `compare_week`.
 
     Equal runs are solved once. A run that diverges is reported in the tables; the others continue.
@@ -199,7 +199,7 @@ class Study(Compared):
         return {**self.fixed, **at_first, **values, "end_week": self.compare_week}
 
 
-class Calibration(Compared):
+class CalibrationSettings(ComparisonSettings):
     """A search for the parameters whose brain is most similar to the observed one of a week.
 
     The first round is a scrambled Sobol sequence within the bounds. Later rounds are placed where a Gaussian process
@@ -255,7 +255,7 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
     return type(run).model_validate(raw)
 
 
-def variants(name: str, study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
+def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying fastest."""
     for values in product(*study.vary.values()):
         texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]

@@ -14,10 +14,10 @@ from ..settings.runs import (
     CURVE_KEYS,
     FIRST,
     NOT_VARIED,
-    Compared,
+    ComparisonSettings,
     Run,
     Start,
-    Study,
+    SweepSettings,
     changed,
     growth_series,
     starts_of,
@@ -187,7 +187,7 @@ def studies(config: Config) -> Iterator[KeyProblem]:
                     yield KeyProblem(f"has a run of the name {run}, as {where} has; rename one", key)
 
 
-def _member_problems(study: Study, base: Run, key: Key) -> Iterator[KeyProblem]:
+def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyProblem]:
     if not study.vary:
         yield KeyProblem("found nothing; expected keys of folding with lists of values", (*key, "vary"))
     for value in study.fixed_at:
@@ -217,7 +217,7 @@ def _member_problems(study: Study, base: Run, key: Key) -> Iterator[KeyProblem]:
                 yield KeyProblem(problem.text, (*key, "vary", *problem.key))
 
 
-def _comparison_problems(compared: Compared, config: Config, key: Key) -> Iterator[KeyProblem]:
+def _comparison_problems(compared: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
     weeks, week = {brain.id: brain.week for brain in config.brains}, compared.compare_week
     if compared.base not in config.runs:
         yield KeyProblem(f"found {compared.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from .paths import CALIBRATION, DEVIATION, PUBLISHED, RUN, STUDY
-from .records import Brain, Comparison, Measured, Simulation
+from .records import Brain, Measurement, Simulation, Sweep
 from .registry import AROUND, Figure, Kind, halves_of, measured_by_week, measured_name, surfaces_by_week
 from .study import Study
 
@@ -18,7 +18,7 @@ Given = dict[str, Any]
 def comparison_figures(study: Study) -> Iterator[Figure]:
     """Yield the figures of a study's validation, sweeps and calibration."""
     yield from _validation_figures(study)
-    for sweep in study.comparisons.values():
+    for sweep in study.sweeps.values():
         yield from _sweep_figures(study, sweep)
     if study.calibration and (calibrate := study.config.calibrate):
         tables = {name: f"{CALIBRATION}/{name}.csv" for name in ("runs", "optimum")}
@@ -33,18 +33,18 @@ CALIBRATION_FIGURE = Kind(
 def _validation_figures(study: Study) -> Iterator[Figure]:
     runs = {"runs": list(study.config.runs)}
     if study.validated:
-        ceiling = f"{STUDY}/registration_ceiling.csv" if study.carried else None
+        ceiling = f"{STUDY}/registration_ceiling.csv" if study.registered_starts else None
         yield Figure(VALIDATION, {"validation": f"{STUDY}/validation.csv", "ceiling": ceiling}, runs)
     if study.predictions:
         table = {"prediction": f"{STUDY}/prediction.csv"}
         yield Figure(PREDICTION, table, runs)
         yield Figure(PREDICTION_TABLE, table)
-    for simulation in study.expected:
+    for simulation in study.atlas_predictions:
         yield expected_figure(simulation)
         yield deviation_figure(simulation, "log_area")
         if simulation.start.has_thickness:
             yield deviation_figure(simulation, "thickness_difference_mm")
-    if study.validated_carried:
+    if study.validated_registered:
         yield Figure(ONSET, {"onset": f"{STUDY}/onset.csv"}, runs)
 
 
@@ -108,7 +108,7 @@ EXPECTED = Kind(
 def _deviations(simulation: Simulation) -> dict[float, list[str]]:
     """Return the expected surface and the maps of the real brain's deviation from it, by week."""
     surfaces = surfaces_by_week(simulation)
-    return {week: [surfaces[week], simulation.file(DEVIATION["maps"], week=week)] for week in simulation.real}
+    return {week: [surfaces[week], simulation.file(DEVIATION["maps"], week=week)] for week in simulation.observed}
 
 
 def expected_figure(simulation: Simulation) -> Figure:
@@ -163,38 +163,38 @@ ONSET = Kind(
 # sweeps, which the configuration calls studies
 
 
-def _sweep_figures(study: Study, sweep: Comparison) -> Iterator[Figure]:
+def _sweep_figures(study: Study, sweep: Sweep) -> Iterator[Figure]:
     yield influence_figure(sweep)
     yield influence_spectra(sweep)
     vary = study.config.studies[sweep.name].vary
-    if len(vary) == 1 and sweep.real[_start(sweep).id]:
+    if len(vary) == 1 and sweep.observed[_start(sweep).id]:
         (values,) = vary.values()
         if all(isinstance(value, int | float) for value in values):
             yield nearest_figure(NEAREST, sweep)
             yield nearest_figure(PAPER_NEAREST, sweep, published=PUBLISHED)
 
 
-def _start(sweep: Comparison) -> Brain:
+def _start(sweep: Sweep) -> Brain:
     """Return the start of the first run, whose runs figures show."""
     return sweep.members[0][0].start
 
 
-def _members(sweep: Comparison) -> dict[str, Measured]:
+def _members(sweep: Sweep) -> dict[str, Measurement]:
     """Return the simulated brains from this start at the week of comparison, by run."""
     start = _start(sweep)
     return {simulation.run: simulation.at(sweep.week) for simulation, _ in sweep.members if simulation.start is start}
 
 
-def _sweep_figure(kind: Kind, sweep: Comparison, inputs: Given, **options: Any) -> Figure:
+def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Given, **options: Any) -> Figure:
     """Return a figure of the members of a sweep, some of which may have ended before the week of comparison."""
     start = _start(sweep)
     values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
     may_end = tuple((run, start.id, sweep.week) for run in inputs["members"])
-    shown = {"values": values, "measured": measured_name(sweep.real[start.id][:1]), **options}
+    shown = {"values": values, "measured": measured_name(sweep.observed[start.id][:1]), **options}
     return Figure(kind, inputs, shown, _sweep_names(sweep), may_end)
 
 
-def _sweep_names(sweep: Comparison) -> dict[str, str]:
+def _sweep_names(sweep: Sweep) -> dict[str, str]:
     return {"study": sweep.name, "week": f"{sweep.week:g}"}
 
 
@@ -213,11 +213,11 @@ INFLUENCE = Kind(
 )
 
 
-def influence_figure(sweep: Comparison) -> Figure:
-    real = sweep.real[_start(sweep).id]
+def influence_figure(sweep: Sweep) -> Figure:
+    real = sweep.observed[_start(sweep).id]
     inputs: Given = {
         "members": {run: halves_of(row) for run, row in _members(sweep).items()},
-        "real": halves_of(real[0].measured) if real else None,
+        "real": halves_of(real[0].measurement) if real else None,
     }
     return _sweep_figure(INFLUENCE, sweep, inputs)
 
@@ -238,10 +238,10 @@ INFLUENCE_SPECTRA = Kind(
 )
 
 
-def influence_spectra(sweep: Comparison) -> Figure:
+def influence_spectra(sweep: Sweep) -> Figure:
     inputs: Given = {
         "members": {run: f"{row.folder}/spectra.csv" for run, row in _members(sweep).items()},
-        "real": [f"{brain.measured.folder}/spectra.csv" for brain in sweep.real[_start(sweep).id][:1]],
+        "real": [f"{brain.measurement.folder}/spectra.csv" for brain in sweep.observed[_start(sweep).id][:1]],
     }
     return _sweep_figure(INFLUENCE_SPECTRA, sweep, inputs, week=sweep.week)
 
@@ -264,9 +264,9 @@ PAPER_NEAREST = Kind(
 )
 
 
-def nearest_figure(kind: Kind, sweep: Comparison, **inputs: str) -> Figure:
+def nearest_figure(kind: Kind, sweep: Sweep, **inputs: str) -> Figure:
     start, (varied,) = _start(sweep), sweep.members[0][1]
-    real = [brain.id for brain in sweep.real[start.id][:1]]
+    real = [brain.id for brain in sweep.observed[start.id][:1]]
     options = {"varied": varied, "subject": start.id, "real": real, "week": sweep.week}
     inputs["comparison"] = f"{STUDY}/{sweep.name}/comparison.csv"
     return Figure(kind, inputs, options, _sweep_names(sweep))

@@ -48,7 +48,7 @@ def _brain_figures(study: Study) -> Iterator[Figure]:
         names = {"brain": brain.id}
         yield from (Figure(kind, names=names) for kind in (QUALITY, SMALL, BRAIN_MAPS))
         if brain.has_regions:
-            yield Figure(BRAIN_REGIONS, {"brains": {brain.id: regions_of(brain.measured)}}, names=names)
+            yield Figure(BRAIN_REGIONS, {"brains": {brain.id: regions_of(brain.measurement)}}, names=names)
     yield inputs_figure(study)
     if study.starts:
         yield mesh_quality(study)
@@ -127,7 +127,7 @@ def mesh_quality(study: Study) -> Figure:
 
 def _growth_figures(study: Study) -> Iterator[Figure]:
     # of many subjects that are not folded, charts of metrics and change.csv tell growth; here each would have a panel
-    if study.growing and (len(study.series.brains) <= MAX_SERIES or study.folded):
+    if study.growth_brains and (len(study.series.brains) <= MAX_SERIES or study.run_simulations):
         yield growth_figure(study)
 
 
@@ -156,7 +156,7 @@ def growth_figure(study: Study) -> Figure:
         rate = None
     elif grown and not isinstance(rate, float):
         rate = dict(rate.weeks or {}) if rate.map is None else None
-    options = {"measured": measured_name(brain for _, brain in study.growing), "folding_rate_per_s": rate}
+    options = {"measured": measured_name(brain for _, brain in study.growth_brains), "folding_rate_per_s": rate}
     return Figure(GROWTH_RATES, GROWTH, options)
 
 
@@ -167,20 +167,20 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
     if study.prediction is not None:
         yield predicted_figure(study.prediction, study.atlas_brain(study.prediction))
     for start in study.starts:
-        simulations = [simulation for simulation in study.folded if simulation.start is start]
+        simulations = [simulation for simulation in study.run_simulations if simulation.start is start]
         yield weekly_figure(start, simulations)
         yield outlines_figure(start, simulations)
         yield displacement_maps(start, simulations)
         yield shape_maps(start, simulations)
     zones = set()
-    for simulation in study.folded:
+    for simulation in study.run_simulations:
         if simulation.shapes and "growth" in simulation.settings.fields:
             yield growth_found_figure(simulation)
         if (zoned := repr((simulation.start.id, simulation.settings.model_dump(include=ZONES)))) not in zones:
             zones.add(zoned)
             inputs = {"regions": simulation.file(REGIONS["data"]), "params": simulation.file(PARAMETERS)}
             yield Figure(ZONES_OF_RUN, inputs, names=simulation.names)
-    if study.folded:
+    if study.run_simulations:
         yield Figure(RUNS)
         table, runs = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
         yield Figure(DISPLACEMENT, table, runs)
@@ -202,7 +202,7 @@ PREDICTED = Kind(
 
 def predicted_figure(simulation: Simulation, atlas_brain: Brain) -> Figure:
     start, predicted = simulation.start, f"predicted\n{simulation.weeks[-1]:g} GW"
-    brains = {f"start\n{start.week:g} GW": start.pial, predicted: simulation.measured[-1].parts["whole"]}
+    brains = {f"start\n{start.week:g} GW": start.pial, predicted: simulation.measurements[-1].parts["whole"]}
     brains[f"atlas' own brain\n{atlas_brain.week:g} GW"] = atlas_brain.pial
     options: Given = {"views": THREE_SIDES, "measured": "", "predicted": predicted}
     return Figure(PREDICTED, {"runs": {}, "real": brains}, options, simulation.names)
@@ -293,8 +293,10 @@ SHAPE_MAPS = Kind(
 
 def shape_maps(start: Brain, simulations: list[Simulation]) -> Figure:
     real = measured_by_week(*simulations)
-    brains = {simulation.run: {row.week: halves_of(row) for row in simulation.measured} for simulation in simulations}
-    brains[measured_name(real.values())] = {week: halves_of(brain.measured) for week, brain in real.items()}
+    brains = {
+        simulation.run: {row.week: halves_of(row) for row in simulation.measurements} for simulation in simulations
+    }
+    brains[measured_name(real.values())] = {week: halves_of(brain.measurement) for week, brain in real.items()}
     return Figure(SHAPE_MAPS, {"brains": brains}, {"quantity": "shape_index"}, {"brain": start.id})
 
 
@@ -353,7 +355,7 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
     metrics, spectra = {"metrics": f"{STUDY}/metrics.csv"}, {"spectra": f"{STUDY}/spectra.csv"}
     options = _chart_options(study)
     yield Figure(METRICS, metrics, options)
-    if study.folded:
+    if study.run_simulations:
         yield Figure(METRICS_TABLE, metrics, {"measured": measured_name(study.brains.values())})
     yield Figure(SPECTRA, spectra, options)
     reference = study.norm_reference
@@ -367,7 +369,7 @@ def _chart_options(study: Study) -> Given:
     return {
         "runs": run_names(study.pairs),
         "measured": measured_name([brain for brain in brains if brain.id not in groups] or brains),
-        "subjects": {brain.id: brain.subject for brain in brains if brain.given.subject is not None},
+        "subjects": {brain.id: brain.subject for brain in brains if brain.config.subject is not None},
         "groups": groups,
     }
 
@@ -375,8 +377,8 @@ def _chart_options(study: Study) -> Given:
 def _groups(study: Study) -> dict[str, str]:
     """Return what each measured brain is in the covariate that colours them."""
     brains, wanted = study.brains.values(), study.config.metrics.colour_by
-    for name in [wanted] if wanted else dict.fromkeys(name for brain in brains for name in brain.given.covariates):
-        values = {brain.id: of[name] for brain in brains if name in (of := brain.given.covariates)}
+    for name in [wanted] if wanted else dict.fromkeys(name for brain in brains for name in brain.config.covariates):
+        values = {brain.id: of[name] for brain in brains if name in (of := brain.config.covariates)}
         subjects = {study.brains[brain].subject for brain in values}
         if 1 < len(set(values.values())) <= MAX_COLOURS and (wanted or len(set(values.values())) < len(subjects)):
             return {brain: f"{name}: {value}" for brain, value in values.items()}
@@ -455,12 +457,12 @@ def _region_figures(study: Study) -> Iterator[Figure]:
     tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
     yield Figure(REGIONS_CHART, tables, {"measured": measured_name(brains)})
     simulated = {
-        f"{name}, {simulation.weeks[-1]:g} GW": simulation.measured[-1]
-        for simulation, name in zip(study.folded, run_names(study.pairs), strict=True)
+        f"{name}, {simulation.weeks[-1]:g} GW": simulation.measurements[-1]
+        for simulation, name in zip(study.run_simulations, run_names(study.pairs), strict=True)
         if simulation.has_regions
     }
     if simulated:
-        rows = {brain.id: brain.measured for brain in brains} | simulated
+        rows = {brain.id: brain.measurement for brain in brains} | simulated
         yield Figure(REGIONS_FIGURE, {"brains": {heading: regions_of(row) for heading, row in rows.items()}})
 
 

@@ -1,4 +1,4 @@
-"""The records of a study: what is known of each brain, run and comparison before data are read, and their files."""
+"""Records of a study: brains, simulations and sweeps as the configuration defines them, with their files."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from ..io.volumes import LabelSource
 from ..io.yaml_files import SCHEMES
-from ..settings.brains import Brain as GivenBrain
+from ..settings.brains import BrainConfig
 from ..settings.folding import VARYING
 from ..settings.runs import Run
 from ..settings.terms import MEASURED, Side
@@ -15,16 +15,16 @@ from ..settings.varying import Varying
 from . import paths
 
 Origin = Literal["self", "atlas"]
-"""Whose growth a run has: that of the start's own series, or of another population."""
+"""Source of a run's growth: the start brain's own series, or another population."""
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A brain that is measured, real or simulated.
+class Measurement:
+    """The files of one measured brain, observed or simulated.
 
-    `where` is the folder of its metrics under `results`. `subject` is its id, of a simulated brain that of the start,
-    `run` is "real" for real brains. `surfaces` is the folder of its surfaces. Of what is not known there are no files:
-    the thickness of its cortex, the report with the volumes of its tissues, its regions by side.
+    `where` is the folder of its metrics under `results`, `surfaces` that of its surfaces. `subject` is the brain's id,
+    for a simulated brain that of the start; `run` is "real" for observed brains. Files of thickness, report (volumes of
+    tissues) and regions (by side) are empty if they are not made.
     """
 
     where: str
@@ -43,12 +43,12 @@ class Measured:
 
     @property
     def labels(self) -> dict[str, Any]:
-        """The first columns of its tables."""
+        """The first columns of its tables, with values."""
         return {"subject": self.subject, "run": self.run, "week": self.week}
 
     @property
     def parts(self) -> dict[str, str]:
-        """The files of its surfaces: of the whole, and of its hemispheres."""
+        """The files of its surfaces: whole, left, right."""
         return paths.surfaces_in(self.surfaces, self.sides)
 
     @property
@@ -57,21 +57,21 @@ class Measured:
 
     @property
     def maps(self) -> list[str]:
-        """The files with the maps on its hemispheres."""
+        """The files with the vertex maps of its hemispheres."""
         return [f"{self.folder}/{side}.shape.gii" for side in self.sides]
 
 
 @dataclass(frozen=True, eq=False)
 class Brain:
-    """A brain of the study, as `given` by the configuration.
+    """A brain of the study; `config` is its entry in the configuration.
 
-    `labels` is None where it is given by surfaces. Where it `has_thickness` or `has_white`, the thickness of its cortex
-    and its white surfaces are measured, from its labels or from given white surfaces. Regions of the cortex are
-    `given`, `carried` from another brain, or `named` sulci; its metrics are measured by them where it `has_regions`.
-    `checksums` are the atlas and the SHA-256 of those of its files that are an atlas's, by path.
+    `labels` is None if it is defined by surfaces. `has_thickness` and `has_white` tell whether its cortical thickness
+    and white surfaces are measured, from labels or from white surfaces of the configuration. `regions_from` is the
+    source of its regions: given for this brain, carried from another brain, or named sulci. `has_regions`: its metrics
+    are also measured by region. `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
-    given: GivenBrain
+    config: BrainConfig
     labels: LabelSource | None
     has_thickness: bool
     has_white: bool
@@ -81,38 +81,43 @@ class Brain:
 
     @property
     def id(self) -> str:
-        return self.given.id
+        return self.config.id
 
     @property
     def week(self) -> float:
-        return self.given.week
+        return self.config.week
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        return self.given.sides
+        return self.config.sides
 
     @property
     def subject(self) -> str:
-        """The subject that it is a scan of: itself where none is named."""
-        return self.given.subject or self.id
+        """The subject that was scanned; the brain's own id if none is named."""
+        return self.config.subject or self.id
 
     @property
     def population(self) -> str:
-        """What it is called in tables: its population, or synthetic or unknown."""
-        return self.given.population or ("synthetic" if self.given.synthetic else "unknown")
+        """Its population in tables; "synthetic" or "unknown" if none is named."""
+        return self.config.population or ("synthetic" if self.config.synthetic else "unknown")
 
     def comparable(self, brains: Iterable["Brain"]) -> list["Brain"]:
-        """Return the brains that it may be compared with: of its hemispheres, its population and subject if it has any.
+        """Return the brains with the same hemispheres, population and subject.
 
-        A brain without a subject, as of an atlas, may be compared with any.
+        A brain without a population or subject, as of an atlas, may be compared with any.
         """
-        population, subject = self.given.population, self.given.subject
-        alike = [one for one in brains if population in (None, one.given.population) and one.sides == self.sides]
-        return [one for one in alike if None in (subject, one.given.subject) or one.given.subject == subject]
+        population, subject = self.config.population, self.config.subject
+        return [
+            brain
+            for brain in brains
+            if brain.sides == self.sides
+            and population in (None, brain.config.population)
+            and (None in (subject, brain.config.subject) or brain.config.subject == subject)
+        ]
 
     @property
     def registered(self) -> LabelSource:
-        """The volume by which it is registered: its labels, or a mask made of its surface."""
+        """The volume for its registration: its labels, or a mask made from its surface."""
         return self.labels or LabelSource(paths.MASK.format(brain=self.id), "auto", SCHEMES["binary"])
 
     @property
@@ -121,7 +126,7 @@ class Brain:
 
     @property
     def report(self) -> str:
-        """The report of its surface, with its pose."""
+        """The report of its surface, which contains its pose."""
         return paths.PIAL["report"].format(brain=self.id)
 
     @property
@@ -129,8 +134,8 @@ class Brain:
         return paths.region_files(f"results/brains/{self.id}/metrics") if self.regions_from else {}
 
     @cached_property
-    def measured(self) -> Measured:
-        return Measured(
+    def measurement(self) -> Measurement:
+        return Measurement(
             where=f"brains/{self.id}/metrics",
             subject=self.id,
             run=MEASURED,
@@ -145,10 +150,10 @@ class Brain:
 
 @dataclass(frozen=True)
 class Chain:
-    """A start brain, and the brains of a growth series through which its mesh is carried, one a week.
+    """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
 
-    The files `correspondences` say where the points of each brain are in the next, `posed` for the two whether these
-    are in the poses of their surfaces or in the worlds of their files. Shapes are wanted in `further_weeks`, too.
+    `correspondences` are the files that map each brain to the next; `posed` tells for both whether the map refers to
+    the poses of their surfaces or to the worlds of their files. Shapes are also computed for `further_weeks`.
     """
 
     brains: tuple[Brain, ...]
@@ -179,15 +184,15 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A run from one brain.
+    """A run from one start brain.
 
-    The start's own week is the first of the output `weeks`. `shapes` says whose growth gives the shapes that it grows
-    towards; None where it has rates or sizes. `series` is the growth series with curves of sizes for the start, and
-    `curves` their table where the run follows one. It has the maps of the run `base`: the calibration's for its runs.
+    The first of the output `weeks` is that of the start brain. `shapes` is the source of the shapes that it grows
+    towards; None for growth by rates or sizes. `series` is the growth series with curves of sizes for the start, and
+    `curves` their table if the run follows one. `base` is the run whose maps it uses: its own or the calibration's.
 
-    `compared` are the measured brains of its later weeks, by week, later scans of the start's own subject first; `real`
-    the one of each week that tells what the run is worth. These are `explained` by growth that knows them, or else
-    `predicted`: `from_others_only` by another population's, which has seen no later brain like the start.
+    `observed_brains` are the observed brains of its later weeks, by week, scans of the start's own subject first.
+    `observed`: the brain each week is compared with. `kind` is `explained` if that brain's growth was an input, else
+    `predicted`. `is_atlas_prediction`: growth came from another population only, without later brains of the start's.
     """
 
     run: str
@@ -198,57 +203,57 @@ class Simulation:
     series: str | None
     curves: str | list[str]
     base: str
-    compared: Mapping[float, tuple[Brain, ...]]
-    real: Mapping[float, Brain]
+    observed_brains: Mapping[float, tuple[Brain, ...]]
+    observed: Mapping[float, Brain]
     kind: Literal["explained", "predicted"]
-    from_others_only: bool
+    is_atlas_prediction: bool
     has_regions: bool
 
     @property
     def names(self) -> dict[str, str]:
-        """Its wildcards."""
+        """The values of its wildcards."""
         return {"run": self.run, "brain": self.start.id}
 
     def file(self, pattern: str, **wildcards: str | float) -> str:
-        """Return a file of this simulation by its pattern."""
+        """Return a file of this simulation for a pattern."""
         return paths.file_of(pattern, **self.names, **wildcards)
 
     @property
-    def measured_by_week(self) -> dict[float, Brain]:
-        """The measured brain that it is shown beside, by week, the start at its own week."""
-        return {self.weeks[0]: self.start, **{week: brains[0] for week, brains in self.compared.items()}}
+    def observed_with_start(self) -> dict[float, Brain]:
+        """The first observed brain of each week, with the start brain at its own week."""
+        return {self.weeks[0]: self.start, **{week: brains[0] for week, brains in self.observed_brains.items()}}
 
     @property
     def follows_registration(self) -> bool:
-        """Whether it grows along the registrations of the brains that it is compared with."""
-        return self.shapes is not None and not self.from_others_only
+        """Whether its growth comes from registrations of the brains that it is compared with."""
+        return self.shapes is not None and not self.is_atlas_prediction
 
     @property
     def followed_series(self) -> str | None:
-        """The growth series whose curves it follows; None where it follows none."""
+        """The growth series whose curves it follows, or None."""
         return self.series if self.curves else None
 
     @property
     def targets(self) -> str | list[str]:
-        """The file with the shapes that the run grows towards."""
+        """The file with the shapes that the run grows towards; empty if there are none."""
         return paths.TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
 
     @property
     def mapped(self) -> dict[str, Varying]:
-        """Its parameters that the user gives a map of."""
+        """Its parameters that have a map."""
         values = {name: getattr(self.settings, name) for name in VARYING}
         return {name: value for name, value in values.items() if isinstance(value, Varying) and value.map is not None}
 
     @property
     def maps(self) -> str | list[str]:
-        """The file with the maps of its parameters and the shapes that it grows towards; none where it has neither."""
+        """The file with the maps of its parameters and its target shapes; empty if it has neither."""
         return paths.MAPS.format(run=self.base, brain=self.start.id) if self.shapes or self.mapped else []
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """The settings for its `params.yaml`, where a map goes by the name of its parameter.
+        """The settings for its `params.yaml`. A map has the name of its parameter.
 
-        The number of ranks is left out, since no result depends on it.
+        The number of ranks is left out, since results do not depend on it.
         """
         settings = self.settings.model_dump(mode="json", exclude={"ranks", "start"})
         settings["growth"] = self.settings.growth.own_keys()
@@ -258,12 +263,12 @@ class Simulation:
                 settings[name] = curve | ({"map": name} if value.map is not None else {})
         return settings
 
-    def at(self, week: float) -> Measured:
-        """Return the simulated brain of a week."""
-        metrics, of_week = f"runs/{self.run}/{self.start.id}/metrics", paths.file_of(paths.WEEK, week=week)
-        surfaces = f"{self.file(paths.RUN)}/surfaces/{of_week}"
-        return Measured(
-            where=f"{metrics}/{of_week}",
+    def at(self, week: float) -> Measurement:
+        """Return the measurement of the simulated brain at a week."""
+        metrics, week_folder = f"runs/{self.run}/{self.start.id}/metrics", paths.file_of(paths.WEEK, week=week)
+        surfaces = f"{self.file(paths.RUN)}/surfaces/{week_folder}"
+        return Measurement(
+            where=f"{metrics}/{week_folder}",
             subject=self.start.id,
             run=self.run,
             week=week,
@@ -271,44 +276,44 @@ class Simulation:
             surfaces=surfaces,
             thickness=f"{surfaces}/thickness.shape.gii",
             report=[],
-            # those of a run hold at all its weeks
+            # the regions of a run are the same at all its weeks
             regions=paths.region_files(f"results/{metrics}") if self.has_regions else {},
         )
 
     @property
-    def measured(self) -> list[Measured]:
+    def measurements(self) -> list[Measurement]:
         return [self.at(week) for week in self.weeks]
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """What the configuration calls a study: runs that differ in a few parameters, beside real brains of one week.
+class Sweep:
+    """A sweep (key `studies`): runs that differ in a few parameters, compared with observed brains of one week.
 
-    `members` are each run with each brain that it folds, and the varied values, in the order of the study; `real` are
-    the brains that runs from a start are compared with, by its id.
+    `members` are its simulations with the varied values, in order. `observed` are the brains that simulations from a
+    start brain are compared with, by the id of the start brain.
     """
 
     name: str
     week: float
     members: tuple[tuple[Simulation, Mapping[str, Any]], ...]
-    real: Mapping[str, tuple[Brain, ...]]
+    observed: Mapping[str, tuple[Brain, ...]]
 
 
 @dataclass(frozen=True)
 class CalibrationRuns:
-    """Rounds of runs that differ from those of `base`, each round's parameters chosen from the scores of earlier ones.
+    """Rounds of runs that differ from `base`. The parameters of a round depend on the scores of earlier rounds.
 
-    `rounds` has the round of each run, `real` the brains to be met by the id of the start.
+    `rounds` has the round of each run, `observed` the target brains by the id of the start brain.
     """
 
     base: tuple[Simulation, ...]
     rounds: Mapping[str, int]
-    real: Mapping[str, tuple[Brain, ...]]
+    observed: Mapping[str, tuple[Brain, ...]]
 
     def scores_before(self, number: int) -> list[str]:
-        """Return the scores of all runs of the rounds before one."""
-        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run, of_run in self.rounds.items() if of_run < number]
+        """Return the score files of all runs in earlier rounds."""
+        return [f"{paths.CALIBRATION}/scores/{run}.csv" for run, run_round in self.rounds.items() if run_round < number]
 
     def design(self, run: str) -> str:
-        """Return the table with the parameters of a run and the others of its round."""
+        """Return the table with the parameters of all runs in the round of a run."""
         return f"{paths.CALIBRATION}/round-{self.rounds[run]}.csv"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..settings.terms import REAL_BRAIN
-from .records import Brain, Measured, Simulation
+from .records import Brain, Measurement, Simulation
 
 AROUND = ["left", "right", "top", "bottom"]
 THREE_SIDES = ["left", "top", "bottom"]
@@ -138,10 +138,10 @@ def measured_name(brains: Iterable[Brain]) -> str:
     populations: dict[str, set[float]] = {}
     kinds = set()
     for brain in brains:
-        if brain.given.shape is not None:
-            kinds.add(brain.given.shape.kind)
+        if brain.config.shape is not None:
+            kinds.add(brain.config.shape.kind)
         else:
-            populations.setdefault(brain.given.population or REAL_BRAIN, set()).add(brain.week)
+            populations.setdefault(brain.config.population or REAL_BRAIN, set()).add(brain.week)
     names = list(populations)
     if len(names) > 1:
         spans = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
@@ -151,21 +151,21 @@ def measured_name(brains: Iterable[Brain]) -> str:
     return " or ".join(names) or REAL_BRAIN
 
 
-def halves_of(row: Measured) -> list[list[str]]:
+def halves_of(row: Measurement) -> list[list[str]]:
     """Return the hemispheres of a measured brain, each with its maps."""
     return [list(pair) for pair in zip(row.hemispheres, row.maps, strict=True)]
 
 
-def regions_of(row: Measured) -> list[list[str]]:
+def regions_of(row: Measurement) -> list[list[str]]:
     """Return the hemispheres of a measured brain, each with its regions."""
     return [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
 
 
 def surfaces_by_week(simulation: Simulation) -> dict[float, str]:
     """Return the surfaces of the simulated brains by week."""
-    return {row.week: row.parts["whole"] for row in simulation.measured}
+    return {row.week: row.parts["whole"] for row in simulation.measurements}
 
 
 def measured_by_week(*simulations: Simulation) -> dict[float, Brain]:
     """Return the measured brains that are shown with simulations, by week."""
-    return {week: brain for simulation in simulations for week, brain in simulation.measured_by_week.items()}
+    return {week: brain for simulation in simulations for week, brain in simulation.observed_with_start.items()}

@@ -1,11 +1,11 @@
-"""The growth series of a study: the brains that growth is taken from, and how they correspond."""
+"""Growth series of a study: the brains that growth is measured on, and their correspondences."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from ..settings.brains import Brain as GivenBrain
+from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.runs import growth_series
 from .atlases import used_atlases
@@ -15,10 +15,10 @@ from .records import Brain
 
 @dataclass(frozen=True)
 class Series:
-    """The brains of each growth series by its name, in the order of the configuration, and how they correspond.
+    """The brains of each growth series, by name in the order of the configuration.
 
-    Of several series that a brain may have, one is `preferred`. `matched` are the ids of brains whose surfaces have the
-    same vertices, by series; `unmatched` says why the vertices of other series of surfaces are not.
+    `preferred` is the series to choose if several are possible. `matched` has the ids of brains with vertex-matched
+    surfaces, by series; `unmatched` has the reasons why other series of surfaces are not matched.
     """
 
     brains: Mapping[str, tuple[Brain, ...]]
@@ -27,80 +27,83 @@ class Series:
     unmatched: Mapping[str, str]
 
     def with_brain(self, brain: Brain) -> str:
-        """Return the series that a brain is in, of several the preferred one; "" for none."""
+        """Return the series that contains a brain (the preferred one of several), or ""."""
         names = [name for name, brains in self.brains.items() if brain in brains]
         return min(names, key=lambda name: name != self.preferred, default="")
 
     def for_sizes(self, brain: Brain) -> str | None:
-        """Return the series whose curves a start brain follows: the preferred one, that with it, or the only one.
+        """Return the series whose curves a start brain follows: the preferred one, its own, or the only other one.
 
-        The scans of another subject are none of these but where they are preferred.
+        A series of scans of another subject is used only if it is preferred.
         """
         if self.preferred is not None:
             return self.preferred if self.preferred in self.brains else None
         own = [name for name, brains in self.brains.items() if brain in brains]
-        others = [name for name in self.brains if not self._of_one_subject(name)]
-        return next(iter(own or (others if len(others) == 1 else [])), None)
+        populations = [name for name in self.brains if not self._is_single_subject(name)]
+        return next(iter(own or (populations if len(populations) == 1 else [])), None)
 
-    def of_others(self, start: Brain) -> list[str]:
-        """Return the series of other populations with a brain's hemispheres; of several, the preferred one alone.
+    def of_other_populations(self, start: Brain) -> list[str]:
+        """Return the series of other populations with a brain's hemispheres; only the preferred one, if it is one.
 
-        The scans of one other subject are a series only where they are preferred.
+        A series of scans of another subject is returned only if it is preferred.
         """
-        population = start.given.population
+        population = start.config.population
         names = [
             name
             for name, brains in self.brains.items()
             if start not in brains
-            and (name == self.preferred or not self._of_one_subject(name))
+            and (name == self.preferred or not self._is_single_subject(name))
             and all(brain.sides == start.sides for brain in brains)
-            and all(population is None or brain.given.population != population for brain in brains)
+            and all(population is None or brain.config.population != population for brain in brains)
         ]
         return [self.preferred] if self.preferred in names else names
 
-    def _of_one_subject(self, name: str) -> bool:
+    def _is_single_subject(self, name: str) -> bool:
         brains = self.brains[name]
-        return brains[0].given.subject is not None and not several_subjects(brains)
+        return brains[0].config.subject is not None and not several_subjects(brains)
 
     def are_matched(self, *brains: Brain) -> bool:
         """Return whether brains have surfaces with the same vertices."""
         return any({brain.id for brain in brains} <= ids for ids in self.matched.values())
 
     def correspondence(self, earlier: Brain, later: Brain) -> str:
-        """Return the file that says where one brain's points are in another: by matched vertices, or registration."""
+        """Return the file with the correspondence of two brains, by matched vertices or by registration."""
         file = MATCHED if self.are_matched(earlier, later) else REGISTERED
         return file.format(earlier=earlier.id, later=later.id)
 
     def posed(self, *pair: Brain) -> list[bool]:
-        """Return for two brains whether they correspond in the pose of their surfaces, as masks of surfaces do.
+        """Return for each of two brains whether their correspondence refers to the pose of its surface.
 
-        Others correspond in the world of their files.
+        This is the case for masks made from surfaces. Otherwise it refers to the world of its files.
         """
-        return [not brain.given.has_labels and not self.are_matched(*pair) for brain in pair]
+        return [not brain.config.has_labels and not self.are_matched(*pair) for brain in pair]
 
 
 def several_subjects(brains: Iterable[Brain]) -> bool:
-    """Return whether brains are not of one subject, or an atlas', which names none."""
-    return len({brain.given.subject for brain in brains}) > 1
+    """Return whether brains have different subjects. Brains without a subject, as of an atlas, count as one."""
+    return len({brain.config.subject for brain in brains}) > 1
 
 
 def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
     """Return the growth series of a configuration among some of its brains.
 
-    Surfaces are read to tell whether their vertices are matched, but for files of an atlas that are missing still: its
-    description is believed.
+    Surfaces are read to find whether their vertices are matched. For files of an atlas that are not downloaded yet, the
+    atlas' description counts.
     """
-    names = growth_series([brain.given for brain in brains.values()], config.growth.brains)
-    believed = {
-        str(f.path) for used in used_atlases(config) for f in used.missing if used.atlas.series[f.series].matched
+    names = growth_series([brain.config for brain in brains.values()], config.growth.brains)
+    assumed = {
+        str(file.path)
+        for used in used_atlases(config)
+        for file in used.missing
+        if used.atlas.series[file.series].matched
     }
     matched, unmatched = {}, {}
     for name, ids in names.items():
-        given = sorted((brains[brain].given for brain in ids), key=lambda brain: brain.week)
-        if all(brain.has_vertices for brain in given):
+        members = sorted((brains[brain].config for brain in ids), key=lambda brain: brain.week)
+        if all(brain.has_vertices for brain in members):
             cause: str | None = "growth.matched_surfaces is false"
             if config.growth.matched_surfaces:
-                cause = why_unmatched(given, believed)
+                cause = unmatched_reason(members, assumed)
             if cause is None:
                 matched[name] = frozenset(ids)
             else:
@@ -109,29 +112,29 @@ def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
     return Series(series, config.growth.series, matched, unmatched)
 
 
-def why_unmatched(brains: Sequence[GivenBrain], believed: Collection[str] = ()) -> str | None:
-    """Return why the surfaces of brains are not matched by their vertices; None where they are.
+def unmatched_reason(brains: Sequence[BrainConfig], assumed: Collection[str] = ()) -> str | None:
+    """Return why the surfaces of brains are not vertex-matched, or None if they are.
 
-    They are where all brains are given by surface files of one kind, with as many vertices and the same triangles for
-    each hemisphere. Files that are `believed` to be so need not be there.
+    They are matched if all brains have surface files of the same kind, with as many vertices and the same triangles for
+    each hemisphere. Files in `assumed` count as matched and may not exist yet.
     """
-    # files are looked at where growth by vertices is planned, which few configurations ask for
+    # imported here, since few configurations need it
     from ..io.surfaces import connectivity
 
     first = brains[0]
     for brain in brains:
         if brain.source != first.source:
             return f"{brain.id} is given as {brain.source}, {first.id} as {first.source}"
-    read = [brain for brain in brains if not believed or not all(path in believed for path in brain.files)]
+    read = [brain for brain in brains if not assumed or not all(path in assumed for path in brain.files)]
     try:
         sides = [[connectivity(Path(path)) for path in brain.files] for brain in read]
     except InputError as error:
         return str(error)
-    for brain, others in zip(read, sides, strict=True):
-        for one, two in zip(sides[0], others, strict=True):
-            if one[:2] != two[:2]:
-                has = f"{brain.id} has {two[0]} vertices and {two[1]} triangles"
-                return f"{has} where {read[0].id} has {one[0]} and {one[1]}"
-            if one != two:
+    for brain, brain_sides in zip(read, sides, strict=True):
+        for expected, found in zip(sides[0], brain_sides, strict=True):
+            if expected[:2] != found[:2]:
+                text = f"{brain.id} has {found[0]} vertices and {found[1]} triangles"
+                return f"{text}, but {read[0].id} has {expected[0]} and {expected[1]}"
+            if expected != found:
                 return f"{brain.id} has other triangles than {read[0].id}"
     return None

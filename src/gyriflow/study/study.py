@@ -1,4 +1,4 @@
-"""A study as it was resolved from its configuration: its records, and what is joined from all of them."""
+"""A resolved study: its records, and selections of them for rules, tables and the report."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import used_atlases
-from .records import Brain, CalibrationRuns, Chain, Comparison, Measured, Origin, Simulation
+from .records import Brain, CalibrationRuns, Chain, Measurement, Origin, Simulation, Sweep
 from .series import Series, several_subjects
 
 
 @dataclass(frozen=True)
 class Study:
-    """All that a configuration asks for, without the brains that were refused, which `config` still has.
+    """Everything a configuration asks for. Refused brains are in `config`, not in `brains`.
 
-    `simulations` are by run and start: of `runs`, of studies, and of the calibration. `chains` are the brains behind
-    the growth of a start, by its id and whose growth it is. `comparisons` are what the configuration calls studies.
-    `unreachable` says why starts are not folded.
+    `simulations` are those of runs, sweeps and calibration, by run and start brain. `chains` are the brains that a
+    start brain's growth comes from, by its id and the origin of growth. `unreachable` has the reasons why start brains
+    are not folded.
     """
 
     config: Config
@@ -31,131 +31,140 @@ class Study:
     series: Series
     simulations: Mapping[tuple[str, str], Simulation]
     chains: Mapping[tuple[str, Origin], Chain]
-    comparisons: Mapping[str, Comparison]
+    sweeps: Mapping[str, Sweep]
     calibration: CalibrationRuns | None
     unreachable: Mapping[str, InputError]
 
     @cached_property
-    def folded(self) -> list[Simulation]:
-        """The simulations of `runs`."""
-        return [one for one in self.simulations.values() if one.run in self.config.runs]
+    def run_simulations(self) -> list[Simulation]:
+        """The simulations of `runs`, without those of sweeps and calibration."""
+        return [simulation for simulation in self.simulations.values() if simulation.run in self.config.runs]
 
     @cached_property
     def may_diverge(self) -> list[str]:
-        """The runs of studies and of the calibration."""
+        """The runs of sweeps and of the calibration, which may diverge without stopping the study."""
         return list(dict.fromkeys(run for run, _ in self.simulations if run not in self.config.runs))
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        return [(one.run, one.start.id) for one in self.folded]
+        return [(simulation.run, simulation.start.id) for simulation in self.run_simulations]
 
     def files(self, *patterns: str) -> list[str]:
-        """Return the files of patterns for each of `folded`."""
-        return [one.file(pattern) for one in self.folded for pattern in patterns]
+        """Return the files of patterns for each of `run_simulations`."""
+        return [simulation.file(pattern) for simulation in self.run_simulations for pattern in patterns]
 
     @cached_property
     def starts(self) -> list[Brain]:
-        """The brains that some of `runs` folds, in the order of `brains`."""
-        starts = {one.start for one in self.folded}
+        """The start brains of `runs`, in the order of `brains`."""
+        starts = {simulation.start for simulation in self.run_simulations}
         return [brain for brain in self.brains.values() if brain in starts]
 
     @cached_property
-    def growing(self) -> list[tuple[str, Brain]]:
-        """The series and brain of all that growth is measured on, the earliest of each series first."""
+    def growth_brains(self) -> list[tuple[str, Brain]]:
+        """Series and brain of all brains that growth is measured on, in the order of weeks within a series."""
         series = self.series.brains
         return [(name, brain) for name in series for brain in sorted(series[name], key=lambda brain: brain.week)]
 
     @property
     def with_thickness_curve(self) -> list[str]:
-        """The ids of the brains whose cortical thickness gives a curve, where some run follows it."""
-        followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
-        return [brain.id for _, brain in self.growing if followed and brain.has_thickness]
+        """The ids of the brains whose cortical thickness gives a curve, if a run follows it."""
+        is_followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
+        return [brain.id for _, brain in self.growth_brains if is_followed and brain.has_thickness]
 
     @property
     def unmatched_starts(self) -> dict[str, str]:
-        """Why the surfaces of a growth series with a start brain are not matched, by the series' name."""
+        """The reasons why the surfaces of start brains' growth series are not matched, by series."""
         starts = set(self.starts)
-        return {name: why for name, why in self.series.unmatched.items() if starts & set(self.series.brains[name])}
+        reasons = self.series.unmatched
+        return {name: reason for name, reason in reasons.items() if starts & set(self.series.brains[name])}
 
-    def growth_of(self, one: Simulation) -> str:
-        """Return in words whose measured growth a simulation follows; "" where it follows none."""
-        if one.shapes:
-            brains, name = self.chains[one.start.id, one.shapes].brains, self.series.with_brain(one.start)
-            if one.shapes == "atlas":
-                brains, name = brains[1:], self.series.with_brain(brains[1])
+    def growth_source(self, simulation: Simulation) -> str:
+        """Describe whose measured growth a simulation follows, or return ""."""
+        if simulation.shapes:
+            brains = self.chains[simulation.start.id, simulation.shapes].brains
+            brains = brains[1:] if simulation.shapes == "atlas" else brains
+            name = self.series.with_brain(brains[0])
         else:
-            name = one.followed_series or ""
+            name = simulation.followed_series or ""
             brains = self.series.brains.get(name, ())
         if several_subjects(brains):
             return f"population {name}"
-        return "own" if one.start in brains else f"series {name}" if brains else ""
+        return "own" if simulation.start in brains else f"series {name}" if brains else ""
 
-    # what runs are worth
+    # comparison with observed brains
 
     @cached_property
     def validated(self) -> list[Simulation]:
-        """The simulations that are compared with some real brain."""
-        return [one for one in self.folded if one.real]
+        """The simulations of runs that are compared with an observed brain."""
+        return [simulation for simulation in self.run_simulations if simulation.observed]
 
     @cached_property
     def references(self) -> dict[tuple[str, float], tuple[Brain, Brain]]:
-        """By start and week the real brain that runs are compared with, and the latest comparable real one before."""
+        """The observed brain, and the latest comparable one of an earlier week, by start brain and week."""
         references = {}
-        for one in self.validated:
-            alike = [brain for brain in one.start.comparable(self.brains.values()) if not brain.given.synthetic]
-            for week, real in one.real.items():
-                before = [brain for brain in alike if brain.week < week]
-                references[one.start.id, week] = real, max(before, key=lambda brain: brain.week)
+        for simulation in self.validated:
+            comparable = simulation.start.comparable(self.brains.values())
+            candidates = [brain for brain in comparable if not brain.config.synthetic]
+            for week, observed in simulation.observed.items():
+                earlier = [brain for brain in candidates if brain.week < week]
+                references[simulation.start.id, week] = observed, max(earlier, key=lambda brain: brain.week)
         return references
 
     @cached_property
-    def expected(self) -> list[Simulation]:
-        """Those of them that say what was to be expected of a real brain."""
-        return [one for one in self.validated if one.from_others_only]
+    def atlas_predictions(self) -> list[Simulation]:
+        """The validated simulations that are predictions by an atlas' growth."""
+        return [simulation for simulation in self.validated if simulation.is_atlas_prediction]
 
     @cached_property
     def prediction(self) -> Simulation | None:
-        """The one simulation of a study that folds no other, where it is a prediction by the growth of an atlas."""
-        return self.folded[0] if len(self.folded) == 1 and self.folded[0].from_others_only else None
+        """The only simulation of the study if it is a prediction by an atlas' growth, else None."""
+        simulations = self.run_simulations
+        return simulations[0] if len(simulations) == 1 and simulations[0].is_atlas_prediction else None
 
-    def atlas_brain(self, one: Simulation) -> Brain:
-        """Return the brain, of those whose growth a prediction has, that is nearest in week to its end."""
-        return min(self.chains[one.start.id, "atlas"].later, key=lambda brain: abs(brain.week - one.weeks[-1]))
+    def atlas_brain(self, simulation: Simulation) -> Brain:
+        """Return the brain of a prediction's atlas that is closest in week to its end."""
+        end = simulation.weeks[-1]
+        return min(self.chains[simulation.start.id, "atlas"].later, key=lambda brain: abs(brain.week - end))
 
     @cached_property
     def predictions(self) -> list[Simulation]:
-        """Those that say it, and other predictions from the same starts beside them."""
-        starts = {one.start for one in self.expected}
-        return [one for one in self.validated if one.start in starts and one.kind == "predicted"]
+        """The `atlas_predictions`, and other predictions from the same start brains."""
+        starts = {simulation.start for simulation in self.atlas_predictions}
+        return [
+            simulation for simulation in self.validated if simulation.start in starts and simulation.kind == "predicted"
+        ]
 
     @cached_property
-    def validated_carried(self) -> list[Simulation]:
-        """Those of them whose start is registered with later brains of its series."""
-        return [one for one in self.validated if self.chains[one.start.id, "self"].later]
+    def validated_registered(self) -> list[Simulation]:
+        """The validated simulations whose start brain is registered to later brains of its series."""
+        return [simulation for simulation in self.validated if self.chains[simulation.start.id, "self"].later]
 
     @property
-    def carried(self) -> list[str]:
-        """The ids of their start brains."""
-        starts = {one.start for one in self.validated_carried}
+    def registered_starts(self) -> list[str]:
+        """The ids of the start brains of `validated_registered`."""
+        starts = {simulation.start for simulation in self.validated_registered}
         return [start.id for start in self.starts if start in starts]
 
     def ceiling_weeks(self, brain: str) -> list[float]:
-        """Return the compared weeks that a start brain's mesh is carried to."""
+        """Return the validated weeks to which a start brain's mesh is carried."""
         return [week for week in self.chains[brain, "self"].later_weeks if (brain, week) in self.references]
 
-    # what is measured
+    # measurements
 
     @cached_property
-    def measured(self) -> dict[str, Measured]:
-        """All that the tables of the study are of, real and simulated, by folder."""
-        rows = [brain.measured for brain in self.brains.values()]
-        return {row.where: row for row in (*rows, *(row for one in self.folded for row in one.measured))}
+    def measurements(self) -> dict[str, Measurement]:
+        """The measurements in the tables of the study, of observed and simulated brains, by folder."""
+        rows = [brain.measurement for brain in self.brains.values()]
+        return {
+            row.where: row
+            for row in (*rows, *(row for simulation in self.run_simulations for row in simulation.measurements))
+        }
 
     @cached_property
-    def places(self) -> dict[str, Measured]:
-        """All that is measured by folder, the runs of studies at the weeks of comparison among it."""
-        rows = [member.at(study.week) for study in self.comparisons.values() for member, _ in study.members]
-        return {**{row.where: row for row in rows}, **self.measured}
+    def all_measurements(self) -> dict[str, Measurement]:
+        """All measurements by folder, including those of sweeps at their week of comparison."""
+        rows = [simulation.at(sweep.week) for sweep in self.sweeps.values() for simulation, _ in sweep.members]
+        return {**{row.where: row for row in rows}, **self.measurements}
 
     @property
     def surfaces(self) -> list[str]:
@@ -171,83 +180,84 @@ class Study:
     @property
     def folded_surfaces(self) -> list[str]:
         return [
-            one.file(file, week=week)
-            for one in self.folded
-            for file in paths.folded_of(*one.start.sides).values()
-            for week in one.weeks
+            simulation.file(file, week=week)
+            for simulation in self.run_simulations
+            for file in paths.folded_of(*simulation.start.sides).values()
+            for week in simulation.weeks
         ]
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:
-        """The atlas of each brain that is of one, by id."""
+        """The atlas of each brain that belongs to one, by id."""
         return {
             used.atlas.brain_id(file.series, file.week): used.atlas
             for used in used_atlases(self.config)
             for file in used.files
         }
 
-    def individuals(self, brains: Iterable[str]) -> bool:
-        """Return whether measured brains differ as individuals do: none is of an atlas, which has averages.
+    def are_individuals(self, ids: Iterable[str]) -> bool:
+        """Return whether brains are individuals, not averages of an atlas.
 
-        Brains of no named subject that are half a week or more apart may be an atlas' as well.
+        Brains without named subjects at intervals of half a week or more may be the averages of an unknown atlas.
         """
-        given = [self.brains[brain].given for brain in brains]
-        weeks = sorted(brain.week for brain in given)
-        told = all(brain.subject for brain in given) or any(late - early < 0.5 for early, late in pairwise(weeks))
-        return told and not any(brain.id in self.atlases for brain in given)
+        brains = [self.brains[brain].config for brain in ids]
+        weeks = sorted(brain.week for brain in brains)
+        has_subjects = all(brain.subject for brain in brains)
+        is_dense = any(late - early < 0.5 for early, late in pairwise(weeks))
+        return (has_subjects or is_dense) and not any(brain.id in self.atlases for brain in brains)
 
     @cached_property
     def norm_reference(self) -> list[str]:
-        """The ids of the measured brains that others are compared with: the given ones, or else all real ones.
+        """The ids of the brains that form the norm: those of the configuration, or else all observed brains.
 
-        They have the hemispheres of the first start brain: half a brain is no measure of whole ones. If none are given
-        and the real ones are of several populations, those of the start's are used.
+        They have the hemispheres of the first start brain. By default, if there are several populations, only the start
+        brain's is used.
         """
-        # where nothing is to be folded, the first brain stands for the start
+        # without runs, the first brain takes the place of the start brain
         first = self.starts or ([] if self.config.runs else list(self.brains.values()))
         if not first:
             return []
-        start, given = first[0], self.config.metrics.norm_reference
-        alike = [brain for brain in self.brains.values() if brain.sides == start.sides]
-        if given is not None:
-            named = {brain: atlas.name for brain, atlas in self.atlases.items()}
-            return [brain.id for brain in alike if {brain.id, named.get(brain.id)} & set(given)]
-        real = [brain for brain in alike if not brain.given.synthetic]
-        if len({brain.given.population for brain in real}) > 1:
-            real = [brain for brain in real if brain.given.population == start.given.population]
-        return [brain.id for brain in real]
+        start, reference = first[0], self.config.metrics.norm_reference
+        candidates = [brain for brain in self.brains.values() if brain.sides == start.sides]
+        if reference is not None:
+            atlas_names = {brain: atlas.name for brain, atlas in self.atlases.items()}
+            return [brain.id for brain in candidates if {brain.id, atlas_names.get(brain.id)} & set(reference)]
+        observed = [brain for brain in candidates if not brain.config.synthetic]
+        if len({brain.config.population for brain in observed}) > 1:
+            observed = [brain for brain in observed if brain.config.population == start.config.population]
+        return [brain.id for brain in observed]
 
     @property
     def scans(self) -> dict[str, list[str]]:
-        """The ids of the brains of each subject that was scanned at several weeks, by week."""
+        """The ids of the scans of each subject that was scanned several times, in the order of weeks."""
         scans: dict[str, list[str]] = {}
-        for brain in sorted(self.brains.values(), key=lambda brain: (brain.given.subject or "", brain.week)):
-            if brain.given.subject is not None:
-                scans.setdefault(brain.given.subject, []).append(brain.id)
+        for brain in sorted(self.brains.values(), key=lambda brain: (brain.config.subject or "", brain.week)):
+            if brain.config.subject is not None:
+                scans.setdefault(brain.config.subject, []).append(brain.id)
         return {subject: ids for subject, ids in scans.items() if len(ids) > 1}
 
     # regions, and maps at the vertices of the template
 
-    def giver_of_regions(self, brain: str) -> Brain:
-        """Return the brain with given regions that is nearest in week."""
-        week = self.brains[brain].week
-        given = [one for one in self.brains.values() if one.regions_from == "given"]
-        return min(given, key=lambda other: abs(other.week - week))
+    def region_source(self, name: str) -> Brain:
+        """Return the brain with regions of its own that is closest in week to a brain."""
+        week = self.brains[name].week
+        sources = [brain for brain in self.brains.values() if brain.regions_from == "given"]
+        return min(sources, key=lambda brain: abs(brain.week - week))
 
-    def template_sides(self, row: Measured) -> list[Side]:
+    def template_sides(self, row: Measurement) -> list[Side]:
         """Return the hemispheres of a brain that have maps at the template's vertices."""
-        # it may have been refused
+        # the template may have been refused
         template = self.brains.get(self.config.metrics.template or "")
         return [side for side in row.sides if template is not None and side in template.sides]
 
     @property
     def exported(self) -> list[dict[str, Any]]:
-        """What the export needs to know of each brain that is measured: names, and files by side."""
-        return [self._exported(row, self.brains[row.subject]) for row in self.measured.values()]
+        """Names and files, by side, of each measured brain for the export."""
+        return [self._exported(row, self.brains[row.subject]) for row in self.measurements.values()]
 
-    def _exported(self, row: Measured, brain: Brain) -> dict[str, Any]:
-        real = row.run == MEASURED
-        white = paths.white_of(*row.sides) if real and brain.has_white else {}
+    def _exported(self, row: Measurement, brain: Brain) -> dict[str, Any]:
+        is_observed = row.run == MEASURED
+        white = paths.white_of(*row.sides) if is_observed and brain.has_white else {}
         whites = {name: file.format(brain=brain.id) for name, file in white.items()}
         sides = [side for side in row.sides if whites]
         template = {side: paths.TEMPLATE_MAPS.format(where=row.where, side=side) for side in self.template_sides(row)}
@@ -261,24 +271,24 @@ class Study:
             "maps": {side: f"{row.folder}/{side}.shape.gii" for side in row.sides},
             "regions": dict(zip(SIDES, row.regions.values(), strict=False)),
             "report": brain.report,
-            "covariates": brain.given.covariates,
+            "covariates": brain.config.covariates,
             "white": {side: whites[f"{side}_surface"] for side in sides},
             "white_maps": {side: whites[f"{side}_maps"] for side in sides},
             "template": self.config.metrics.template,
             "template_maps": template,
-            "volume": volume if brain.labels and not real else {},
+            "volume": volume if brain.labels and not is_observed else {},
         }
 
-    # what the report and the table of quality say beside figures
+    # contents of the report and of the table of quality besides figures
 
     @property
     def used_settings(self) -> dict[str, Any]:
-        """The configuration; the brains of the atlas are among the brains by now."""
+        """The configuration. Brains of atlases and of the table of participants are already among its brains."""
         return self.config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
 
     @property
-    def described_brains(self) -> list[dict[str, Any]]:
-        """What the configuration says of each brain, refused ones too, with its licence where it is of an atlas."""
+    def brain_descriptions(self) -> list[dict[str, Any]]:
+        """Description of each brain, refused ones too, with the licence of its atlas."""
         licences = {brain: atlas.licence.name for brain, atlas in self.atlases.items()}
         keys = ("id", "week", "population", "source", "synthetic", "covariates")
         return [
@@ -289,18 +299,18 @@ class Study:
     @property
     def prediction_facts(self) -> dict[str, Any] | None:
         """The names, weeks, growth and files of the one prediction, for its report; None if there is none."""
-        if (one := self.prediction) is None:
+        if (simulation := self.prediction) is None:
             return None
-        at, beside = one.measured[-1], self.atlas_brain(one)
+        last, atlas_brain = simulation.measurements[-1], self.atlas_brain(simulation)
         exported = [ExportedBrain(**brain) for brain in self.exported]
-        last = next(brain for brain in exported if (brain.run, brain.week) == (one.run, at.week))
-        atlas = self.atlases.get(beside.id)
+        brain = next(brain for brain in exported if (brain.run, brain.week) == (simulation.run, last.week))
+        atlas = self.atlases.get(atlas_brain.id)
         return {
-            **{**one.names, "start_week": one.start.week, "week": at.week},
-            **{"beside": beside.id, "beside_week": beside.week},
+            **{**simulation.names, "start_week": simulation.start.week, "week": last.week},
+            **{"beside": atlas_brain.id, "beside_week": atlas_brain.week},
             # those whose growth it has
-            "population": beside.population,
+            "population": atlas_brain.population,
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
-            "surfaces": [*at.parts.values()],
-            "labels": labels_of("results/export", last, exported) if last.volume else None,
+            "surfaces": [*last.parts.values()],
+            "labels": labels_of("results/export", brain, exported) if brain.volume else None,
         }

@@ -103,7 +103,7 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
     config = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text()))
     assert [brain.week for brain in config.brains] == [22.4, 22, 23, 24, 25]
     study = resolve(config)
-    assert [(simulation.start.id, simulation.shapes) for simulation in study.folded] == [(FOUND, "atlas")]
+    assert [(simulation.start.id, simulation.shapes) for simulation in study.run_simulations] == [(FOUND, "atlas")]
     assert [brain.id for brain in study.chains[FOUND, "atlas"].later] == [brain.id for brain in config.brains[1:]]
     asked = (tmp_path / "asked.txt").read_text()
     assert asked == f"--configfile {tmp_path / 'gyriflow.yaml'} --cores 3 --directory {tmp_path} all export"
@@ -124,10 +124,10 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monk
     section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
     assert (section["atlas"]["name"], section["atlas"]["folder"]) == (str(atlas / "atlas.yaml"), str(atlas))
     study = resolve(load(section))
-    assert all(Path(file).is_file() for brain in study.brains.values() for file in brain.given.files)
+    assert all(Path(file).is_file() for brain in study.brains.values() for file in brain.config.files)
     # what the cortex is resolved by
     assert list(coarse_cortices(study)) == []
-    assert study.folded[0].settings.step_s == 86400
+    assert study.run_simulations[0].settings.step_s == 86400
     assert study.config.mesh.order == 1
 
 

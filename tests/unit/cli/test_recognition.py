@@ -201,7 +201,7 @@ def test_only_scans_of_one_subject_are_led_to_each_other(tmp_path):
     config = configured(tmp_path)
     assert [brain.subject for brain in config.brains] == ["sub-01", "sub-02"]
     assert list(config.runs) == ["reference"]
-    assert not resolve(config).growing
+    assert not resolve(config).growth_brains
 
 
 @pytest.fixture
@@ -227,7 +227,7 @@ def test_a_bids_app_measures_and_folds_the_first_of_several_scans_where_told(app
     assert arguments[-2:] == ["quality", "export"]
     assert "--keep-going" in arguments
     assert list(written) == ["brains", "metrics"]
-    assert resolve(load(written, tmp_path)).folded == []
+    assert resolve(load(written, tmp_path)).run_simulations == []
     _, written = app("participant", "--fold")
     assert (written["start"], written["folding"]["end_week"]) == (["sub-01_ses-1"], 24.43)
     assert list(written["runs"]) == ["reference", "measured"]
@@ -267,9 +267,9 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
     written = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
     assert list(written) == ["brains"]
     study = resolve(load(written, tmp_path))
-    assert (len(study.brains), study.folded, study.norm_reference) == (2, [], ["sub-01_ses-1", "sub-01_ses-2"])
+    assert (len(study.brains), study.run_simulations, study.norm_reference) == (2, [], ["sub-01_ses-1", "sub-01_ses-2"])
     # of a configuration with runs, nothing is folded either
     folded = load(written | {"start": "first", "folding": {"end_week": 24}}, tmp_path)
-    assert (len(resolve(folded).folded), resolve(folded.measured_only).folded) == (1, [])
+    assert (len(resolve(folded).run_simulations), resolve(folded.measured_only).run_simulations) == (1, [])
     # surfaces stay as they are for the runs, which have sulci shut
     assert [one.opens_sulci for one in (study.config, folded, folded.measured_only)] == [True, False, False]

@@ -15,7 +15,7 @@ from gyriflow.formats import FORMATS, is_volume
 from gyriflow.io.surfaces import SURFACE_READERS, read_surface, write_surface
 from gyriflow.io.volumes import VOLUME_READERS, read_label_volume
 from gyriflow.report.page import hide_paths
-from gyriflow.settings.brains import Brain
+from gyriflow.settings.brains import BrainConfig
 
 BALL = sphere(20.0, 2)
 LABELS = np.zeros((4, 5, 6), dtype=np.uint8)
@@ -91,6 +91,6 @@ def test_each_format_has_a_reader_and_each_reader_a_format():
 @pytest.mark.parametrize("suffix", [".nii.gz", ".HDR", ".mgz"])
 def test_a_single_hemisphere_with_a_scheme_may_be_any_volume(suffix):
     one = {"id": "a", "week": 22, "hemisphere": {"file": f"a{suffix}", "side": "left"}}
-    assert Brain(**one, scheme="feta-7").has_labels
+    assert BrainConfig(**one, scheme="feta-7").has_labels
     with pytest.raises(ValidationError, match="scheme"):
-        Brain(**one)
+        BrainConfig(**one)

@@ -23,7 +23,7 @@ def test_defaults_are_the_reference_values():
     config = load(study())
     run = config.runs["reference"]
     assert (run.thickness_mm, run.poisson_ratio, run.growth_rate_per_s, run.step_s) == (1.5, 0.45, 2e-7, 43200)
-    (one,) = resolve(config).folded
+    (one,) = resolve(config).run_simulations
     assert (one.run, one.start.id, one.weeks) == ("reference", "a", (21, 22, 23, 24))
     assert [brain.source for brain in config.brains] == ["labels", "labels"]
 
@@ -129,7 +129,7 @@ def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
 
 
 def test_parameters_of_a_run_are_what_the_folding_program_reads():
-    (one,) = resolve(load(study(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}))).folded
+    (one,) = resolve(load(study(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}))).run_simulations
     known = {"start_week": one.weeks[0], "output_weeks": one.weeks, "fissure_x_mm": 0.0}
     read = parameters_from(known | one.parameters)
     assert read.stress_memory_gw == math.inf
@@ -153,7 +153,7 @@ def test_the_schema_of_all_keys_is_current():
 
 def test_the_page_of_keys_has_every_section():
     listed = re.findall(r"^::: gyriflow\.\S+\.(\w+)$", (CONFIG.parent / "docs" / "keys.md").read_text(), re.MULTILINE)
-    sections = {*SCHEMA["$defs"], *Atlas.model_json_schema()["$defs"], "Atlas", "Compared"}
+    sections = {*SCHEMA["$defs"], *Atlas.model_json_schema()["$defs"], "Atlas", "ComparisonSettings"}
     # runs have the keys of folding
     assert sorted(listed) == sorted(sections - {"Run"})
 

@@ -152,10 +152,10 @@ def test_averages_are_no_individuals(volume):
     brains += [{"id": f"n{week}", "week": week, **own} for week in (21, 21.4, 23)]
     found = resolve(load({"brains": brains, "atlas": atlas, "metrics": {"norm_reference": ["spina-bifida"]}}))
     assert found.norm_reference == ["spina-bifida-operated-25", "spina-bifida-operated-26"]
-    assert not found.individuals(found.norm_reference)
-    assert found.individuals(["s21", "s23"])
-    assert not found.individuals(["n21", "n23"])
-    assert found.individuals(["n21", "n21.4", "n23"])
+    assert not found.are_individuals(found.norm_reference)
+    assert found.are_individuals(["s21", "s23"])
+    assert not found.are_individuals(["n21", "n23"])
+    assert found.are_individuals(["n21", "n21.4", "n23"])
 
 
 def test_charts_are_coloured_by_a_covariate_that_groups_subjects(volume):

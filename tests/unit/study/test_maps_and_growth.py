@@ -25,7 +25,7 @@ def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):
     }
     with_maps, plain = resolve(
         load(study(mapped, runs={"mapped": {}, "plain": dict.fromkeys(mapped, 1e-8)}), tmp_path)
-    ).folded
+    ).run_simulations
     settings = with_maps.parameters
     assert {name: settings[name] for name in mapped} == {
         "thickness_mm": {"map": "thickness_mm"},

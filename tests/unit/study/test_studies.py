@@ -35,7 +35,7 @@ def resolved(**sections):
 
 
 def members(study, name):
-    return [one.run for one, _ in study.comparisons[name].members]
+    return [one.run for one, _ in study.sweeps[name].members]
 
 
 def refusal(**sections):
@@ -46,7 +46,7 @@ def refusal(**sections):
 
 def test_a_study_makes_a_run_of_each_combination():
     found = resolved(studies={"both": THICKNESS | {"vary": {"thickness_mm": [1, 2], "contact.gap_mm": [2, 3]}}})
-    runs = {one.run: one.settings for one, _ in found.comparisons["both"].members}
+    runs = {one.run: one.settings for one, _ in found.sweeps["both"].members}
     assert list(runs) == ["both-1-2", "both-1-3", "both-2-2", "both-2-3"]
     assert [(run.thickness_mm, run.contact.gap_mm) for run in runs.values()] == [(1, 2), (1, 3), (2, 2), (2, 3)]
     assert {run.shear_modulus_cortex_pa for run in runs.values()} == {3000}
@@ -81,7 +81,7 @@ def test_comparison_prefers_the_starts_population(tmp_path):
         brains.append({"id": name, "week": week, "pial": str(tmp_path / f"{name}.stl"), "population": population})
     for known, asked, real in ((brains, {}, "c"), (brains[:2], {}, "b"), (brains, {"compare_with": ["b"]}, "b")):
         found = resolved(brains=known, studies={"thickness": THICKNESS | asked})
-        assert [brain.id for brain in found.comparisons["thickness"].real["a"]] == [real]
+        assert [brain.id for brain in found.sweeps["thickness"].observed["a"]] == [real]
 
 
 def test_the_run_of_a_single_value_may_differ_further():
@@ -90,8 +90,7 @@ def test_the_run_of_a_single_value_may_differ_further():
         "fixed_at": {1.5: {"step_s": 43200}},
     }
     found = [
-        (one.run, one.settings.step_s, values)
-        for one, values in resolved(studies={"s": study}).comparisons["s"].members
+        (one.run, one.settings.step_s, values) for one, values in resolved(studies={"s": study}).sweeps["s"].members
     ]
     assert found == [("s-0.8", 86400, {"thickness_mm": 0.8}), ("s-1.5", 43200, {"thickness_mm": 1.5})]
 

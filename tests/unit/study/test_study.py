@@ -76,7 +76,7 @@ def refusal(brains, **sections):
 def test_the_paper_is_planned_with_the_paper_s_steps_and_ratios():
     members = {
         name: [(values, one.settings) for one, values in compared.members]
-        for name, compared in resolve(load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES)).comparisons.items()
+        for name, compared in resolve(load(read_yaml(EXAMPLES / "paper.yaml"), EXAMPLES)).sweeps.items()
     }
     steps = {values["thickness_mm"]: run.step_s for values, run in members["thickness"]}
     assert steps == {0.8: 86400, 1.5: 43200, 2.25: 86400, 6.0: 86400}
@@ -107,7 +107,7 @@ def test_maps_are_made_for_the_runs_that_have_any(files, labels):
 
 def test_measured_sizes_are_waited_for_by_the_runs_that_follow_them(real):
     runs = {"plain": {}, "given": {"growth": SIZES}, "measured": {"growth": SIZES | {"volume_ml": "measured"}}}
-    found = study(real, runs=runs).folded
+    found = study(real, runs=runs).run_simulations
     assert [one.curves for one in found] == [[], [], CURVES["curves"]]
     assert [one.followed_series for one in found] == [None, None, "volume"]
 
@@ -124,7 +124,7 @@ def test_a_refused_brain_leaves_the_others_as_they_are(of_two):
     assert study(brains, ["own22"], **asked).pairs == [("a", "own23")]
     # without the end of the atlas no run of it has anywhere to go
     found = study(brains, ["b24", "b25"], **asked)
-    assert (found.folded, set(found.unreachable)) == ([], {"own22", "own23"})
+    assert (found.run_simulations, set(found.unreachable)) == ([], {"own22", "own23"})
     assert "own22" in found.brains
     # one start of another population's growth is left out, the other goes on by its own
     other = study(brains, ["b24", "b25"], **asked | {"runs": {"a": runs["a"] | {"start": "own22"}, "plain": {}}})
@@ -142,17 +142,17 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     }
     found = study([*real, twin], ["b22", "b23", "b24"], **asked)
     # a study none of whose runs has a start is none
-    assert {name: [one.start.id for one, _ in of.members] for name, of in found.comparisons.items()} == {
+    assert {name: [one.start.id for one, _ in of.members] for name, of in found.sweeps.items()} == {
         "thick": ["b21", "b21"]
     }
-    assert ids(found.comparisons["thick"].real["b21"]) == ["twin"]
-    assert found.simulations["reference", "b21"].real == {24: found.brains["twin"]}
+    assert ids(found.sweeps["thick"].observed["b21"]) == ["twin"]
+    assert found.simulations["reference", "b21"].observed == {24: found.brains["twin"]}
     assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
     assert {tuple(row["template_maps"]) for row in found.exported} == {()}
     # nothing is left where no start is
     search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
-    assert empty.folded == empty.norm_reference == [] == list(empty.comparisons)
+    assert empty.run_simulations == empty.norm_reference == [] == list(empty.sweeps)
     assert empty.calibration is None
 
 
@@ -164,15 +164,19 @@ def test_a_week_of_days_is_one_number_everywhere(labels):
     days = 24 + 2 / 7
     varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": days}
     found = study([labels(21), labels(days, id="late")], folding={"end_week": days}, studies={"thick": varied})
-    one, comparison = found.simulations["reference", "b21"], found.comparisons["thick"]
+    one, comparison = found.simulations["reference", "b21"], found.sweeps["thick"]
     assert found.brains["late"].week == one.weeks[-1] == comparison.week == 24.29
-    assert ids(one.real.values()) == ids(comparison.real["b21"]) == ["late"]
+    assert ids(one.observed.values()) == ids(comparison.observed["b21"]) == ["late"]
     # the rows of tables that figures look for by their week
-    rows = [found.brains["late"].measured, one.measured[-1], *(member.at(24.29) for member, _ in comparison.members)]
+    rows = [
+        found.brains["late"].measurement,
+        one.measurements[-1],
+        *(member.at(24.29) for member, _ in comparison.members),
+    ]
     assert {row.week for row in rows} == {24.29}
     spectra = next(figure for figure in figures_of(found) if figure.kind.name == "influence_spectra")
     assert spectra.options["week"] == 24.29
-    assert one.measured[-1].where.endswith("/week-24.29")
+    assert one.measurements[-1].where.endswith("/week-24.29")
 
 
 def cohort(labels):
@@ -190,27 +194,30 @@ def test_growth_is_of_one_subject_whose_scans_alone_it_leads_to(labels):
         "b": ["b24", "b27"],
     }
     # each up to its own last scan
-    assert {one.start.id: (ids(one.real.values()), one.weeks[-1]) for one in found.folded} == {
+    assert {one.start.id: (ids(one.observed.values()), one.weeks[-1]) for one in found.run_simulations} == {
         "a22": (["a26"], 26.0),
         "b24": (["b27"], 27.0),
     }
-    assert [found.growth_of(one) for one in found.folded] == ["own", "own"]
+    assert [found.growth_source(one) for one in found.run_simulations] == ["own", "own"]
     with pytest.raises(InputError, check=Facts("m", "c25", "a, b", 25, 27)):
         study(cohort(labels), **MEASURED | {"start": "c25"})
     # nor does a brain follow the sizes of another subject
     sizes = MEASURED | {"runs": {"s": {"growth": "sizes"}}}
-    alone = study(cohort(labels)[2:], **sizes | {"start": "c25"}).folded[0]
-    assert (alone.series, study(cohort(labels)[2:], **sizes | {"start": "b24"}).folded[0].series) == (None, "b")
+    alone = study(cohort(labels)[2:], **sizes | {"start": "c25"}).run_simulations[0]
+    assert (alone.series, study(cohort(labels)[2:], **sizes | {"start": "b24"}).run_simulations[0].series) == (
+        None,
+        "b",
+    )
 
 
 def test_a_chain_of_several_subjects_is_asked_for_by_name_and_called_a_populations(labels):
     found = study(cohort(labels), growth={"brains": {"cohort": ["all"]}}, **MEASURED)
     assert ids(found.chains["a22", "self"].brains) == ["a22", "b24", "c25", "a26", "b27"]
-    one = found.folded[0]
-    assert (ids(one.real.values()), one.weeks[-1]) == (["b24", "c25", "a26", "b27"], 27.0)
-    assert found.growth_of(one) == Facts("cohort")
+    one = found.run_simulations[0]
+    assert (ids(one.observed.values()), one.weeks[-1]) == (["b24", "c25", "a26", "b27"], 27.0)
+    assert found.growth_source(one) == Facts("cohort")
     # a list of brains is no chain
-    assert study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "b24"}).growing
+    assert study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "b24"}).growth_brains
     with pytest.raises(InputError, check=Facts("m", "a22", "b", 22, 27)):
         study(cohort(labels), growth={"brains": ["a22", "b24", "b27"]}, **MEASURED | {"start": "a22"})
 
@@ -220,22 +227,22 @@ def test_the_scans_of_another_subject_are_no_atlas(labels):
     expected = {"runs": {"e": {"preset": "expected"}}, "folding": {"end_week": 27}, "start": "c25"}
     found = study([*cohort(labels), *atlas], **expected)
     assert ids(found.chains["c25", "atlas"].later) == ["atlas25", "atlas26", "atlas27"]
-    assert [found.growth_of(one) for one in found.folded] == [Facts("atlas")]
-    assert ids(found.folded[0].compared[26]) == ["atlas26"]
+    assert [found.growth_source(one) for one in found.run_simulations] == [Facts("atlas")]
+    assert ids(found.run_simulations[0].observed_brains[26]) == ["atlas26"]
 
 
 def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_worth():
     found = study([{"id": f"b{week}", "week": week, **SPHERE} for week in (21, 22)])
-    (one,) = found.folded
-    assert {week: brain.id for week, brain in one.measured_by_week.items()} == {21: "b21", 22: "b22"}
-    assert one.real == {}
+    (one,) = found.run_simulations
+    assert {week: brain.id for week, brain in one.observed_with_start.items()} == {21: "b21", 22: "b22"}
+    assert one.observed == {}
     alone = study([{"id": "b21", "week": 21, **SPHERE}])
-    assert alone.growing == alone.validated == []
+    assert alone.growth_brains == alone.validated == []
 
 
 def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
     runs = {"plain": {}, "given": {"growth": SIZES}, "sizes": {"growth": "sizes"}, "shapes": {"growth": "shapes"}}
-    found = study(real, runs=runs).folded
+    found = study(real, runs=runs).run_simulations
     assert [one.kind for one in found] == ["predicted", "predicted", "explained", "explained"]
     # only there its displacement is that of the registrations
     assert [one.follows_registration for one in found] == [False, False, False, True]
@@ -250,8 +257,8 @@ def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(rea
     chain = found.chains["b21", "self"]
     assert (ids(chain.brains), chain.later_weeks) == (["b21", "b22", "b23", "b27"], [22, 23, 27])
     assert chain.correspondences[0] == "results/study/registration/b21/b22.h5"
-    assert found.carried == ["b21"]
-    assert [one.targets for one in found.folded] == ["results/brains/b21/mesh/targets.self.h5", []]
+    assert found.registered_starts == ["b21"]
+    assert [one.targets for one in found.run_simulations] == ["results/brains/b21/mesh/targets.self.h5", []]
     # sizes come from the shapes
     assert found.simulations["a", "b21"].curves == []
 
@@ -317,7 +324,7 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
     assert one.weeks == pytest.approx([22.4, 23, 23.4, 23.7, 24])
     assert (chain.later_weeks, chain.further_weeks) == ([22, 23, 24], (23.4, 23.7))
     assert found.chains["own22.4", "self"].further_weeks == ()
-    assert {week: brain.id for week, brain in one.real.items()} == {23: "own23", 23.4: "own23.4", 23.7: "own23.7"}
+    assert {week: brain.id for week, brain in one.observed.items()} == {23: "own23", 23.4: "own23.4", 23.7: "own23.7"}
     # so are runs beside it; others keep the weeks that are asked for
     assert found.simulations["plain", "own22.4"].weeks == one.weeks
     assert [one.run for one in found.predictions] == ["a", "plain"]
@@ -337,16 +344,16 @@ def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_
     runs = {"a": EXPECTED["runs"]["a"], "paper": {}, "measured": {"preset": "measured"}}
     found = study(of_two(22, 23, 24), runs=runs)
     # a run that no brain tells of stands beside it, and one that later brains explain does not
-    assert [(one.run, one.from_others_only) for one in found.predictions] == [("a", True), ("paper", False)]
-    assert [one.kind for one in found.folded] == ["predicted", "predicted", "explained"]
+    assert [(one.run, one.is_atlas_prediction) for one in found.predictions] == [("a", True), ("paper", False)]
+    assert [one.kind for one in found.run_simulations] == ["predicted", "predicted", "explained"]
     # of unknown population, it is compared with the brains that its growth comes from
-    assert study(of_two(22, population=None), **EXPECTED).folded[0].kind == "explained"
+    assert study(of_two(22, population=None), **EXPECTED).run_simulations[0].kind == "explained"
     # a later scan of the same subject is its own, whatever it is called
     scans = [brain | ({"subject": "s"} if brain["id"] in ("own22", "b24") else {}) for brain in of_two(22)]
     atlas = [brain["id"] for brain in scans[1:]]
-    assert not study(scans, growth={"brains": {"with it": atlas}}, **EXPECTED).folded[0].from_others_only
+    assert not study(scans, growth={"brains": {"with it": atlas}}, **EXPECTED).run_simulations[0].is_atlas_prediction
     # which is of no other subject's series but by name
-    assert study(scans, **EXPECTED).folded[0].from_others_only
+    assert study(scans, **EXPECTED).run_simulations[0].is_atlas_prediction
 
 
 def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
@@ -369,11 +376,11 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
 
 
 def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
-    (expected,) = study(of_two(22, 23, 24), **EXPECTED).expected
-    assert ids(expected.real.values()) == ["own23", "own24"]
+    (expected,) = study(of_two(22, 23, 24), **EXPECTED).atlas_predictions
+    assert ids(expected.observed.values()) == ["own23", "own24"]
     # whose growth is its own explains
     own = study(of_two(22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
-    assert own.expected == []
+    assert own.atlas_predictions == []
 
 
 # studies and calibration
@@ -382,13 +389,13 @@ def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_thei
 def test_a_study_is_compared_at_its_week_and_its_members_are_measured_there(real):
     varied = {"base": "reference", "vary": {"thickness_mm": [1.0, 2.0]}, "compare_week": 23}
     found = study(real, runs={"reference": {"thickness_mm": 1.0}}, studies={"thick": varied})
-    compared = found.comparisons["thick"]
+    compared = found.sweeps["thick"]
     assert [one.run for one, _ in compared.members] == ["reference", "thick-2"]
-    place = found.places["runs/thick-2/b21/metrics/week-23.00"]
+    place = found.all_measurements["runs/thick-2/b21/metrics/week-23.00"]
     assert place.labels == {"subject": "b21", "run": "thick-2", "week": 23}
     assert place.thickness == "results/runs/thick-2/b21/surfaces/week-23.00/thickness.shape.gii"
-    assert place.where not in found.measured
-    assert [brain.population for brain in compared.real["b21"]] == ["unknown"]
+    assert place.where not in found.measurements
+    assert [brain.population for brain in compared.observed["b21"]] == ["unknown"]
 
 
 def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
@@ -398,7 +405,7 @@ def test_rounds_of_a_calibration_wait_for_the_scores_of_earlier_ones(real):
     assert (list(found.rounds.values()), found.scores_before(0)) == ([0, 0, 0, 1], [])
     assert found.scores_before(1)[-1] == "results/study/calibration/scores/calibration-02.csv"
     assert found.design("calibration-03") == "results/study/calibration/round-1.csv"
-    assert ids(found.real["b21"]) == ["b24"]
+    assert ids(found.observed["b21"]) == ["b24"]
 
 
 # what is measured
@@ -410,7 +417,7 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
     found = study([labels(21), labels(22), sphere], metrics={"regions": given})
     assert [brain.regions_from for brain in found.brains.values()] == ["given", "carried", None]
     # those of a run hold at all its weeks
-    regions = found.places["runs/reference/b21/metrics/week-22.00"].regions
+    regions = found.all_measurements["runs/reference/b21/metrics/week-22.00"].regions
     assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
 
 
@@ -418,7 +425,7 @@ def test_named_sulci_are_those_of_real_whole_brains(real):
     sphere = {"id": "sphere", "week": 22, **SPHERE}
     found = study([*real, sphere])
     assert [brain.regions_from for brain in found.brains.values()] == ["named"] * 4 + [None]
-    assert [one.regions for one in found.measured.values()] == [{}] * len(found.measured)
+    assert [one.regions for one in found.measurements.values()] == [{}] * len(found.measurements)
     everywhere = study([*real, sphere], metrics={"regions": "named_sulci"}).brains.values()
     assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
 

@@ -209,7 +209,7 @@ def test_changed_values(tmp_path, raw):
     if config is not None:
         # what is valid serves, but for brains that shapes to grow towards are missing for
         with suppress(InputError):
-            assert all(one.weeks for one in resolve(config).folded)
+            assert all(one.weeks for one in resolve(config).run_simulations)
     assert not list(tmp_path.iterdir())
 
 

@@ -38,16 +38,16 @@ def test_the_adjacent_brain_is_the_latest_before_the_week_that_runs_are_compared
         23: ["c", "b"],
         24: ["d", "c"],
     }
-    assert list(found.places["brains/half/metrics"].parts) == ["whole", "left"]
+    assert list(found.all_measurements["brains/half/metrics"].parts) == ["whole", "left"]
 
 
 def test_the_observed_brain_of_a_week_is_the_subject_s_own_or_else_the_first_and_never_a_shape():
     brains = [brain("start", 21, subject="s"), sphere("ball", 22), brain("x", 22), brain("own", 22, subject="s")]
     run = resolved([*brains, brain("y", 22)], start="start").simulations["reference", "start"]
-    assert (ids(run.compared[22]), run.real[22].id) == (["own", "ball", "x", "y"], "own")
+    assert (ids(run.observed_brains[22]), run.observed[22].id) == (["own", "ball", "x", "y"], "own")
     # another subject's scan is no brain to be compared with
     run = resolved([*brains[:3], brain("theirs", 22, subject="t")], start="start").simulations["reference", "start"]
-    assert (ids(run.compared[22]), run.real[22].id) == (["ball", "x"], "x")
+    assert (ids(run.observed_brains[22]), run.observed[22].id) == (["ball", "x"], "x")
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_regions_come_from_the_brain_nearest_in_week_that_has_any(order):
     brains = [*(brains[number] for number in order), *labelled(21.4, 23, 24.5, 25.5, names="bdfg")]
     regions = {name: {"volume": __file__, "names": {1: "frontal"}} for name in "ace"}
     found = resolved(brains, metrics={"regions": regions})
-    assert {name: found.giver_of_regions(name).id for name in "bdfg"} == {"b": "a", "d": "c", "f": "e", "g": "e"}
+    assert {name: found.region_source(name).id for name in "bdfg"} == {"b": "a", "d": "c", "f": "e", "g": "e"}
 
 
 def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start():
@@ -125,7 +125,7 @@ def test_a_chain_goes_from_its_own_start_to_the_first_brain_past_its_own_end():
     assert ids(found.chains["a", "self"].brains) == ["a", "b", "c"]
     # both runs from a start follow one chain, to the later of their ends
     assert ids(found.chains["b", "self"].brains) == ["b", "c", "d"]
-    assert found.carried == ["b", "a"]
+    assert found.registered_starts == ["b", "a"]
     # a brain that is refused is passed over
     assert ids(resolved(brains, ["c"], runs=runs).chains["b", "self"].brains) == ["b", "d"]
 
