@@ -179,7 +179,7 @@ def carried(frames: Path, week: float) -> Carried:
     surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
     side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, "B5")
     metrics = size_metrics(surface, side.crossing) | folding_metrics([side]) | spectrum_metrics(side)
-    return Carried(surface, side.bend.mean, metrics)
+    return Carried(surface, side.curvature_maps.mean, metrics)
 
 
 def parse() -> argparse.Namespace:

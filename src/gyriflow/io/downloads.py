@@ -14,7 +14,7 @@ TRIES = 3
 TIMEOUT_S = (15.0, 60.0)
 """Longest wait for a connection, and for the next bytes."""
 
-Say = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
@@ -25,10 +25,10 @@ def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
             raise InputError(f"is not the file of {atlas}", path=path, expected=f"the SHA-256 {sha256}", remedy=remedy)
 
 
-def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size: int | None = None) -> None:
+def fetch(path: AnyPath, url: str, report: Report, *, sha256: str | None = None, size: int | None = None) -> None:
     """Fetch a file from a URL, check it and put it under `path`, or check the one there, which is never replaced.
 
-    `say` is called with a line on what was found. Where no checksum is known, a GIFTI or NIfTI file has to be readable
+    `report` is called with a line about the file. Without a known checksum, a GIFTI or NIfTI file has to be readable
     to its end. There has to be room for the size in bytes, if it is known.
 
     StorageError where the server cannot be reached, lacks the file or sends something else, the file that is there is
@@ -48,7 +48,7 @@ def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size:
     with _refused(path, url):
         if path.exists():
             _check(path, path.name, sha256)
-            say(f"{path} is there already")
+            report(f"{path} already exists")
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(path.parent).free
@@ -56,7 +56,7 @@ def fetch(path: AnyPath, url: str, say: Say, *, sha256: str | None = None, size:
             raise StorageError(f"no room for {size} bytes; {free} are free", path=path.parent)
         files = {"registry": {path.name: None}, "urls": {path.name: url}}
         pooch.create(path.parent, "", retry_if_failed=TRIES - 1, **files).fetch(path.name, downloader=download)
-    say(f"{path}: SHA-256 {sha256_of(path)}" + ("" if sha256 else ", as it came; no checksum is known"))
+    report(f"{path}: SHA-256 {sha256_of(path)}" + ("" if sha256 else " as downloaded; no checksum is known"))
 
 
 def _check(path: Path, name: str, sha256: str | None) -> None:
@@ -88,7 +88,7 @@ def _refused(path: Path, url: str) -> Iterator[None]:
     try:
         yield
     except requests.RequestException as error:
-        remedy = f"The same command goes on with what is missing; or put the file into {path.parent} by hand."
+        remedy = f"Run the same command again to continue, or put the file into {path.parent} by hand."
         raise StorageError("cannot be fetched", path=url, found=_cause(error), remedy=remedy) from error
     except ValueError as error:
         if path.exists():

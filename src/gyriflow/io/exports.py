@@ -28,7 +28,7 @@ IGNORED = """\
 *.surf.gii
 *.shape.gii
 {kinds}
-# tables of the whole study, its report, and what is to be kept of the work
+# tables of the whole study, its report, and files to keep
 /metrics_*
 /report.html
 /brains
@@ -65,12 +65,12 @@ BidsNames = Mapping[str, tuple[str, str | None]]
 
 @dataclass(frozen=True)
 class ExportedBrain:
-    """A brain at a week, and its files by the sides that it has; regions may be empty.
+    """A brain at a week and its files by side; regions may be empty.
 
-    The run is "real" for measured brains; the subject is who was scanned, or the brain where that is not said. Of a
-    simulated brain, all but run, week and files are those of its start. The report has the pose of its surface.
-    `template_maps` are at the vertices of another brain. The volume, which simulated brains of labels have, names the
-    start's `labels`, in whose grid theirs are written, and `surface` and `thickness` of the whole.
+    The run is "real" for observed brains. The subject is the scanned person, or the brain if none is named. For a
+    simulated brain, everything but run, week and files is that of its start brain. The report has the pose of its
+    surface. `template_maps` are at the vertices of another brain. Simulated brains of labels have a `volume`: the start
+    brain's `labels`, whose grid is used, and the `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -103,9 +103,9 @@ def export_bids(
     the columns subject, run and week; `units` are those of `metrics_wide`. InputError where two brains have one name.
     """
     folder = Path(folder)
-    measured = [brain for brain in brains if brain.run == MEASURED]
-    names = _subjects_and_sessions(measured)
-    space, reference = _template(measured, names)
+    observed = [brain for brain in brains if brain.run == MEASURED]
+    names = _subjects_and_sessions(observed)
+    space, reference = _template(observed, names)
     places = _places(folder, brains, names)
     sidecars: dict[str, dict[str, Any]] = {}
     for brain, place in zip(brains, places, strict=True):
@@ -122,7 +122,7 @@ def export_bids(
     write_text(folder / "README.md", README.format(version=version))
     if descriptions := _descriptions(brains, places):
         _write_tsv(folder / "descriptions.tsv", pd.DataFrame(descriptions.items(), columns=["desc_id", "description"]))
-    _write_people(folder, measured, names)
+    _write_people(folder, observed, names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
         table = table.rename(columns={"subject": "brain"})
@@ -136,10 +136,10 @@ def export_bids(
     write_json(folder / "dataset_description.json", dataset)
 
 
-def labels_of(folder: AnyPath, one: ExportedBrain, brains: Sequence[ExportedBrain]) -> str:
-    """Return the file for the labels of one simulated brain that `export_bids` writes to a folder with all brains."""
-    names = _subjects_and_sessions([brain for brain in brains if brain.run == MEASURED])
-    return LABELS_FILE.format(*_places(Path(folder), [one], names)[0])
+def labels_file(folder: AnyPath, brain: ExportedBrain, brains: Sequence[ExportedBrain]) -> str:
+    """Return the file to which `export_bids` writes the labels of a simulated brain, given all brains."""
+    names = _subjects_and_sessions([observed for observed in brains if observed.run == MEASURED])
+    return LABELS_FILE.format(*_places(Path(folder), [brain], names)[0])
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> list[Place]:
@@ -151,8 +151,8 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> 
         simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
         places.append(place)
-        if (other := taken.setdefault(place, brain)) is not brain:
-            brains_and_runs = f"{other.brain} ({other.run}) and {brain.brain} ({brain.run})"
+        if (first := taken.setdefault(place, brain)) is not brain:
+            brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
             expected = "ids and runs that differ in their letters and digits"
             raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
     return places
@@ -186,7 +186,7 @@ def _write_maps(
 ) -> dict[str, dict[str, Any]]:
     sidecars: dict[str, dict[str, Any]] = {}
     prefix, simulated = place
-    # files by side, the entities `space-` and `desc-`, and what sidecars say of the space
+    # files by side, the entities `space-` and `desc-`, and the space in sidecars
     kinds: tuple[tuple[Any, str, str, Mapping[str, Any]], ...] = (
         (brain.maps, "", simulated, {}),
         (brain.template_maps, space, simulated, reference),
@@ -203,8 +203,8 @@ def _write_maps(
     return sidecars
 
 
-def _template(measured: Sequence[ExportedBrain], names: BidsNames) -> tuple[str, dict[str, Any]]:
-    template = next((brain for brain in measured if brain.brain == brain.template), None)
+def _template(observed: Sequence[ExportedBrain], names: BidsNames) -> tuple[str, dict[str, Any]]:
+    template = next((brain for brain in observed if brain.brain == brain.template), None)
     if template is None:
         return "", {}
     stem = "_".join(filter(None, names[template.brain]))
@@ -241,13 +241,13 @@ def publish_derivatives(
     # brains of an atlas have pages, too, to which the report leads
     report = exported.parent / "report"
     names = [*(str(path.relative_to(report)) for path in report.glob("**/*.html")), "methods.rst"]
-    of_all = {name: f"report/{name}" for name in names if whole}
-    for target, page in (pages | of_all).items():
+    study_pages = {name: f"report/{name}" for name in names if whole}
+    for target, page in (pages | study_pages).items():
         if (exported.parent / page).is_file():
             _copy(exported.parent / page, folder / target)
     description = source / "dataset_description.json"
-    said = read_json(description) if description.is_file() else {}
-    doi = str(said.get("DatasetDOI", ""))
+    source_description = read_json(description) if description.is_file() else {}
+    doi = str(source_description.get("DatasetDOI", ""))
     url = doi if doi.startswith(("doi:", "http")) else f"doi:{doi}" if doi else source.resolve().as_uri()
     described = read_json(exported / "dataset_description.json")
     write_json(folder / "dataset_description.json", described | {"SourceDatasets": [{"URL": url}]})
@@ -256,7 +256,7 @@ def publish_derivatives(
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
     subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
     sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
-    # two subjects whose names differ in other characters only are told by their equal sessions
+    # subjects whose names differ only in other characters are noticed by their equal sessions
     several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(sessions.values())
     week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
     return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}

@@ -1,4 +1,4 @@
-"""What readers look at: figures as PNG and PDF, and pages as HTML with pictures in them."""
+"""Write figures as PNG and PDF, and HTML pages with embedded pictures."""
 
 import re
 from base64 import b64encode
@@ -66,11 +66,11 @@ def _inches(path: AnyPath) -> float:
 
 def _coded(path: AnyPath, width: int) -> str:
     with Image.open(path) as picture:
-        shown = picture.convert("RGB")
-    if shown.width > width:
-        shown = shown.resize((width, round(shown.height * width / shown.width)), Image.Resampling.LANCZOS)
+        image = picture.convert("RGB")
+    if image.width > width:
+        image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
     content = BytesIO()
-    shown.save(content, "WEBP", quality=QUALITY, method=4)
+    image.save(content, "WEBP", quality=QUALITY, method=4)
     return b64encode(content.getvalue()).decode("ascii")
 
 

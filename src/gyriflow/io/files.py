@@ -49,10 +49,9 @@ def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> Non
 
 @contextmanager
 def atomic_write(path: AnyPath) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that takes its place when the block ends well.
+    """Yield a temporary path next to `path` that replaces it when the block succeeds.
 
-    After an error an earlier file stays as it was. Missing folders are made. StorageError where the system refuses to
-    write.
+    After an error an earlier file is unchanged. Missing folders are made. StorageError if the system refuses to write.
     """
     path = Path(path)
     temporary = path.with_name(f".{uuid.uuid4().hex[:12]}.{path.name}")
@@ -69,7 +68,7 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
 
 
 def remove_tree(folder: AnyPath) -> Path:
-    """Return the path of a folder that is removed with all in it, so that nothing of an earlier run is left there."""
+    """Remove a folder with its contents; return its path."""
     shutil.rmtree(folder, ignore_errors=True)
     return Path(folder)
 
@@ -196,8 +195,8 @@ def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, 
         with suppress(OSError, StorageError):
             state = Path(path).stat()
             # one that takes another's place keeps its date, but has been renamed
-            now = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
-            by_path[path] = earlier[path] if earlier.get(path, [])[1:] == now else [sha256_of(path), *now]
+            current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
+            by_path[path] = earlier[path] if earlier.get(path, [])[1:] == current else [sha256_of(path), *current]
     return by_path
 
 
@@ -213,10 +212,10 @@ def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
 def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
     """Return the files of a folder and those in it, in order, without hidden ones and folders of some names."""
 
-    def wanted(path: Path) -> bool:
+    def is_included(path: Path) -> bool:
         return not any(part.startswith(".") or part in left_out for part in path.relative_to(folder).parts)
 
-    return [path for path in files_below(folder) if wanted(path)]
+    return [path for path in files_below(folder) if is_included(path)]
 
 
 def files_below(folder: AnyPath) -> list[Path]:

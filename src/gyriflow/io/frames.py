@@ -1,4 +1,4 @@
-"""The frames of a folding run: one HDF5 file, with an XDMF file beside it that ParaView opens as a time series.
+"""Frames of a simulation: one HDF5 file, with an XDMF file that ParaView opens as a time series.
 
 Layout of the HDF5 file: `tets` (m, 4), of quadratic elements (m, 10), once; per output week a group `week_21.00` with
 `positions` (n, 3) in mm, fields at the vertices, and in its group `cell_fields` those of the elements. Positions are in
@@ -72,9 +72,9 @@ def _time_series(data_name: str, file: h5py.File) -> str:
         names = set(frame) - {POSITIONS, CELL_FIELDS}
         fields = {field: (frame[field], f"{where}/{field}") for field in sorted(names)}
         cell_fields = frame.get(CELL_FIELDS, {})
-        of_cells = {field: (values, f"{where}/{CELL_FIELDS}/{field}") for field, values in cell_fields.items()}
+        cell_data = {field: (values, f"{where}/{CELL_FIELDS}/{field}") for field, values in cell_fields.items()}
         cells, points = (tets, f"{data_name}:/tets"), (frame[POSITIONS], f"{where}/{POSITIONS}")
-        grids.append(grid(name, cells, points, fields, of_cells, float(name.removeprefix("week_"))))
+        grids.append(grid(name, cells, points, fields, cell_data, float(name.removeprefix("week_"))))
     return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
 
 

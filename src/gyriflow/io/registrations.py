@@ -60,7 +60,7 @@ class WeeklyShapes:
         """Return the number of a week among those of the shapes; InputError where it is missing."""
         found = np.flatnonzero(self.weeks == week)
         if not len(found):
-            weeks = ", ".join(f"{known:g}" for known in self.weeks)
+            weeks = ", ".join(f"{week:g}" for week in self.weeks)
             raise InputError(
                 f"the mesh has no shape at {week:g} GW", found=f"shapes at {weeks} GW", remedy=REGISTER_AGAIN
             )

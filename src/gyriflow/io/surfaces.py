@@ -1,6 +1,6 @@
 """Triangle surfaces (GIFTI, FreeSurfer, VTK, STL, PLY, OBJ), in mm, and maps and labels at their vertices (GIFTI).
 
-Where a file says in which space its coordinates are, they are brought to scanner space.
+Coordinates are transformed to scanner space if the file defines their space.
 """
 
 import hashlib
@@ -32,7 +32,7 @@ Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 SURFACE_NAMES = f"a file that ends in {', '.join(SURFACE_SUFFIXES)}"
 FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
 RawSurface = tuple[Floats, NDArray, str | None, str | None]
-"""Points and faces as a file has them, the space of the points and the structure, None where it does not say so."""
+"""Points and faces of a file, the space of the points and the structure (each None if the file has none)."""
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
@@ -40,9 +40,9 @@ System = tuple[str, str, Floats]
 def read_surface(path: AnyPath) -> TriangleMesh:
     """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY or OBJ file, in the order of corners of the file.
 
-    Coordinates are the file's; where a GIFTI or FreeSurfer file says how they lie in scanner space, they are brought
-    there. InputError for missing, truncated or empty files, NaN or infinite coordinates, faces that name missing
-    vertices, and coordinates that are not those of the subject.
+    Coordinates of GIFTI and FreeSurfer files are transformed to scanner space if the file defines how. InputError for
+    missing, truncated or empty files, NaN or infinite coordinates, faces with missing vertices, and coordinates of
+    another space than the subject's.
     """
     return surface_space_structure(path)[0]
 
@@ -50,7 +50,7 @@ def read_surface(path: AnyPath) -> TriangleMesh:
 def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, str | None]:
     """Return a surface as `read_surface` does, the space of its coordinates and its structure.
 
-    Both are None where the file does not say so. The space is a NIfTI transform code's name, such as
+    Both are None if the file has none. The space is a NIfTI transform code's name, such as
     "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
     """
     path = Path(path)
@@ -77,8 +77,8 @@ def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, Trian
 
     InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
     """
-    (one, space), (other, other_space) = _read_side(left, "left"), _read_side(right, "right")
-    return one, other, space is not None and space == other_space
+    (left_mesh, left_space), (right_mesh, right_space) = _read_side(left, "left"), _read_side(right, "right")
+    return left_mesh, right_mesh, left_space is not None and left_space == right_space
 
 
 def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
@@ -90,8 +90,8 @@ def _read_side(path: AnyPath, side: Side) -> tuple[TriangleMesh, str | None]:
     mesh, space, structure = surface_space_structure(path)
     expected = STRUCTURES[side]
     if structure in STRUCTURES.values() and structure != expected:
-        remedy = "Swap `left` and `right`, or mend what the file says of itself (AnatomicalStructurePrimary, lh or rh)."
-        raise InputError("is of the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
+        remedy = "Swap `left` and `right`, or correct the file's own side (AnatomicalStructurePrimary, lh or rh)."
+        raise InputError("is the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
     return mesh, space
 
 
@@ -164,7 +164,7 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     """
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
-        problem = "is no surface that a map can belong to, since STL files do not number their vertices"
+        problem = "cannot have a map, since STL files do not number their vertices"
         raise InputError(problem, path=surface_path, expected=f"the GIFTI, PLY or OBJ file that {path} was made on")
     surface = read_surface(surface_path)
     arrays = load_gifti(path).darrays
@@ -211,7 +211,7 @@ def _read_gifti_surface(path: Path) -> RawSurface:
 
 
 def _read_with_trimesh(path: Path) -> RawSurface:
-    # VTK's readers of these formats end the process on damaged PLY files and leave polygons as they are
+    # VTK's readers of these formats crash on damaged PLY files and do not triangulate polygons
     import trimesh
 
     # process=True joins equal vertices: STL stores each corner of each face
@@ -223,7 +223,7 @@ def _read_with_pyvista(path: Path) -> RawSurface:
     import pyvista as pv
 
     data = pv.read(path)
-    # what VTK computes from damaged cells may end the process, so that these are taken as they are
+    # VTK may crash on damaged cells, so these are read without its filters
     if not isinstance(data, pv.PolyData) or not data.n_points or not data.is_all_triangles:
         raise InputError("holds no surface", path=path, found=type(data).__name__, expected="triangles (PolyData)")
     return np.asarray(data.points, dtype=float), np.asarray(data.regular_faces), None, None
@@ -251,7 +251,7 @@ def _connectivity(path: Path, _: tuple[int, int] | None) -> tuple[int, int, str]
 
 
 UNNAMED = ("", "???", "unknown", "Unknown", "none")
-"""Names that label tables give to what is in no region."""
+"""Names in label tables for vertices without a region."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#F0E442")
 
@@ -259,17 +259,18 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 def read_vertex_labels(path: AnyPath) -> tuple[Ints, dict[int, str]]:
     """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
 
-    InputError for missing or truncated files, another number of arrays than one, and values that are no whole numbers.
+    InputError for missing or truncated files, for other than one array, and for non-integer values.
     """
     image = load_gifti(path)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
-        raise InputError("is no label file", path=path, found=shapes, expected="one label for each vertex (.label.gii)")
+        expected = "one label for each vertex (.label.gii)"
+        raise InputError("is not a label file", path=path, found=shapes, expected=expected)
     values = np.asarray(arrays[0].data)
     labels = np.rint(values).astype(np.int64)
     if not np.isfinite(values).all() or np.abs(values - labels).max(initial=0.0) > 1e-3:
-        raise InputError("has values that are no whole numbers", path=path, expected="labels")
+        raise InputError("contains non-integer values", path=path, expected="labels")
     names = {int(key): str(name).strip() for key, name in image.labeltable.get_labels_as_dict().items()}
     return labels, {key: name for key, name in names.items() if key != NO_REGION and name not in UNNAMED}
 
@@ -312,7 +313,7 @@ def _coordinate_systems(path: AnyPath) -> list[System]:
         try:
             matrix = np.array(numbers, dtype=float).reshape(4, 4)
         except ValueError as error:
-            problem = "has a coordinate system that is no matrix"
+            problem = "has an invalid coordinate-system matrix"
             raise InputError(problem, path=path, found=f"{len(numbers)} entries") from error
         require_finite(matrix, path, "entries in a coordinate system", "rows")
         systems.append((data, to, matrix))
@@ -342,8 +343,8 @@ def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str
         return matrix, to
     for _, to, matrix in moving:
         size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-        said = "%s: its matrix to %s, which scales by %.3g, was not applied: sizes are the subject's own"
-        log.warning(said, path, to, size)
+        text = "%s: its matrix to %s, which scales by %.3g, was not applied, to keep the subject's own size"
+        log.warning(text, path, to, size)
     if moving:
         return np.eye(4), None
     named = next((to for data, to, _ in systems if UNKNOWN not in (data, to)), None)
@@ -351,32 +352,32 @@ def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str
 
 
 def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
-    # FreeSurfer's converter gives the volume's centre with the points, whichever space it writes them in
+    # FreeSurfer's converter writes the volume's centre with the points, whatever their space
     try:
         centre = [float(metadata[key]) for key in C_RAS]
     except (KeyError, ValueError):
         return
     if any(abs(place) > 1e-3 for place in centre):
-        said = (
-            "%s: does not say the space of its coordinates: they may be relative to the centre of FreeSurfer's volume "
+        text = (
+            "%s: does not define its space: coordinates may be relative to the centre of FreeSurfer's volume "
             "(tkr RAS), off volumes in scanner space by C_RAS = (%g, %g, %g) mm. Before volumes of regions or maps are "
             "used with it, convert it anew with mris_convert --to-scanner"
         )
-        log.warning(said, path, *centre)
+        log.warning(text, path, *centre)
 
 
 def _read_freesurfer_surface(path: Path) -> RawSurface:
-    """Return vertices (mm) and faces of FreeSurfer's own kind of file, such as lh.pial, their space and structure.
+    """Return vertices (mm) and faces of a FreeSurfer file such as lh.pial, their space and structure.
 
-    Its coordinates are relative to the centre of a volume (tkr RAS), whose geometry is at the end of the file, by which
-    they are brought to scanner space. Without it they stay relative to that centre, and a warning says so.
+    Its coordinates are relative to the centre of a volume (tkr RAS). They are transformed to scanner space by the
+    volume's geometry at the end of the file; without it they stay relative to that centre, with a warning.
     """
     structure = FREESURFER_SIDES.get(path.name.split(".")[0])
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)
     if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
-        log.warning("%s: says nothing of its volume: the coordinates are relative to its centre (tkr RAS)", path)
+        log.warning("%s: has no volume geometry: its coordinates are relative to the volume's centre (tkr RAS)", path)
         return np.asarray(vertices, dtype=float), faces, None, structure
     axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward

@@ -1,6 +1,6 @@
 """Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm.
 
-The start mesh of a run stands in one file with its regions, of which ParaView shows two blocks: `mesh`, the elements
+The start mesh of a run stands in one file with its regions, which ParaView shows as two blocks: `mesh`, the elements
 with all fields and tags, and `facets`, the pial triangles with theirs. dolfinx reads the mesh by `read_mesh()`, and
 tags by `read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: a second domain, which ParaView leaves out, has a grid for
 each tag, since dolfinx before 0.10 reads a grid's first tag only.
@@ -63,7 +63,7 @@ def document(*domains: str) -> str:
 def write_tetrahedral_mesh(
     path: AnyPath, mesh: TetrahedralMesh, cell_fields: Mapping[str, NDArray] | None = None
 ) -> None:
-    """Write `path` (.xdmf) and the .h5 beside it: a mesh in mm, with fields (m,) or (m, 3) of its elements by name."""
+    """Write a mesh in mm, with fields (m,) or (m, 3) of its elements by name, to `path` (.xdmf) and its .h5 file."""
     data = Path(path).with_suffix(".h5")
     fields = {name: (np.asarray(values), f"{data.name}:/Cell/{name}") for name, values in (cell_fields or {}).items()}
     with new_hdf5(data) as file:
@@ -75,12 +75,12 @@ def write_tetrahedral_mesh(
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
-    """Read the mesh that `write_tetrahedral_mesh` has written to `path`, from the .h5 beside it.
+    """Read a mesh written by `write_tetrahedral_mesh` to `path`, from its .h5 file.
 
     InputError where the file cannot be read, or holds points that are not numbers, or flat or inverted elements.
     """
     data = Path(path).with_suffix(".h5")
-    with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 beside it") as file:
+    with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 file") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
     require_finite(mesh.vertices, data, "coordinates", "points")
     if wrong := int((signed_volumes(mesh) <= 0).sum()):
@@ -107,7 +107,7 @@ class Regions:
 
 
 def write_regions(path: AnyPath, regions: Regions) -> None:
-    """Write `path` (.xdmf) and the .h5 beside it."""
+    """Write `path` (.xdmf) and its .h5 file."""
     data = Path(path).with_suffix(".h5")
     cells = {"tets": regions.mesh.tets, "facets": regions.facets}
     tags = {"tets": regions.cell_tags, "facets": regions.facet_tags}
@@ -121,19 +121,19 @@ def write_regions(path: AnyPath, regions: Regions) -> None:
             file[f"fields/{name}"] = field
 
     def part(name: str, kind: str, names: Iterable[str], fields: Mapping[str, NDArray]) -> str:
-        of_cells = {tag: (np.asarray(tags[kind][tag], np.int32), f"{data.name}:/{kind}_tags/{tag}") for tag in names}
-        of_vertices = {field: (values, f"{data.name}:/fields/{field}") for field, values in fields.items()}
+        cell_data = {tag: (np.asarray(tags[kind][tag], np.int32), f"{data.name}:/{kind}_tags/{tag}") for tag in names}
+        vertex_data = {field: (values, f"{data.name}:/fields/{field}") for field, values in fields.items()}
         points = regions.mesh.vertices, f"{data.name}:/vertices"
-        return grid(name, (cells[kind], f"{data.name}:/{kind}"), points, of_vertices, of_cells)
+        return grid(name, (cells[kind], f"{data.name}:/{kind}"), points, vertex_data, cell_data)
 
-    shown = part("mesh", "tets", tags["tets"], regions.fields) + part("facets", "facets", tags["facets"], {})
+    blocks = part("mesh", "tets", tags["tets"], regions.fields) + part("facets", "facets", tags["facets"], {})
     single = [part(name, "tets", [name], {}) for name in tags["tets"]]
     single += [part(f"facet_{name}" if name in tags["tets"] else name, "facets", [name], {}) for name in tags["facets"]]
-    write_text(path, document(shown, "".join(single)))
+    write_text(path, document(blocks, "".join(single)))
 
 
 def read_regions(path: AnyPath) -> Regions:
-    """Return what `write_regions` has written to `path`; InputError where the .h5 beside it was not written so."""
+    """Read regions written by `write_regions` to `path`; InputError if its .h5 file is missing or invalid."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "regions", "regions.h5 of a run") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])

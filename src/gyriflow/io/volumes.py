@@ -23,11 +23,11 @@ from .files import AGAIN, AnyPath, atomic_write, reading, require_finite
 log = logging.getLogger(__name__)
 
 MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
-# two header matrices that place every corner within this part of a voxel say the same thing
+# two header matrices agree if they place every corner within this share of a voxel
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
-MOST_PACKED = 1100
+MAX_COMPRESSION = 1100
 """How many times shorter gzip makes a file at most (1032 times), with some room."""
 
 
@@ -48,7 +48,7 @@ class LabelVolume:
 
 @dataclass(frozen=True, eq=False)
 class ScalarVolume:
-    """The (i, j, k) value of each voxel, NaN where the volume says nothing, and the (4, 4) affine to RAS+ mm."""
+    """The (i, j, k) values of the voxels, NaN if undefined, and the (4, 4) affine to RAS+ mm."""
 
     values: Floats
     affine: Floats
@@ -72,8 +72,8 @@ def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, crop
 
     A `cropped` one ends a voxel beyond its labels, so that an empty border takes no memory.
 
-    `affine_from` says which of NIfTI's two matrices counts; "auto" takes the one that is set and refuses two that
-    disagree. InputError for missing or truncated files, values that are no whole numbers, NaN, unclear orientation.
+    `affine_from` selects one of NIfTI's two matrices; "auto" takes the one that is set and refuses two that disagree.
+    InputError for missing or truncated files, non-integer values, NaN, and ambiguous orientation.
     """
     values, affine = read_values(path, affine_from, "labels")
     if cropped:
@@ -110,7 +110,7 @@ def names_unit(path: AnyPath) -> bool:
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
-    `content` says in messages what the values are: "labels". InputError for missing or truncated files, other numbers
+    `content` names the values in messages: "labels". InputError for missing or truncated files, other numbers
     of axes, unclear orientation.
     """
     image = _load(path, content)
@@ -129,10 +129,10 @@ VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI
 def _load(path: AnyPath, content: str = "numbers") -> SpatialImage:
     found = format_of(path, "volume")
     with reading(path, "an image", _expected(content)):
-        # nibabel knows other formats by what is in them
+        # nibabel recognises other formats by their contents
         image = VOLUME_READERS[found.name if found else "NIfTI"](path)
         if not isinstance(image, SpatialImage):
-            raise InputError("is no volume", path=path, found=type(image).__name__, expected=_expected(content))
+            raise InputError("is not a volume", path=path, found=type(image).__name__, expected=_expected(content))
     return image
 
 
@@ -157,7 +157,7 @@ def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
     image = nib.Nifti1Image(labels.astype(kind), volume.affine)
     image.header.set_xyzt_units("mm")
     image.set_sform(volume.affine, code="scanner")
-    # a quaternion holds no shear: where it cannot say the same as the sform, it stays unset
+    # a quaternion cannot express shear: if it cannot match the sform, it stays unset
     image.set_qform(volume.affine, code="scanner")
     if not np.allclose(image.get_qform(), volume.affine, atol=1e-3):
         image.set_qform(None, code="unknown")
@@ -172,9 +172,9 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     data = Path(image.file_map["image"].filename or path)
     packed = data.name.lower().endswith((".gz", ".mgz", ".bz2"))
     size = data.stat().st_size
-    if needed < 0 or needed > size * (MOST_PACKED if packed else 1):
+    if needed < 0 or needed > size * (MAX_COMPRESSION if packed else 1):
         expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
-        problem = "is shorter than its header says"
+        problem = "is shorter than its header specifies"
         raise InputError(problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN)
 
 
@@ -202,11 +202,11 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
     scale = np.array([[MM_PER_NIFTI_UNIT[unit]]] * 3 + [[1.0]])
     if affine_from != "auto":
         return scale * matrices[affine_from]
-    given = [name for name, code in codes.items() if code > 0]
-    if not given:
+    present = [name for name, code in codes.items() if code > 0]
+    if not present:
         problem = "neither qform nor sform is set, so left and right are unknown"
         raise InputError(problem, path=path, expected="a code > 0 of one", remedy=WHICH_MATRIX)
-    if len(given) == 2:
+    if len(present) == 2:
         voxel = np.linalg.norm(matrices["sform"][:3, :3], axis=0).min()
         difference = matrices["sform"] - matrices["qform"]
         ends = np.array(np.meshgrid(*[[0, n - 1] for n in image.shape[:3]])).reshape(3, -1)
@@ -215,7 +215,7 @@ def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPat
             problem = f"qform and sform disagree by up to {distance:.3g} {unit}"
             both = "".join(f"\n{name} (code {codes[name]})\n{matrices[name]}" for name in ("qform", "sform"))
             raise InputError(problem, path=path, found=f"{both}\n", remedy=WHICH_MATRIX)
-    return scale * matrices[given[0]]
+    return scale * matrices[present[0]]
 
 
 def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
@@ -225,7 +225,7 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
     except KeyError:
         unit = ""
     if unit not in MM_PER_NIFTI_UNIT:
-        problem, expected = "has a unit of length that NIfTI does not know", "2 (mm), 1 (metres), 3 (micrometres) or 0"
+        problem, expected = "has a unit of length that is not in NIfTI", "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
     return unit
 
@@ -235,17 +235,17 @@ def _checked_affine(affine: Floats, path: AnyPath) -> Floats:
     if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
         raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
     if sizes.max() > ANISOTROPY_WARNED * sizes.min():
-        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are used as they are", path, *sizes)
+        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
     return affine
 
 
 def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
     shape = values.shape
-    kept = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
-    if len(kept) != 3 or values.dtype.kind not in "biuf":
+    shape3d = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
+    if len(shape3d) != 3 or values.dtype.kind not in "biuf":
         form, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
         raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
-    return values.reshape(kept)
+    return values.reshape(shape3d)
 
 
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
@@ -255,10 +255,10 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
         if broken.any():
             broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
             remedy = "gyriflow does not segment images: give a tissue label volume."
-            raise InputError("has values that are no whole numbers", path=path, found=broken_values, remedy=remedy)
+            raise InputError("contains non-integer values", path=path, found=broken_values, remedy=remedy)
         values = np.rint(values)
     least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:
         span, expected = f"{least:.6g} to {largest:.6g}", f"whole numbers up to {bounds.max}"
-        raise InputError("has values that are no tissue labels", path=path, found=span, expected=expected)
+        raise InputError("contains values that are not tissue labels", path=path, found=span, expected=expected)
     return values.astype(np.int32)

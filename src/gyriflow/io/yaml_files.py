@@ -11,12 +11,12 @@ from ..settings.base import validated
 from ..settings.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
 from .files import AnyPath, write_text
 
-MOST_VALUES = 1_000_000
+MAX_VALUES = 1_000_000
 """How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Refuses two equal keys in one mapping, of which YAML would silently keep the last."""
+    """Loader that refuses duplicate keys, of which YAML would silently keep the last."""
 
 
 def _size(value: Any, sizes: dict[int, int]) -> int:
@@ -31,9 +31,9 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
     for key, _ in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
-            raise yaml.constructor.ConstructorError(None, None, "a key is no single word", key.start_mark)
+            raise yaml.constructor.ConstructorError(None, None, "keys must be scalars", key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
-            problem = f"the key {key.value!r} of line {first[key.value]} is there again"
+            problem = f"duplicate key {key.value!r} (first on line {first[key.value]})"
             raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         first[str(key.value)] = line
     loader.flatten_mapping(node)
@@ -61,8 +61,8 @@ def read_yaml(path: AnyPath) -> Any:
         # words that look like a date or a number and are none, such as 2001-99-99 or 0b
         problem = f"has a value that YAML cannot read: {error}"
         raise InputError(problem, path=path, remedy="Put texts in quotes.") from error
-    if size > MOST_VALUES:
-        raise InputError("has too many values, aliases written out", path=path, found=size, expected=MOST_VALUES)
+    if size > MAX_VALUES:
+        raise InputError("has too many values, aliases written out", path=path, found=size, expected=MAX_VALUES)
     return content
 
 
@@ -71,7 +71,7 @@ def read_keys(path: AnyPath) -> dict[str, Any]:
     content = read_yaml(path)
     if not isinstance(content, dict):
         kind = "nothing" if content is None else "a list" if isinstance(content, list) else repr(content)
-        raise InputError("holds no keys", path=path, found=kind, expected="keys with values, such as `week: 21`")
+        raise InputError("is not a mapping", path=path, found=kind, expected="keys with values, such as `week: 21`")
     return content
 
 
@@ -86,7 +86,7 @@ def write_yaml(path: AnyPath, content: Any) -> None:
 
 
 class Schemes(Mapping[str, LabelScheme]):
-    """The schemes by name, each read when it is first asked for; InputError where a file is no scheme."""
+    """The schemes by name, each read on first use; InputError if a file is not a scheme."""
 
     def __init__(self) -> None:
         self._known: dict[str, LabelScheme] = {}

@@ -75,12 +75,12 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             expected=expected,
         )
     values = map_coordinates(data, index.T, order=1, mode="nearest")
-    missing = ~np.isfinite(values)
-    if missing.any():
+    undefined = ~np.isfinite(values)
+    if undefined.any():
         raise InputError(
             "a map has no number in parts of the start brain",
             path=path,
-            found=f"{int(missing.sum())} vertices at voxels that are NaN or infinite",
+            found=f"{int(undefined.sum())} vertices at voxels that are NaN or infinite",
             expected=expected,
         )
     return values

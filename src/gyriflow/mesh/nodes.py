@@ -16,7 +16,7 @@ from ..geometry.triangles import Floats, Mask, TriangleMesh, edges, face_normals
 from .quality import jacobian_ratios, radius_ratios
 
 log = logging.getLogger(__name__)
-ALIKE = 0.5
+MIN_NORMAL_COSINE = 0.5
 """Least cosine between the normals of the mesh at a node and of the surface where the node is to go: the wall of a
 sulcus may be nearer to a node than the place it comes from."""
 FARTHEST = 0.25
@@ -66,8 +66,8 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
     length = np.linalg.norm(np.diff(boundary.vertices[ends], axis=1)[:, 0], axis=1)
     shortest = np.full(len(outer), np.inf)
     np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
-    alike = np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face]) >= ALIKE
-    near = alike & (distance <= FARTHEST * shortest)
+    agrees = np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face]) >= MIN_NORMAL_COSINE
+    near = agrees & (distance <= FARTHEST * shortest)
     target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)
     target[outer[near]] = place[near]
     way[outer[near]] = True

@@ -56,14 +56,14 @@ class GapWalls:
     area: Floats
 
 
-def fidelity(mesh: TriangleMesh, other: TriangleMesh) -> dict[str, float]:
-    """Return how far two surfaces are from each other, in mm.
+def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
+    """Return how far two surfaces are from each target, in mm.
 
     `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
     both directions; `hausdorff` is the largest distance found. Every face is sampled at the centroids of the four
     triangles between its corners and the middles of its edges, and for the largest distance at its corners.
     """
-    ways = [_distances(mesh, other), _distances(other, mesh)]
+    ways = [_distances(mesh, target), _distances(target, mesh)]
     return {
         "hausdorff99": surface_distance(ways, QUANTILE)[1],
         "hausdorff": max(float(distance.max()) for distance, _ in ways),
@@ -123,10 +123,10 @@ def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[N
     return np.array([hit[0] for hit in hits], dtype=np.int64), np.array([hit[1] for hit in hits], dtype=np.float64)
 
 
-def _distances(mesh: TriangleMesh, other: TriangleMesh) -> tuple[Floats, Floats]:
+def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
     a, b, c = corners(mesh).transpose(1, 0, 2)
     centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
-    distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), other)
+    distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), target)
     return distance, np.concatenate([np.tile(face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
 
 

@@ -1,4 +1,4 @@
-"""Filling a closed surface with tetrahedra of wanted sizes, and refusing a mesh that is not the inside of it."""
+"""Fill a closed surface with tetrahedra of given sizes, and refuse a mesh that does not match its inside."""
 
 import logging
 from typing import Any
@@ -32,7 +32,7 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 def edge_length_at(
     depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> NDArray[np.float64]:
-    """Return the wanted edge length in mm of elements of an order at depths in mm below the surface.
+    """Return the requested edge length in mm of elements of an order at depths in mm below the surface.
 
     It is that of the surface down to a depth, grows from there on, and ends at that of the core. With depth, nodes of
     elements of both orders are as far apart.
@@ -44,7 +44,7 @@ def edge_length_at(
 def background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
-    """Return a regular tetrahedral grid around the surface and the wanted edge length in mm at its vertices."""
+    """Return a regular tetrahedral grid around the surface and the requested edge length in mm at its vertices."""
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
@@ -124,14 +124,14 @@ def _refuse_other_shape(mesh: TetrahedralMesh, surface: TriangleMesh) -> None:
     volumes = signed_volumes(mesh)
     boundary, _ = boundary_surface(mesh)
     open_edges = int((edges(boundary)[1] != 2).sum())
-    wanted = signed_volume(surface)
-    changed = abs(volumes.sum() - wanted) > OTHER_VOLUME * wanted
+    expected_volume = signed_volume(surface)
+    changed = abs(volumes.sum() - expected_volume) > OTHER_VOLUME * expected_volume
     parts = [face_components(s).max() + 1 for s in (boundary, surface)]
     euler = [euler_number(s) for s in (boundary, surface)]
     problems = {
         f"{int((volumes <= 0).sum())} inverted elements": (volumes <= 0).any(),
         f"{open_edges} edges of its surface without two faces": open_edges > 0,
-        f"volume {volumes.sum():.0f} mm3 instead of {wanted:.0f}": changed,
+        f"volume {volumes.sum():.0f} mm3 instead of {expected_volume:.0f}": changed,
         f"{parts[0]} parts instead of {parts[1]}": parts[0] != parts[1],
         f"Euler number {euler[0]} instead of {euler[1]}": euler[0] != euler[1],
     }

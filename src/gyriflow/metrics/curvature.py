@@ -103,7 +103,7 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     return Curvature(mean + half_difference, mean - half_difference, fitted & ~one_sided, radii)
 
 
-def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:
+def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:
     """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
 
     intrinsic_curvature_index
@@ -115,26 +115,28 @@ def curvature_integrals(bend: Curvature, areas: Floats) -> dict[str, float]:
     gaussian_curvature_norm
         The L² norm 1/4π √(A ∫ K² dA) with A the area; 1 for a sphere (the same).
     """
-    smaller, larger = np.sort(np.abs([bend.maximum, bend.minimum]), axis=0)
+    smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
     integrals = {
-        "intrinsic_curvature_index": np.maximum(bend.gaussian, 0.0) @ areas,
+        "intrinsic_curvature_index": np.maximum(curvature.gaussian, 0.0) @ areas,
         "folding_index": (larger * (larger - smaller)) @ areas,
-        "mean_curvature_norm": bend.mean**2 @ areas,
-        "gaussian_curvature_norm": np.sqrt(areas.sum() * (bend.gaussian**2 @ areas)),
+        "mean_curvature_norm": curvature.mean**2 @ areas,
+        "gaussian_curvature_norm": np.sqrt(areas.sum() * (curvature.gaussian**2 @ areas)),
     }
     return {name: float(value) / (4.0 * np.pi) for name, value in integrals.items()}
 
 
-def mean_curvature_quantiles(bend: Curvature, areas: Floats) -> dict[str, float]:
+def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, float]:
     """Return the mean curvatures in 1/mm below which 5, 25, 50, 75 and 95 % of the area are, by name."""
-    values = np.quantile(bend.mean, QUANTILES, weights=areas, method="inverted_cdf")
+    values = np.quantile(curvature.mean, QUANTILES, weights=areas, method="inverted_cdf")
     names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
     return dict(zip(names, map(float, values), strict=True))
 
 
-def join(bends: list[Curvature]) -> Curvature:
+def join(curvatures: list[Curvature]) -> Curvature:
     """Return the curvature of surfaces side by side."""
-    return Curvature(*(np.concatenate([getattr(bend, one.name) for bend in bends]) for one in fields(Curvature)))
+    return Curvature(
+        *(np.concatenate([getattr(part, field.name) for part in curvatures]) for field in fields(Curvature))
+    )
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
@@ -152,7 +154,7 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
 
     The ball takes in what is linked to its centre by edges inside it: not the other wall of a sulcus. The weight is
     area × cosine × (1 − d²/radius²): area of the vertex, turned into the tangent plane, so that the sum stands for an
-    integral that does not depend on the mesh; nothing changes by a jump at the rim; and what is turned away by more
+    integral that does not depend on the mesh; nothing changes by a jump at the rim; and what is turned offset by more
     than 90° does not count. The tangent plane is that of the weighted mean of the normals.
 
     Returns
@@ -193,8 +195,8 @@ def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iter
             size = ball.nnz
             ball = ball @ links
             counts = np.diff(ball.indptr)
-            away = vertices[ball.indices] - np.repeat(vertices[centres], counts, axis=0)
-            inside = np.einsum("ij,ij->i", away, away) < np.repeat(radii_mm[centres] ** 2, counts)
+            offset = vertices[ball.indices] - np.repeat(vertices[centres], counts, axis=0)
+            inside = np.einsum("ij,ij->i", offset, offset) < np.repeat(radii_mm[centres] ** 2, counts)
             ends = np.concatenate([[0], np.cumsum(inside)])[ball.indptr]
             ball = sparse.csr_matrix(
                 (np.ones(ends[-1], dtype=bool), ball.indices[inside], ends), shape=(len(centres), len(vertices))
@@ -213,17 +215,17 @@ def _fit(
 ) -> Quadrics:
     near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
-    away = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
+    offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
     facing = normals[near]
-    share = areas[near] * (1.0 - np.einsum("ij,ij->i", away, away))
+    share = areas[near] * (1.0 - np.einsum("ij,ij->i", offset, offset))
 
     upright = normals[centres]
     for _ in range(2):
         weights = share * np.maximum(np.einsum("ij,ij->i", facing, np.repeat(upright, counts, axis=0)), 0.0)
         upright = unit(np.add.reduceat(weights[:, None] * facing, starts))
-    across = unit(np.cross(upright, np.eye(3)[np.abs(upright).argmin(axis=1)]))
-    frames = np.stack([across, np.cross(upright, across), upright], axis=1)
-    x, y, z = np.einsum("ijk,ik->ji", np.repeat(frames, counts, axis=0), away)
+    tangent = unit(np.cross(upright, np.eye(3)[np.abs(upright).argmin(axis=1)]))
+    frames = np.stack([tangent, np.cross(upright, tangent), upright], axis=1)
+    x, y, z = np.einsum("ijk,ik->ji", np.repeat(frames, counts, axis=0), offset)
 
     powers = {(0, 0): weights, (1, 0): weights * x, (0, 1): weights * y}
     for a, b in _MONOMIALS:

@@ -1,4 +1,4 @@
-"""What is around pial surfaces (hull, envelope), sulcal depth below it, and gyrification indices."""
+"""Hull and envelope of pial surfaces, sulcal depth below the envelope, and gyrification indices."""
 
 from dataclasses import dataclass
 
@@ -94,8 +94,8 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     closed = cap(mesh)
     if len(closed.faces) == len(mesh.faces):
         return Pieces(centres, areas)
-    kept = nearest_on(centres, closed)[1] < len(mesh.faces)
-    return Pieces(centres[kept], areas[kept])
+    is_original = nearest_on(centres, closed)[1] < len(mesh.faces)
+    return Pieces(centres[is_original], areas[is_original])
 
 
 def gyrification_index(meshes: list[TriangleMesh], around: list[Pieces]) -> float:

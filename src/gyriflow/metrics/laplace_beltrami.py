@@ -22,7 +22,7 @@ SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
 
 DENSE_VERTICES = 600
 DENSE_VERTICES_MANY_MODES = 3000
-"""Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are wanted."""
+"""Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are needed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     if size <= DENSE_VERTICES or (size <= DENSE_VERTICES_MANY_MODES and count > size // 3):
         values, functions = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1))
         return Modes(values, functions)
-    wanted, top = count + 2, (count + 6) * _spacing(mass)
+    needed, top = count + 2, (count + 6) * _spacing(mass)
     while (most := count_below(stiffness, mass, top)) < count:
-        top *= 1.01 * wanted / max(most, wanted // 4)
+        top *= 1.01 * needed / max(most, needed // 4)
     modes = modes_below(stiffness, mass, top)
     return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
 

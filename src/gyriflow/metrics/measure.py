@@ -40,7 +40,7 @@ class Folds:
     """
 
     mesh: TriangleMesh
-    bend: Curvature
+    curvature_maps: Curvature
     hull: Pieces
     envelope: Pieces
     depth: Floats
@@ -49,19 +49,19 @@ class Folds:
     def maps(self) -> dict[str, NDArray]:
         """Return the arrays per vertex by name, of those in `BrainMetrics.maps`."""
         return {
-            "shape_index": self.bend.shape_index,
-            "curvedness": self.bend.curvedness,
-            "mean_curvature": self.bend.mean,
-            "gaussian_curvature": self.bend.gaussian,
+            "shape_index": self.curvature_maps.shape_index,
+            "curvedness": self.curvature_maps.curvedness,
+            "mean_curvature": self.curvature_maps.mean,
+            "gaussian_curvature": self.curvature_maps.gaussian,
             "sulcal_depth_mm": self.depth,
             "local_gyrification_index": self.local_gyrification,
-            "reliable": self.bend.reliable.astype(np.int32),
+            "reliable": self.curvature_maps.reliable.astype(np.int32),
         }
 
 
 @dataclass(frozen=True, eq=False)
 class Hemisphere(Folds):
-    """A hemisphere of n vertices, "left" or "right", and what was measured on it beside its folds.
+    """A hemisphere of n vertices, "left" or "right", with its measures other than folds.
 
     Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others, `weyl`
     Weyl's number of modes.
@@ -84,7 +84,7 @@ def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
     return Folds(
         mesh=mesh,
-        bend=curvature(mesh, radius_mm=curvature_radius_mm),
+        curvature_maps=curvature(mesh, radius_mm=curvature_radius_mm),
         hull=pieces_over(hull, mesh),
         envelope=around,
         depth=sulcal_depth(mesh, hull),
@@ -97,14 +97,14 @@ def measure_hemisphere(
 ) -> Hemisphere:
     """Measure a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
     folds = measure_folds(mesh, curvature_radius_mm)
-    bend = folds.bend
+    curvature_maps = folds.curvature_maps
     stiffness, mass = laplacian(mesh)
     first = first_eigenvalue(stiffness, mass)
     modes, reach = modes_of(spangy_modes, stiffness, mass, first)
     weyl = weyl_number(area(mesh), first)
     # near a cut the proxy is continued from beyond
-    away, shape_index = np.flatnonzero(bend.reliable), bend.shape_index[:, None]
-    proxy = harmonic_continuation(mesh.vertices, mesh.faces, away, tolerance=1e-12)(shape_index[away])[:, 0]
+    reliable, shape_index = np.flatnonzero(curvature_maps.reliable), curvature_maps.shape_index[:, None]
+    proxy = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(shape_index[reliable])[:, 0]
     return Hemisphere(
         **vars(folds),
         name=name,
@@ -131,8 +131,8 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
-    bend = join([side.bend for side in sides])
-    weights = areas * bend.reliable
+    curvature_maps = join([side.curvature_maps for side in sides])
+    weights = areas * curvature_maps.reliable
     if not weights.any():
         reason = "every vertex has the edge of the surface within its radius"
         raise MeshError("no curvature away from the cut", found=reason, remedy="Lower metrics.curvature_radius_mm.")
@@ -145,15 +145,15 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     return {
         "gyrification_index": gyrification_index(meshes, [side.hull for side in sides]),
         "gyrification_index_envelope": gyrification_index(meshes, [side.envelope for side in sides]),
-        "mean_shape_index": mean(bend.shape_index),
-        "mean_curvedness": mean(bend.curvedness),
-        "sulcal_area_share": mean(bend.shape_index < 0),
-        "curvature_radius": mean(bend.radius_mm),
-        "curvature_wavelength": RESOLVED_RADII * mean(bend.radius_mm),
+        "mean_shape_index": mean(curvature_maps.shape_index),
+        "mean_curvedness": mean(curvature_maps.curvedness),
+        "sulcal_area_share": mean(curvature_maps.shape_index < 0),
+        "curvature_radius": mean(curvature_maps.radius_mm),
+        "curvature_wavelength": RESOLVED_RADII * mean(curvature_maps.radius_mm),
         "mean_sulcal_depth": mean(depth),
         "sulcal_depth_95": float(deep),
-        **curvature_integrals(bend, weights),
-        **mean_curvature_quantiles(bend, weights),
+        **curvature_integrals(curvature_maps, weights),
+        **mean_curvature_quantiles(curvature_maps, weights),
     }
 
 
@@ -162,15 +162,15 @@ def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
 
     Empty where it was measured nowhere.
     """
-    measured = np.isfinite(values)
-    if not measured.any():
+    is_measured = np.isfinite(values)
+    if not is_measured.any():
         return {}
-    chosen, weights = values[measured], areas[measured]
-    mean = float(np.average(chosen, weights=weights))
-    low, high = np.quantile(chosen, [0.05, 0.95], weights=weights, method="inverted_cdf")
+    selected, weights = values[is_measured], areas[is_measured]
+    mean = float(np.average(selected, weights=weights))
+    low, high = np.quantile(selected, [0.05, 0.95], weights=weights, method="inverted_cdf")
     return {
         "mean_thickness": mean,
-        "thickness_sd": float(np.sqrt(np.average((chosen - mean) ** 2, weights=weights))),
+        "thickness_sd": float(np.sqrt(np.average((selected - mean) ** 2, weights=weights))),
         "thickness_q05": float(low),
         "thickness_q95": float(high),
         "thickness_measured_share": float(weights.sum() / areas.sum()),
@@ -286,9 +286,9 @@ def measure_brain(
         thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
         sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
-    of_whole = size_metrics(whole, crossing_faces(whole)) | _folding_and_thickness(sides)
-    of_whole |= {metric: volume for metric, volume in volumes.items() if volume is not None}
-    metrics = {"whole": of_whole | area_ratio(of_whole)}
+    whole_metrics = size_metrics(whole, crossing_faces(whole)) | _folding_and_thickness(sides)
+    whole_metrics |= {metric: volume for metric, volume in volumes.items() if volume is not None}
+    metrics = {"whole": whole_metrics | area_ratio(whole_metrics)}
     for side in sides:
         sizes = size_metrics(side.mesh, side.crossing)
         metrics[side.name] = sizes | _folding_and_thickness([side]) | spectrum_metrics(side)

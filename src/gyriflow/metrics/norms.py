@@ -18,11 +18,11 @@ from .tables import BRAIN
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
 
-LEAST_BRAINS = 5
-"""Subjects of a week, of which quantiles are given."""
+MIN_BRAINS = 5
+"""Smallest number of subjects near a week for which quantiles are computed."""
 
-LEAST_FREEDOM = 3
-"""Degrees of freedom that the scatter round a curve needs to be known."""
+MIN_FREEDOM = 3
+"""Degrees of freedom below which the scatter around a curve is unknown."""
 
 WINDOW_GW = 0.5
 """Brains at most this far from a week are of that week."""
@@ -39,7 +39,7 @@ class PublishedNorm:
     """A published curve: mean and standard deviation as polynomials of the week, highest power first.
 
     It is for the first to the last of `weeks`, measured in a label `scheme` by counting `labels`, of so many
-    `subjects`, None where its source does not say. `tissue` is the list of a `LabelScheme` that is nearest to it in
+    `subjects`, None if its source does not state it. `tissue` is the list of a `LabelScheme` that is closest to it in
     other schemes, "" where there is none; `side` the hemisphere of the structure, None where it is in both.
     """
 
@@ -99,7 +99,7 @@ def published_scores(
     of another scheme than the norms', `sides` the hemispheres that the brain has.
 
     Columns structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution,
-    0 to 100), brains (that the norm was made of; NaN where its source does not say), flag ("ok"; "other labels": the
+    0 to 100), brains (that the norm was made of; NaN if its source does not state it), flag ("ok"; "other labels": the
     norm was measured with labels of another scheme; "outside the norm's weeks", or "one hemisphere" where the norm is
     of more than the brain has, then without expected, z and centile).
     """
@@ -109,14 +109,14 @@ def published_scores(
             continue
         norm = norms[name]
         inside = norm.weeks[0] <= week <= norm.weeks[1]
-        there = len(sides) == len(SIDES) or norm.side in sides
-        scored = inside and there
+        is_present = len(sides) == len(SIDES) or norm.side in sides
+        scored = inside and is_present
         mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
         z = (value - mean) / sd
         brains = np.nan if norm.subjects is None else norm.subjects
         flag = "other labels" if name in others else "ok"
         if not scored:
-            flag = "outside the norm's weeks" if there else "one hemisphere"
+            flag = "outside the norm's weeks" if is_present else "one hemisphere"
         rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
     return pd.DataFrame(rows, columns=columns)
@@ -142,8 +142,8 @@ def volume_tables(
     """
     rows, scores = [], []
     for brain in brains:
-        known = brain.subject, MEASURED, brain.week
-        rows += [(*known, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
+        columns = brain.subject, MEASURED, brain.week
+        rows += [(*columns, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
         found, others = structure_volumes(brain.volumes, brain.scheme, norms)
         scored = published_scores(found, brain.week, norms, others, brain.sides)
         scores.append(scored.assign(subject=brain.subject)[["subject", *scored.columns]])
@@ -163,8 +163,8 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
     for names, brains in _by_metric(metrics, reference):
         for week in np.unique(brains["week"]):
             near = brains[(brains["week"] - week).abs() <= WINDOW_GW].groupby("person")["value"].mean()
-            enough = near if len(near) >= LEAST_BRAINS else near.iloc[:0]
-            quantiles = enough.quantile(list(QUANTILES.values()))
+            sufficient = near if len(near) >= MIN_BRAINS else near.iloc[:0]
+            quantiles = sufficient.quantile(list(QUANTILES.values()))
             rows.append((*names, brains["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
     columns = ["hemisphere", "metric", "unit", "week", "brains", "mean", "sd", *QUANTILES]
     return pd.DataFrame(rows, columns=columns)
@@ -177,7 +177,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], *, individu
     squares, in which the scans of a subject count as one together. The centile is that of a further brain's value under
     Student's distribution, which is the wider the fewer subjects there are: t = (x − expected)/(s √(1 + h)), with s the
     scatter round the curve and h the leverage of the week. All brains of the table are scored; one of the reference is
-    compared with those of other subjects. Where the reference's brains are no `individuals`, but averages as those of
+    compared with those of other subjects. If the reference's brains are not `individuals`, but averages as those of
     an atlas, their scatter is not that of individuals: there are values to be expected, and no sd, z and centile.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
@@ -188,14 +188,16 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], *, individu
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     table = _with_people(metrics).assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
     rows = []
-    for row, alike, person in zip(table[names].to_dict("records"), table["alike"], table["person"], strict=True):
-        others = by_metric.get((row["hemisphere"], row["metric"]))
-        if others is None:
+    for row, is_comparable, person in zip(
+        table[names].to_dict("records"), table["alike"], table["person"], strict=True
+    ):
+        norm = by_metric.get((row["hemisphere"], row["metric"]))
+        if norm is None:
             continue
-        # a measured brain is compared with the others, of whom none is an earlier scan of itself
-        others = others[alike & ((row["run"] != MEASURED) | (others["person"] != person))]
-        *score, flag = _score(row["week"], row["value"], others, individuals)
-        rows.append((*row.values(), *score, flag if alike else OTHER_SIDES))
+        # the norm of an observed brain excludes all scans of its own subject
+        norm = norm[is_comparable & ((row["run"] != MEASURED) | (norm["person"] != person))]
+        *score, flag = _score(row["week"], row["value"], norm, individuals)
+        rows.append((*row.values(), *score, flag if is_comparable else OTHER_SIDES))
     columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -206,8 +208,8 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
     """
     sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
-    of_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    return sides.isin(sides[of_reference])
+    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    return sides.isin(sides[is_reference])
 
 
 def _with_people(metrics: pd.DataFrame) -> pd.DataFrame:
@@ -222,7 +224,7 @@ def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[An
 
 
 class _Curve(NamedTuple):
-    """What the curve through reference brains says at k weeks, and the scatter round it with its degrees of freedom."""
+    """The curve through reference brains at k weeks, and the scatter around it with its degrees of freedom."""
 
     expected: Floats
     leverage: Floats
@@ -232,12 +234,12 @@ class _Curve(NamedTuple):
 
 def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
     weeks, values = brains["week"].to_numpy(dtype=float), brains["value"].to_numpy(dtype=float)
-    # the scans of a subject are no independent brains
+    # the scans of one subject are not independent
     weights = 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
     distinct = len(np.unique(weeks))
     degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
     freedom = brains["person"].nunique() - degree - 1
-    if freedom < LEAST_FREEDOM:
+    if freedom < MIN_FREEDOM:
         return None
     centre = float(weeks.mean())
     powers, here = (np.vander(x - centre, degree + 1) for x in (weeks, at))
@@ -251,7 +253,7 @@ def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, individuals:
     """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
 
     Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
-    Student's distribution; NaN where the reference's brains are no `individuals`.
+    Student's distribution; NaN if the reference's brains are not `individuals`.
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]

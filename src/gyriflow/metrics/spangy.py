@@ -131,8 +131,8 @@ def spectrum(
     band = bands_of_modes(modes.eigenvalues)
     reach = float(modes.eigenvalues[-1]) if reach is None else reach
     bands = _band_table(modes.eigenvalues, band, coefficients, edge_length_mm, reach)
-    enough = weyl is not None and weyl <= len(coefficients)
-    cut = _relative(_powers(band[:weyl], coefficients[:weyl])) if enough else np.full(BANDS + 1, np.nan)
+    is_covered = weyl is not None and weyl <= len(coefficients)
+    cut = _relative(_powers(band[:weyl], coefficients[:weyl])) if is_covered else np.full(BANDS + 1, np.nan)
     bands.insert(list(bands.columns).index("complete"), "relative_power_weyl", cut.tolist())
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
@@ -199,10 +199,10 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     fine = resolved.eq(True).to_numpy()
     whole = powers.reindex(complete.index).where(complete.eq(True)).to_numpy(dtype=float)
     rows = [
-        (*one, other[0], other[2], *row)
-        for i, one in enumerate(hemispheres)
-        for j, other in enumerate(hemispheres)
-        if other[1] == MEASURED and other[3] == one[3] and i != j
+        (*first, second[0], second[2], *row)
+        for i, first in enumerate(hemispheres)
+        for j, second in enumerate(hemispheres)
+        if second[1] == MEASURED and second[3] == first[3] and i != j
         for row in _distances(whole[i], whole[j], fine[i] & fine[j])
     ]
     table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])

@@ -1,4 +1,4 @@
-"""Tables of a study made of those of its brains: all in one, left beside right, change between scans and weeks."""
+"""Tables of a study from those of its brains: all metrics, asymmetry, and change between scans and weeks."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -43,7 +43,7 @@ def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]])
     wide = table.assign(column=names).pivot_table("value", BRAIN, "column", aggfunc="first")
     brains = pd.MultiIndex.from_frame(table[BRAIN].drop_duplicates())
     wide = wide.reindex(index=brains, columns=list(dict.fromkeys(names))).reset_index().rename_axis(columns=None)
-    columns = dict.fromkeys(name for of_brain in covariates.values() for name in of_brain if name not in wide)
+    columns = dict.fromkeys(name for values in covariates.values() for name in values if name not in wide)
     for place, name in enumerate(columns, start=len(BRAIN)):
         wide.insert(place, name, [covariates.get(brain, {}).get(name) for brain in wide["subject"]])
     return wide
@@ -53,11 +53,11 @@ def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
     """Return the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
 
     Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known. Metrics have the
-    columns hemisphere, metric, value, and any others that rows of both sides have alike, such as region; these stay.
+    columns hemisphere, metric, value, and others that rows of both sides share, such as region; these are kept.
     """
     keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
     sides = metrics[metrics["hemisphere"].isin(SIDES)]
-    # of a hemisphere that is alone nothing can be said
+    # a single hemisphere has no asymmetry
     wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
     wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
     total = wide["left"].abs() + wide["right"].abs()

@@ -53,8 +53,8 @@ def at_part(values: NDArray, whole: TriangleMesh, part: TriangleMesh) -> NDArray
 
     InputError where the part has a vertex that the whole has not.
     """
-    away, nearest = cKDTree(whole.vertices).query(part.vertices)
-    if len(values) != len(whole.vertices) or away.max() > SAME_POINT_MM:
-        sizes = f"{len(values)} values; vertices of the part up to {away.max():.3g} mm from those of the whole"
+    distance, nearest = cKDTree(whole.vertices).query(part.vertices)
+    if len(values) != len(whole.vertices) or distance.max() > SAME_POINT_MM:
+        sizes = f"{len(values)} values; vertices of the part up to {distance.max():.3g} mm from those of the whole"
         raise InputError("values do not belong to the surface", found=sizes, expected=f"{len(whole.vertices)} values")
     return values[nearest]

@@ -22,7 +22,7 @@ DOWNLOADS = Path("resources", "atlases")
 
 FileKey = Literal["labels", "image", "left", "right", "pial"]
 SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
-"""The keys of files that give a surface, of which a series has one set; `image` goes with labels."""
+"""Sets of file keys that define a surface. A series has one of them; `image` is optional with labels."""
 WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
 """How a week may be written in a file's name, as `05.2f`."""
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
@@ -58,7 +58,7 @@ class AtlasLicence(Settings):
 
 
 class AtlasReference(Settings):
-    """What to cite."""
+    """The reference to cite."""
 
     citation: str
     """Authors, title, journal and year."""
@@ -139,7 +139,7 @@ class Atlas(Settings):
     licence: AtlasLicence
     """Terms of use."""
     reference: AtlasReference | None = None
-    """What to cite."""
+    """The reference to cite."""
     url: str | None = Field(None, pattern="^https?://")
     """Address of the files' root; `null`: not online."""
     folder: str | None = None
@@ -161,7 +161,7 @@ def shipped_atlases() -> list[str]:
 
 
 class AtlasSettings(Settings):
-    """An atlas, each week of which is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
+    """An atlas. Each of its weeks is a brain with the id `NAME-SERIES-WEEK` (`NAME-WEEK` if it has one series).
 
     `atlas: NAME` is short for a section; several atlases are a list. Missing files are fetched when a stage needs
     them, or by `./run snakemake --cores 1 retrieve`. An existing file is never replaced.

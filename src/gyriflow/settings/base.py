@@ -85,7 +85,7 @@ class Settings(BaseModel):
         return key in self.model_fields_set and getattr(self, key) is not None
 
 
-# messages: the path of each key, what is allowed, what was found
+# messages: path of the key, allowed values, value found
 
 Key = tuple[str | int, ...]
 
@@ -134,7 +134,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
 
 
 def keys_at(kind: Any, path: Key) -> list[str]:
-    """Return the keys of the settings at `path` inside the type `kind`; none where there are no settings."""
+    """Return the keys of the settings at `path` inside the type `kind`; empty if there are no settings."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         if not path:
             return list(kind.model_fields)

@@ -126,11 +126,11 @@ class BrainConfig(Settings):
         return HEMISPHERE_LABELS if is_volume(self.hemisphere.file) else HEMISPHERE_SURFACE
 
     def problems(self) -> Iterator[KeyProblem]:
-        given = [key for key in SOURCES if self.is_set(key)]
-        if not given and self.image is not None:
+        sources = [key for key in SOURCES if self.is_set(key)]
+        if not sources and self.image is not None:
             yield KeyProblem("gyriflow does not segment images; give a label volume under labels", ("image",))
-        elif len(given) != 1:
-            text = f"found {' and '.join(given) or 'none'} as its source; expected exactly one of {', '.join(SOURCES)}"
+        elif len(sources) != 1:
+            text = f"found {' and '.join(sources) or 'none'}; expected exactly one of {', '.join(SOURCES)}"
             yield KeyProblem(text)
         else:
             for key, kinds in KEY_SOURCES.items():
@@ -178,8 +178,8 @@ class GivenRegions(Settings):
         if (self.volume is not None) == bool(sides):
             yield KeyProblem(f"found {'both' if sides else 'neither'}; expected volume, or left and right")
         elif len(sides) == 1:
-            missing = "right" if sides == ["left"] else "left"
-            yield KeyProblem("is missing; both hemispheres need labels", (missing,))
+            side = "right" if sides == ["left"] else "left"
+            yield KeyProblem("is missing; both hemispheres need labels", (side,))
         if self.volume is not None and not self.names:
             yield KeyProblem("is missing; it defines the regions of the volume", ("names",))
 

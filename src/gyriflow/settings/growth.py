@@ -1,4 +1,4 @@
-"""The section `folding.growth`, and the growth models: what all parts of gyriflow but the solver know of them."""
+"""The section `folding.growth`, and the registry of growth models for all parts of gyriflow but the solver."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ ModelName = Literal["rates", "sizes", "shapes"]
 
 @dataclass(frozen=True)
 class GrowthModel:
-    """What configuration, planning, figures and methods text need to know of a growth model.
+    """Properties of a growth model for configuration, planning, figures and methods text.
 
     Attributes
     ----------

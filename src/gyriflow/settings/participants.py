@@ -13,9 +13,9 @@ class ParticipantsSettings(Settings):
     Columns are `participant_id` (or `id`); the gestational age, `gestational_age` or `week`, as `24.3`, `24+2` or
     `24w2d` (or `age_weeks`, `age_days`, or `age` with its unit in the sidecar); and keys of brains, inner ones with a
     dot (`hemispheres.left`), two `white` surfaces with a semicolon between. Instead of keys, `files` may name labels, a
-    pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is no value.
-    Other columns are covariates. Each participant is a subject; one with a `sub-01/sub-01_sessions.tsv` beside the
-    table has a brain for each of its sessions, with that one's age.
+    pial surface, or left and right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is an empty
+    value. Other columns are covariates. Each participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to
+    the table has a brain for each session, with its age.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
@@ -23,7 +23,7 @@ class ParticipantsSettings(Settings):
     file: str
     """Tab-separated file; paths in it are relative to it."""
     columns: dict[str, str] = Field({})
-    """Columns that the table lacks, with one value for all rows, in which `{subject}`, `{session}` and `{id}`,
+    """Columns to add to the table, with one value for all rows. In it `{subject}`, `{session}` and `{id}`,
     such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
     feta-7}`."""
 

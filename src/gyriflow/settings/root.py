@@ -64,16 +64,16 @@ class Config(Settings):
 
     @property
     def measured_only(self) -> "Config":
-        """This configuration with nothing to fold, and surfaces as they are for its runs."""
+        """This configuration without simulations, and with the surfaces that it has with them."""
         surface = self.surface.model_copy(update={"open_sulci": self.opens_sulci})
         nothing: dict[str, Any] = {"start": None, "folding": None, "runs": {}, "studies": {}, "calibrate": None}
         return self.model_copy(update={**nothing, "surface": surface})
 
     @property
     def opens_sulci(self) -> bool:
-        """Whether sulci that labels keep shut are opened.
+        """Whether fused sulci are opened.
 
-        They are not where brains are folded: elements are wider than slits, and what a mesh with shut sulci grows
-        towards or is compared with has to have them shut, too.
+        They stay fused in studies with runs: elements are wider than slits, and the brains that such a mesh grows
+        towards or is compared with must be fused, too.
         """
         return self.surface.open_sulci and not self.runs

@@ -142,9 +142,9 @@ def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainCo
     volumes = [brain for brain in brains if brain.has_labels]
     surfaces = [brain for brain in brains if not brain.has_labels]
     by_kind: dict[str, Sequence[BrainConfig]] = {"surface": surfaces, "volume": volumes}
-    given = {kind: members for kind, members in by_kind.items() if members}
+    present = {kind: members for kind, members in by_kind.items() if members}
     # a kind with a single week can only be compared across kinds
-    return given if len(given) == 1 or all(_ages(members) > 1 for members in given.values()) else {"all": brains}
+    return present if len(present) == 1 or all(_ages(members) > 1 for members in present.values()) else {"all": brains}
 
 
 def _ages(brains: Sequence[BrainConfig]) -> int:

@@ -60,8 +60,8 @@ class SchemeSettings(Settings):
         if both := sorted(set(self.left) & set(self.right)):
             yield KeyProblem(f"found {_as_text(both)}, which are also in left", ("right",))
         if bool(self.left) != bool(self.right):
-            missing = "right" if self.left else "left"
-            yield KeyProblem("is missing; the hemispheres are separated by both left and right", (missing,))
+            side = "right" if self.left else "left"
+            yield KeyProblem("is missing; the hemispheres are separated by both left and right", (side,))
 
 
 class LabelScheme(SchemeSettings):

@@ -63,7 +63,7 @@ REAL_BRAIN = "real brain"
 """What a measured brain is called in figures where its population is not named."""
 
 NO_REGION = 0
-"""The label of what is in no region."""
+"""The label of vertices without a region."""
 
 MAX_COLOURS = 6
 """Largest number of covariate values that charts show by colour."""

@@ -1,4 +1,4 @@
-"""What a study consists of: a configuration is resolved once into its brains, runs and comparisons, and their files."""
+"""Studies: load and check a configuration, and resolve it into brains, simulations, sweeps and figures."""
 
 from .resolve import resolve
 

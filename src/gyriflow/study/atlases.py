@@ -41,12 +41,12 @@ class UsedAtlas:
     @property
     def series(self) -> list[str]:
         """The names of the series that are used."""
-        given = self.settings.series
-        return list(self.atlas.series) if given is None else [given] if isinstance(given, str) else list(given)
+        series = self.settings.series
+        return list(self.atlas.series) if series is None else [series] if isinstance(series, str) else list(series)
 
     @property
     def folder(self) -> Path:
-        """Where missing files are put."""
+        """Folder for downloads."""
         return Path(self.settings.folder or Path.cwd() / DOWNLOADS / self.atlas.name)
 
     @cached_property
@@ -56,7 +56,7 @@ class UsedAtlas:
 
     @property
     def missing(self) -> list[AtlasFile]:
-        """Those that are to be fetched."""
+        """The files that have to be downloaded."""
         return [file for file in self.files if not file.copies]
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
@@ -66,7 +66,7 @@ class UsedAtlas:
             for key in series.files if self.settings.images else series.needed:
                 path = series.files[key].format(week=int(week) if week == int(week) else week)
                 copies = self._in_folder[series.files[key]].get(week) or self._shipped(path)
-                # what is not published has no address
+                # unpublished files have no address
                 url = f"{root}/{path}" if root and week in series.weeks else None
                 record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
                 place = copies[0] if copies else self.folder / path
@@ -78,7 +78,7 @@ class UsedAtlas:
         return [week for week in sorted(self.settings.weeks) if week in self.known_weeks(name)]
 
     def known_weeks(self, name: str) -> set[float]:
-        """Return the weeks of a series that are published, or of which the folder has all that a brain needs."""
+        """Return the weeks of a series that are published or whose necessary files are in the folder."""
         series = self.atlas.series[name]
         present = [set(self._in_folder[series.files[key]]) for key in series.needed]
         return set(series.weeks) | set.intersection(*present)
@@ -128,7 +128,7 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
 
 
 def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
-    """Yield what is wrong between a section, its atlas and its folder."""
+    """Yield the problems between a section, its atlas and its folder."""
     atlas, settings, licence = used.atlas, used.settings, used.atlas.licence
     if unknown := [name for name in used.series if name not in atlas.series]:
         yield KeyProblem(f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}", ("series",))

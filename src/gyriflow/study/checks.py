@@ -32,17 +32,17 @@ RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 RESERVED_STUDIES = (
     *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
 )
-"""Folders of the study's results that are no studies."""
+"""Folders of the study's results that are not sweeps."""
 
 
 def problems_between(config: Config) -> list[KeyProblem]:
-    """Return what is wrong between the sections of a configuration, each problem once."""
+    """Return the problems between the sections of a configuration, each once."""
     every = (names, starts, runs, growth, studies, calibration, metrics)
     return list(dict.fromkeys(problem for check in every for problem in check(config)))
 
 
 def names(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong with the names of brains, runs, studies and schemes, some of which are folders."""
+    """Yield problems of the names of brains, runs, studies and schemes, some of which are folder names."""
     if not config.brains and not config.atlas:
         yield KeyProblem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
     counts = Counter(brain.id for brain in config.brains)
@@ -67,15 +67,15 @@ def names(config: Config) -> Iterator[KeyProblem]:
             yield KeyProblem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
 
 
-def _equal_but_for_case(given: Iterable[str]) -> Iterator[tuple[str, str]]:
+def _equal_but_for_case(names: Iterable[str]) -> Iterator[tuple[str, str]]:
     first: dict[str, str] = {}
-    for name in given:
-        if (other := first.setdefault(name.lower(), name)) != name:
-            yield other, name
+    for name in names:
+        if (earlier := first.setdefault(name.lower(), name)) != name:
+            yield earlier, name
 
 
 def starts(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong with the start brains of the study and of its runs."""
+    """Yield problems of the start brains of the study and of its runs."""
     yield from _start_problems(config.start, config, ("start",))
     for name, run in config.runs.items():
         yield from _start_problems(run.start, config, ("runs", name, "start"))
@@ -98,11 +98,11 @@ def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProble
     brains = [brain.id for brain in config.brains]
     for name in dict.fromkeys(ids):
         if name not in brains:
-            yield KeyProblem(f"found {name!r}, which is no brain; {did_you_mean(name, brains)}", key)
+            yield KeyProblem(f"found {name!r}, which is not a brain; {did_you_mean(name, brains)}", key)
 
 
 def runs(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong between the settings of each run and its start brains."""
+    """Yield problems between the settings of each run and its start brains."""
     by_id = {brain.id: brain for brain in config.brains}
     for name, run in config.runs.items():
         brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
@@ -125,12 +125,12 @@ def _place(run: str, key: Key, config: Config) -> Key:
 
 
 def growth(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong between the brains, and the series that growth is measured on."""
-    given = config.growth.brains
-    named = dict(given) if isinstance(given, Mapping) else {}
+    """Yield problems between brains and growth series."""
+    growth_brains = config.growth.brains
+    named = dict(growth_brains) if isinstance(growth_brains, Mapping) else {}
     lists: dict[Key, Sequence[str]] = {("growth", "brains", name): ids for name, ids in named.items()}
-    if given is not None and not named:
-        lists = {("growth", "brains"): list(given)}
+    if growth_brains is not None and not named:
+        lists = {("growth", "brains"): list(growth_brains)}
     every = [brain.id for brain in config.brains]
     lists = {key: every if named and ALL in ids else ids for key, ids in lists.items()}
     unknown = [problem for key, ids in lists.items() for problem in _unknown(ids, config, key)]
@@ -144,26 +144,26 @@ def growth(config: Config) -> Iterator[KeyProblem]:
         mixed = sorted({brain.population or "of no known population" for brain in brains})
         if named and len(mixed) > 1:
             yield KeyProblem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
-    series, wanted = growth_series(config.brains, config.growth.brains), config.growth.series
-    if wanted is not None and series and wanted not in series:
-        yield KeyProblem(f"found {wanted!r}; the series are {', '.join(series)}", ("growth", "series"))
+    series, preferred = growth_series(config.brains, config.growth.brains), config.growth.series
+    if preferred is not None and series and preferred not in series:
+        yield KeyProblem(f"found {preferred!r}; the series are {', '.join(series)}", ("growth", "series"))
 
 
 def metrics(config: Config) -> Iterator[KeyProblem]:
-    """Yield brains that the metrics' settings name and that are not there, and scans of a subject of one week."""
-    given = config.metrics
+    """Yield unknown brains in the settings of metrics, and scans of a subject in the same week."""
+    settings = config.metrics
     atlases = {used.atlas.name for used in used_atlases(config)}
-    norm = [name for name in given.norm_reference or () if name not in atlases]
+    norm = [name for name in settings.norm_reference or () if name not in atlases]
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
-    values = {brain.covariates.get(given.colour_by or "") for brain in config.brains} - {None}
-    if given.colour_by and not 1 < len(values) <= MAX_COLOURS:
+    values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
+    if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
         yield KeyProblem(
-            f"found {len(values)} values of {given.colour_by!r}; colours tell 2 to {MAX_COLOURS} apart",
+            f"found {len(values)} values of {settings.colour_by!r}; colours can show 2 to {MAX_COLOURS}",
             ("metrics", "colour_by"),
         )
-    with_regions = given.regions if isinstance(given.regions, dict) else {}
+    with_regions = settings.regions if isinstance(settings.regions, dict) else {}
     yield from _unknown(with_regions, config, ("metrics", "regions"))
-    yield from _unknown([given.template] if given.template else (), config, ("metrics", "template"))
+    yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # the carrying of regions and their asymmetry are of both sides
     if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
         yield KeyProblem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
@@ -174,7 +174,7 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
 
 
 def studies(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong between the studies, the runs and the brains."""
+    """Yield problems between the studies, the runs and the brains."""
     study_of_run: dict[str, str] = {}
     for name, study in config.studies.items():
         key = ("studies", name)
@@ -202,11 +202,11 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
     if wrong := [name for name in places if name in NOT_VARIED]:
         yield KeyProblem("cannot differ within a study; choose another base", places[wrong[0]])
         return
-    for _, chosen in variants("", study):
+    for _, combination in variants("", study):
         try:
-            settings = changed(base, study.changes(chosen))
+            settings = changed(base, study.changes(combination))
         except KeyError as error:
-            yield KeyProblem("there is no such key of folding", places[error.args[0]])
+            yield KeyProblem("is not a key of folding", places[error.args[0]])
             return
         except ValidationError as error:
             for path, text in messages(error, Run):
@@ -217,21 +217,21 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
                 yield KeyProblem(problem.text, (*key, "vary", *problem.key))
 
 
-def _comparison_problems(compared: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
-    weeks, week = {brain.id: brain.week for brain in config.brains}, compared.compare_week
-    if compared.base not in config.runs:
-        yield KeyProblem(f"found {compared.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))
-    for brain in compared.compare_with or ():
+def _comparison_problems(settings: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
+    weeks, week = {brain.id: brain.week for brain in config.brains}, settings.compare_week
+    if settings.base not in config.runs:
+        yield KeyProblem(f"found {settings.base!r}; expected a run: {', '.join(config.runs)}", (*key, "base"))
+    for brain in settings.compare_with or ():
         if weeks.get(brain) != week:
-            what = f"of {weeks[brain]:g} GW" if brain in weeks else "which is no brain"
+            what = f"of {weeks[brain]:g} GW" if brain in weeks else "which is not a brain"
             yield KeyProblem(f"found {brain}, {what}; expected brains of {week:g} GW", (*key, "compare_with"))
-    if compared.compare_with is None and week not in weeks.values():
-        there = ", ".join(f"{other:g}" for other in sorted(set(weeks.values())))
-        yield KeyProblem(f"found {week:g}; there are brains of {there} GW to compare with", (*key, "compare_week"))
+    if settings.compare_with is None and week not in weeks.values():
+        available = ", ".join(f"{other_week:g}" for other_week in sorted(set(weeks.values())))
+        yield KeyProblem(f"found {week:g}; there are brains of {available} GW to compare with", (*key, "compare_week"))
 
 
 def calibration(config: Config) -> Iterator[KeyProblem]:
-    """Yield what is wrong between the calibration, the runs and the brains."""
+    """Yield problems between the calibration, the runs and the brains."""
     calibrate = config.calibrate
     if calibrate is None:
         return
@@ -252,7 +252,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
         if key == STIFFNESS_RATIO and isinstance(base.shear_modulus_core_pa, Varying):
             yield "the core's shear modulus varies in the base run; expected a number"
         if curve != key and not _is_curve(curve, base):
-            yield f"{curve} is no curve in the base run"
+            yield f"{curve} is not a curve in the base run"
     elif key in NOT_VARIED:
         yield "cannot be calibrated"
     else:
@@ -260,7 +260,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
             try:
                 changed(base, {key: bound})
             except KeyError:
-                yield "there is no such key of folding"
+                yield "is not a key of folding"
                 return
             except ValidationError as error:
                 yield from dict.fromkeys(text for _, text in messages(error, Run))

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from ..errors import InputError
-from ..io.exports import ExportedBrain, labels_of
+from ..io.exports import ExportedBrain, labels_file
 from ..settings.atlas import Atlas
 from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
@@ -312,5 +312,5 @@ class Study:
             "population": atlas_brain.population,
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
             "surfaces": [*last.parts.values()],
-            "labels": labels_of("results/export", brain, exported) if brain.volume else None,
+            "labels": labels_file("results/export", brain, exported) if brain.volume else None,
         }
