@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from ellipsoid import RUN, SEMI_AXES
+from facts import Facts
 from shapes import ellipsoid_mesh, rigid
 
 from gyriflow.errors import SolverError
@@ -34,7 +35,7 @@ def test_a_brain_off_the_curve_comes_onto_it_within_a_week():
 
 def test_a_curve_that_is_missed_is_named_with_how_far():
     row = {"week": 23.0, "area_cm2": 99.0, "area_aim_cm2": 100.0, "volume_ml": 50.1, "volume_aim_ml": 50.0}
-    assert missed_curves(row) == "at GW 23 the brain is area -1.0 % off its curve"
+    assert missed_curves(row) == Facts("GW 23", "area", "-1.0 %") != Facts("volume")
     assert missed_curves(row | {"area_cm2": 100.2}) == ""
     assert missed_curves({"week": 23.0, "area_cm2": 99.0, "volume_ml": 50.0}) == ""
 
@@ -98,8 +99,9 @@ def test_bounds_leave_the_volume_on_its_curve():
     # less area than the volume makes: the core grows by itself
     assert steered_rates(np.array([-0.02, 0.035]), MADE, BOUNDS) == (0.0, pytest.approx(0.02), True)
     assert steered_rates(np.array([-0.01, -0.02]), MADE, BOUNDS) == (0.0, 0.0, True)
-    with pytest.raises(SolverError, match="growth by sizes finds no rates"):
-        steered_rates(np.array([0.01, 0.02]), MADE * [[1, 1], [1, 0]], BOUNDS)
+    singular = MADE * [[1, 1], [1, 0]]
+    with pytest.raises(SolverError):
+        steered_rates(np.array([0.01, 0.02]), singular, BOUNDS)
 
 
 def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its_direction():

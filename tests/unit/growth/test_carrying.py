@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from facts import Facts
 from scipy.ndimage import gaussian_filter
 from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
 
@@ -58,16 +59,16 @@ def test_surfaces_are_matched_whatever_the_order_of_their_triangles():
 
 
 def test_other_triangles_and_other_places_are_refused():
-    with pytest.raises(InputError, match="642 vertices and 1280 triangles"):
+    with pytest.raises(InputError, check=Facts(642, 1280, 2562, 5120, "growth.matched_surfaces")):
         match_surfaces(ATLAS, sphere(subdivisions=3))
     wrong = ATLAS.faces.copy()
     wrong[0] = wrong[0, 0], wrong[0, 1], wrong[400, 2]
-    with pytest.raises(InputError, match="different vertices or triangles"):
+    with pytest.raises(InputError, check=Facts(2562, 5120, "growth.matched_surfaces")):
         match_surfaces(ATLAS, TriangleMesh(GROWN.second, wrong))
     shuffled = np.random.default_rng(0).permutation(GROWN.second)
-    with pytest.raises(InputError, match="do not correspond"):
+    with pytest.raises(InputError, check=Facts("129°", 1.39, "30°", 0.3)):
         match_surfaces(ATLAS, TriangleMesh(shuffled, ATLAS.faces))
-    with pytest.raises(InputError, match="a rotation of 149° between them"):
+    with pytest.raises(InputError, check=Facts("149°", "30°")):
         match_surfaces(ATLAS, TriangleMesh(GROWN.second @ TURN.T, ATLAS.faces))
 
 
@@ -81,7 +82,7 @@ def test_another_mesh_of_the_brain_goes_along_in_any_pose():
     assert found[2] == pytest.approx(own.vertices * STRETCH, abs=0.05)
     assert np.array_equal(carry_surface(own, [turned, back]), found[2])
     assert carry_surface(own, []) is own.vertices
-    with pytest.raises(InputError, match=r"first matched surface; found 5\.16 mm"):
+    with pytest.raises(InputError, check=Facts("5.16 mm", "2 mm")):
         follow_surfaces(TriangleMesh(own.vertices * 1.5, own.faces), [turned])
 
 
@@ -119,7 +120,7 @@ def test_matched_surfaces_are_read_as_written(tmp_path):
     assert np.array_equal(read.first.vertices, ATLAS.vertices)
     assert np.array_equal(read.first.faces, ATLAS.faces)
     assert np.array_equal(read.second, GROWN.second)
-    with pytest.raises(ValueError, match="matched vertices"):
+    with pytest.raises(ValueError, match="vertices"):
         MatchedSurfaces(ATLAS, GROWN.second[1:])
 
 
@@ -131,11 +132,10 @@ def test_carried_meshes_are_read_as_written(tmp_path):
     assert read.weeks.tolist() == [21.0, 22.5]
     assert read.positions == pytest.approx(carried.positions, abs=1e-5)
     assert [read.index(week) for week in (21.0, 22.5)] == [0, 1]
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError, check=Facts("22 GW", "21, 22.5 GW")):
         read.index(22.0)
-    assert all(fact in str(refused.value) for fact in ("22 GW", "21, 22.5 GW"))
     (tmp_path / "torn.h5").write_bytes(b"torn")
-    with pytest.raises(InputError, match=r"torn\.h5: cannot be read as shapes of a mesh"):
+    with pytest.raises(InputError, check=Facts(tmp_path / "torn.h5")):
         read_weekly_shapes(tmp_path / "torn.h5")
 
 
@@ -151,7 +151,7 @@ def test_points_are_carried_in_turn():
     positions = carry_over_weeks(BALL.vertices, chain)
     assert positions.shape == (3, len(BALL.vertices), 3)
     assert positions[2] == pytest.approx(1.2 * (1.1 * BALL.vertices + [1, 0, 0]))
-    with pytest.raises(InputError, match=r"outside the grid.*interval 1 of 2.*up to 40 mm"):
+    with pytest.raises(InputError, check=Facts(1, 2, len(BALL.vertices), "40 mm")):
         carry_over_weeks(BALL.vertices + [60.0, 0, 0], chain)
 
 
@@ -176,7 +176,7 @@ def test_maps_come_to_the_vertices_of_a_template():
     assert found["template_distance_mm"].max() < 0.05
     # of the template itself, which needs no registration
     assert maps_on_template({"x": brain.vertices[:, 0]}, brain, brain, [])["x"] == pytest.approx(brain.vertices[:, 0])
-    with pytest.raises(InputError, match="outside the grid"):
+    with pytest.raises(InputError, check=Facts(642, "40 mm")):
         maps_on_template(maps, brain, transformed(template, scaling(1, (60, 0, 0))), [between])
 
 
@@ -290,7 +290,7 @@ def test_a_brain_in_another_pose_is_turned_first(pair):
 def test_a_failed_registration_is_refused_with_numbers(pair):
     none = Deformation(np.eye(4), np.zeros((*pair[0].tissue.shape, 3)), pair[0].affine)
     quality = measure_quality(*pair, none)
-    with pytest.raises(InputError, match=r"registration week 21 to 22 has failed: Dice of the cerebrum 0\.\d+ below"):
+    with pytest.raises(InputError, match=r"0\.7\d+ .*0\.2\d+ ", check=Facts("week 21 to 22", 0.95, 0.6)):
         require_good(quality, pair="week 21 to 22")
 
 
@@ -301,13 +301,13 @@ def test_a_map_that_folds_is_refused(pair, found):
     quality = measure_quality(*pair, folded)
     assert quality.least_determinant < 0
     assert quality.folded_share > 0.005
-    with pytest.raises(InputError, match="the map folds in"):
+    with pytest.raises(InputError, check=Facts("21-22", "9.37%", "0.50%")):
         require_good(quality, pair="21-22")
 
 
 def test_a_cerebrum_at_the_edge_of_the_volume_is_refused():
     affine = centred()
-    with pytest.raises(InputError, match=r"edge of the volume.*i = 0"):
+    with pytest.raises(InputError, check=Facts(280, "i = 0")):
         channels(volume(affine, later=False)[21:], affine, cerebrum=(WHITE, CORTEX))
 
 
@@ -318,7 +318,7 @@ def test_images_are_compared_where_both_brains_have_one(pair):
     shown = channels(labels, affine, cerebrum=(WHITE, CORTEX), image=(image, affine))
     assert shown.cortex is None
     assert np.quantile(shown.intensity[shown.tissue > 0], 0.99) == pytest.approx(1.0, abs=0.01)
-    with pytest.raises(InputError, match="does not show the cerebrum"):
+    with pytest.raises(InputError, check=Facts("0%", "99 %", 0)):
         channels(labels, affine, cerebrum=(WHITE, CORTEX), image=(np.zeros_like(image), affine))
     found = register(replace(shown, cortex=pair[0].cortex), replace(pair[1], intensity=None))
     assert found.channels == ("cerebrum", "cortex")
@@ -330,5 +330,5 @@ def test_deformations_are_read_as_written(tmp_path, found):
     assert np.array_equal(read.matrix, found.deformation.matrix)
     assert read.displacement == pytest.approx(found.deformation.displacement, abs=1e-6)
     (tmp_path / "b.h5").write_bytes(b"torn")
-    with pytest.raises(InputError, match=r"b\.h5: cannot be read as a correspondence"):
+    with pytest.raises(InputError, check=Facts(tmp_path / "b.h5")):
         read_correspondence(tmp_path / "b.h5")

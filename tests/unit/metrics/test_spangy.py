@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from facts import Facts
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
 from shapes import ellipsoid, sheet, sphere
@@ -91,8 +92,9 @@ def test_a_sphere_has_its_degrees_in_the_bands() -> None:
 
 def test_two_pieces_are_refused(shape) -> None:
     apart = transformed(shape, [[1, 0, 0, 100], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    with pytest.raises(MeshError, match="one piece"):
-        first_eigenvalue(*laplacian(merged(shape, apart)))
+    pair = laplacian(merged(shape, apart))
+    with pytest.raises(MeshError):
+        first_eigenvalue(*pair)
 
 
 def found(choice, mesh: TriangleMesh) -> tuple[Modes, float]:
@@ -237,16 +239,16 @@ def test_modes_other_than_the_inertia_counts_are_an_error(monkeypatch: pytest.Mo
     stiffness, mass = laplacian(ellipsoid(AXES))
     counted = laplace_beltrami.count_below
     monkeypatch.setattr(laplace_beltrami, "count_below", lambda *arguments: counted(*arguments) + wrong)
-    with pytest.raises(SolverError, match="number of modes is wrong"):
+    with pytest.raises(SolverError, check=Facts(27, 27 + wrong)):
         lowest_modes(stiffness, mass, 20)
 
 
 def test_vertex_without_a_face_is_refused() -> None:
-    with pytest.raises(MeshError, match="without a face"):
+    with pytest.raises(MeshError, check=Facts(1)):
         laplacian(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]]))
 
 
 def test_more_modes_than_a_surface_has_are_refused() -> None:
     stiffness, mass = laplacian(ellipsoid(AXES, 2))
-    with pytest.raises(SolverError, match="found 163; expected 1 to 162"):
+    with pytest.raises(SolverError, check=Facts(163, 1, 162)):
         lowest_modes(stiffness, mass, 163)
