@@ -4,10 +4,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from facts import Facts
 from shapes import sphere
 
 from gyriflow.compare.published import (
+    AGREES,
+    MISSING,
     NOT_COMPARABLE,
+    NOT_RUN,
     SweepTables,
     comparison_caption,
     published_nearest,
@@ -186,33 +190,33 @@ def verdicts(displacement: pd.DataFrame, *studies: SweepTables) -> dict[str, tup
 
 def test_displacements_agree_by_all_nodes_or_by_the_surface():
     found = verdicts(moves(all=1.0, pial=2.5))
-    assert found["largest displacement, 21-22 GW (mm)"] == ("all nodes 1.00, surface 2.50", "as in the paper")
+    largest, mean = (row for result, row in found.items() if result == Facts("21-22 GW"))
+    assert largest == (Facts("1.00", "2.50"), AGREES)
     # the paper's 0.42 for 0.50 and 1.25
-    assert found["mean displacement, 21-22 GW (mm)"] == ("all nodes 0.50, surface 1.25", "+19%, +198%")
-    assert found["largest displacement, 22-23 GW (mm)"] == ("–", "not run")
+    assert mean == (Facts("0.50", "1.25"), "+19%, +198%")
+    assert [row for result, row in found.items() if result == Facts("22-23 GW")] == [(MISSING, NOT_RUN)] * 2
 
 
 def test_energy_and_emissions_are_those_of_a_week_of_the_run():
-    found = verdicts(moves())
-    assert found["hours a gestational week"][0] == "0.5 (9 elements, 2 ranks)"
+    *_, hours, energy, emissions = verdicts(moves()).items()
+    assert hours == (Facts("hours"), (Facts(0.5, 9, 2), NOT_COMPARABLE))
     # 2 h of a core of 12 W in two weeks
-    assert found["energy (Wh) a gestational week"][0] == "12 (9 elements, 2 ranks)"
-    assert found["emissions (g CO2e) a gestational week"][0] == "5.7 (9 elements, 2 ranks)"
+    assert energy == (Facts("(Wh)"), (Facts(12, 9, 2), NOT_COMPARABLE))
+    assert emissions == (Facts("(g CO2e)"), (Facts(5.7, 9, 2), NOT_COMPARABLE))
 
 
 def test_findings_of_a_sweep_are_checked_one_by_one():
     found = verdicts(moves(), sweep(SHARES, (0.4, 0.35), 0.2))
-    assert found["all thicknesses come to 28 GW"] == ("1 of 2 runs", "in part")
-    here, verdict = found["nearest thickness_mm by relative_power_B4, 28 GW"]
-    assert here == "left, cut: 2.25; right, cut: 0.8 (not resolved by the mesh)"
-    assert verdict == "in part"
+    checked = {entry["check"]: found[entry["finding"]] for entry in PUBLISHED["findings"][::-1]}
+    assert checked["all_come"] == (Facts(1, 2), "in part")
+    (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", "relative_power_B4", "28 GW"))
+    assert nearest == (Facts("left", 2.25, "right", 0.8, "not resolved by the mesh"), "in part")
     # three simulated hemispheres and the two of the real brain, of which the thick one has more B5
-    assert found["B4 is above B5 and B6, in real and simulated brains"] == ("4 of 5 cases", "in part")
-    here, verdict = found["B6 is very weak, in real and simulated brains"]
-    assert here == "5 of 5 cases when cut; in whole bands 0.20 to 0.20"
-    assert verdict == "as in the paper, by the cut alone"
+    assert checked["most_B4"] == (Facts(4, 5), "in part")
+    assert checked["little_B6"] == (Facts("5 of 5", "0.20"), Facts(AGREES))
+    assert checked["little_B6"][1] != AGREES
     # of thin alone both sides are there; the real one has the same on both
-    assert found["B4 is higher on the right, in real and simulated brains"] == ("1 of 2 cases", "in part")
+    assert checked["right_B4"] == (Facts(1, 2), "in part")
     # the real 0.35 is above 0.3 on the right, not above 0.4 on the left
     assert found["B5 of the real brain is above that of any simulation"] == ("1 of 2 cases", "in part")
     assert found["ratios of 1 to 20 come to 29 GW"] == ("–", "not run")
@@ -248,10 +252,12 @@ def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
 
 def test_a_caption_names_the_observed_brains_and_another_population():
     table = compared(t1=0.3)
-    text = comparison_caption("thickness", 28.0, pd.concat([table, table.assign(real="c", same_population=True)]))
-    assert all(fact in text for fact in ("thickness", "28 GW", "b (other)", "c (other)"))
-    assert "another population" in text
-    assert "another population" not in comparison_caption("thickness", 28.0, table.assign(same_population=True))
+    both = pd.concat([table, table.assign(real="c")])
+    mixed, same = (
+        comparison_caption("thickness", 28.0, both.assign(same_population=known)) for known in ([False, True], True)
+    )
+    assert same == Facts("thickness", "28 GW", "b (other)", "c (other)")
+    assert len(mixed) > len(same)
     none = comparison_caption("thickness", 28.0, table[:0])
     assert "No run" in none
     assert "28 GW" in none

@@ -131,7 +131,7 @@ def test_a_growth_model_without_sizes_follows_none():
 
 def test_a_brain_without_a_series_has_no_measured_curve():
     for table, series in ((None, None), (curves(), "surface")):
-        with pytest.raises(InputError, check=Facts("area_cm2", "growth")):
+        with pytest.raises(InputError, check=Facts("area_cm2")):
             followed_sizes(MEASURED, table, series, [21.0, 22.0], False)
 
 
