@@ -149,7 +149,7 @@ rule registration_ceiling:
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
-        "../scripts/validation.py"
+        "../scripts/registration_ceiling.py"
 
 
 def onset_surfaces(wildcards):

@@ -33,11 +33,14 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
     return np.stack(positions)
 
 
-def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a mesh's vertices: the given ones, and carried to w later weeks.
+def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence], pose: Pose | None = None) -> Floats:
+    """Return the (w + 1, n, 3) positions of a mesh's vertices: its own, and carried to w later weeks.
 
-    With matched surfaces the boundary follows them and the inside is continued harmonically.
+    All are in the worlds of the files, which correspondences refer to; `pose` is that of the mesh, if it is posed. With
+    matched surfaces the boundary follows them and the inside is continued harmonically.
     """
+    if pose is not None:
+        mesh = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
     if matched := [pair for pair in later if isinstance(pair, MatchedSurfaces)]:
         return follow_inside(mesh, matched)
     return carry_over_weeks(mesh.vertices, [pair for pair in later if isinstance(pair, Deformation)])

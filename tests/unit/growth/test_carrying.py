@@ -94,6 +94,9 @@ def test_the_inside_goes_along_smoothly(order):
     found = carry_mesh(solid, [GROWN])
     # a linear displacement is harmonic
     assert found[1] == pytest.approx(solid.vertices * STRETCH, abs=0.05)
+    pose = Pose(rigid(0, 0, 30, shift=(4, 0, 1)))
+    posed = replace(solid, vertices=transform_points(solid.vertices, pose.world))
+    assert carry_mesh(posed, [GROWN], pose) == pytest.approx(found, abs=0.01)
 
 
 def test_a_posed_surface_is_carried_into_the_pose_of_the_later_brain():
