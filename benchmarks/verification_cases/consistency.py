@@ -45,9 +45,8 @@ def problem_of(zone_of, comm: MPI.Comm, uniform: bool, order: int) -> NonlinearP
     problem = NonlinearProblem(domain, zones, NeoHookean(0.45), penalty_pa_per_m=5e5, remembers_stress=True)
     x = 0 if uniform else domain.local(domain.positions)[:, 2] / (SIDE_MM * 1e-3)
     ones, cells = np.ones(len(domain.vertex_of_node)), len(domain.cells)
-    mu, dg, dr = (
-        nodal[domain.cells] @ problem.points.smooth.T for nodal in (1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones)
-    )
+    to_points = problem.points.interpolation.T
+    mu, dg, dr = (nodal[domain.cells] @ to_points for nodal in (1000 * (ones + x), 0.05 * (ones + x), -0.02 * ones))
     normals = np.tile([1 / 3, 2 / 3, 2 / 3], (*mu.shape, 1))
     V = np.tile(STRETCH, (cells, len(problem.points.weights), 1, 1))
     problem.set_step(mu, layered_inverse(dg, dr, np.ones(cells, bool), normals), V)
@@ -75,7 +74,7 @@ def slopes_of_remainders(comm: MPI.Comm = MPI.COMM_WORLD, order: int = 1) -> Flo
     u = 2e-4 * np.stack([np.sin(0.3 * x[:, 1]), np.cos(0.25 * x[:, 2]), np.sin(0.05 * x[:, 0] * x[:, 1])], axis=1)
     v = np.ascontiguousarray(u[:, [2, 0, 1]]) / 2
     v[x[:, 2] < -0.499 * SIDE_MM] = 0.0
-    energy, residual, owned = problem.energy(u), problem.residual(u), v[: domain.owned].ravel()
+    energy, residual, owned = problem.energy(u), problem.residual(u), v[: domain.n_owned].ravel()
     tangent = problem.tangent(residual).matrix
     direction, change = tangent.createVecs()
     direction.array[:] = owned

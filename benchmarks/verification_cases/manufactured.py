@@ -62,11 +62,11 @@ class BodyForce:
             compiled = dolfinx.fem.form(form, jit_options=options)
         load = dolfinx.fem.assemble_vector(compiled)
         load.scatter_reverse(dolfinx.la.InsertMode.add)
-        self.load = load.array[: 3 * problem.domain.owned]
+        self.load = load.array[: 3 * problem.domain.n_owned]
 
     def energy(self, u: Floats) -> float:
         domain = self.problem.domain
-        return -domain.dot(self.load, u[: domain.owned].ravel())
+        return -domain.dot(self.load, u[: domain.n_owned].ravel())
 
     def add_forces(self, u: Floats, out: Floats) -> None:
         out -= self.load
@@ -120,8 +120,8 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=has_stretch)
 
     side = SIDE_MM * 1e-3
-    nodes, to_points = domain.local(domain.positions) / side, problem.points.smooth.T
-    points = np.matmul(problem.points.smooth, nodes[domain.cells])
+    nodes, to_points = domain.local(domain.positions) / side, problem.points.interpolation.T
+    points = np.matmul(problem.points.interpolation, nodes[domain.cells])
     mu, dg, dr = (np.broadcast_to(values, len(nodes)) for values in layers(case, nodes.T, np.sin)[:3])
     angle = np.broadcast_to(layers(case, np.moveaxis(points, 2, 0), np.sin)[3], points.shape[:2])
     normals = np.stack([0.6 * np.cos(angle), 0.6 * np.sin(angle), np.full(angle.shape, 0.8)], axis=2)

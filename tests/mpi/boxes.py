@@ -58,7 +58,7 @@ def at_the_bottom(centre):
 def set_layers(problem, mu, dg, dr, normals, V=None):
     """Set shear modulus in Pa and growth increments (k,) at the local nodes, with unit normals (c, 3) of the cells."""
     points = problem.points
-    mu, dg, dr = (nodal[problem.domain.cells] @ points.smooth.T for nodal in (mu, dg, dr))
+    mu, dg, dr = (nodal[problem.domain.cells] @ points.interpolation.T for nodal in (mu, dg, dr))
     repeated = np.repeat(normals[:, None], len(points.weights), axis=1)
     problem.set_step(mu, layered_inverse(dg, dr, np.ones(len(mu), bool), repeated), V)
 
@@ -112,4 +112,4 @@ def smooth_displacement(domain, size=1e-3):
 
 def gathered(domain, u):
     """Return the displacement of all vertices: two domains of one mesh may be spread over the ranks differently."""
-    return domain.gathered(u[: domain.owned])
+    return domain.gather(u[: domain.n_owned])

@@ -31,13 +31,13 @@ def test_forces_fit_the_energy_and_stiffness_the_forces():
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
     domain, u = problem.domain, approach(problem.domain)
     v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
-    energy, stiffness, owned = contact.energy(u), contact.stiffness(u), v[: domain.owned].ravel()
+    energy, stiffness, owned = contact.energy(u), contact.stiffness(u), v[: domain.n_owned].ravel()
     direction, change = stiffness.createVecs()
     direction.array[:] = owned
     stiffness.mult(direction, change)
 
     def forces(at):
-        out = np.zeros(3 * domain.owned)
+        out = np.zeros(3 * domain.n_owned)
         contact.add_forces(at, out)
         return out
 
@@ -140,12 +140,12 @@ def test_large_random_steps_of_a_groove_cross_nothing():
         direction = random.normal(0.0, 0.05, mesh.vertices.shape) * M_PER_MM
         direction[:, 0] -= np.sign(mesh.vertices[:, 0]) * 0.3 * M_PER_MM
         length = contact.max_step(displacement, domain.local(direction))
-        now = mesh.vertices + domain.gathered(displacement[: domain.owned]) * MM_PER_M
+        now = mesh.vertices + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
         whole = now + direction * MM_PER_M
         would_cross += ipctk.has_intersections(surface, np.asfortranarray(whole[used]))
         cut += length < 1
         displacement = displacement + length * domain.local(direction)
-        place = mesh.vertices + domain.gathered(displacement[: domain.owned]) * MM_PER_M
+        place = mesh.vertices + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
         assert not ipctk.has_intersections(surface, np.asfortranarray(place[used]))
         if contact.smallest_distance_mm(displacement) < 1e-3:
             displacement = np.zeros_like(displacement)

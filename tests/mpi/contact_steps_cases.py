@@ -53,7 +53,7 @@ def test_a_sulcus_closes_without_crossing_where_it_crosses_without_contact():
 
 @pytest.mark.slow
 @pytest.mark.one_rank
-def test_a_run_goes_on_in_the_middle_of_contact_as_if_it_had_not_stopped():
+def test_a_resumed_run_in_contact_equals_one_without_interruption():
     tight = {"solver": {"newton_tolerance": 1e-11}}
     folding, state = closing_sulcus("global", **tight)
     middle = after_steps(folding, state, 9)

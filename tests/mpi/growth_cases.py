@@ -62,7 +62,7 @@ def test_a_run_has_the_material_that_it_names(material):
 def test_gathering_and_placing_keep_every_vertex_in_its_place():
     mesh = distorted_box()
     domain = Domain(COMM, mesh)
-    np.testing.assert_allclose(domain.gathered(domain.local(domain.positions)[: domain.owned]), mesh.vertices * 1e-3)
+    np.testing.assert_allclose(domain.gather(domain.local(domain.positions)[: domain.n_owned]), mesh.vertices * 1e-3)
     moved = domain.positions * 1.5 + [0.1, 0.2, 0.3]
     domain.place(moved)
     volumes = volumes_between(domain.local(moved), domain.cells)

@@ -48,12 +48,12 @@ def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeyp
     forces = dolfinx.fem.assemble_vector(residual)
     forces.scatter_reverse(dolfinx.la.InsertMode.add)
     largest = COMM.allreduce(np.abs(forces.array).max(), op=boxes.MPI.MAX)
-    np.testing.assert_allclose(at.owned, forces.array[: 3 * domain.owned], rtol=0, atol=1e-12 * largest)
+    np.testing.assert_allclose(at.owned, forces.array[: 3 * domain.n_owned], rtol=0, atol=1e-12 * largest)
 
     matrix = dolfinx.fem.assemble_matrix(tangent, block_mode=BlockMode.compact)
     matrix.scatter_reverse()
     elastic = problem.tangent(at).elastic.matrix
-    blocks, kept = elastic.values, elastic._kept
+    blocks, kept = elastic.values, elastic._stored
     stiffness = matrix.data[: blocks.size].reshape(blocks.shape)[kept]
     blocks = blocks[kept]
     np.testing.assert_allclose(blocks, stiffness, rtol=0, atol=1e-12 * np.abs(stiffness).max())

@@ -37,9 +37,9 @@ def what_is_found(comm, mesh, moved_mm, further_mm):
     x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)
     stiffness = contact.stiffness(u)
     product, other = stiffness.createVecs()
-    product.array[:] = domain.local(x)[: domain.owned].ravel()
+    product.array[:] = domain.local(x)[: domain.n_owned].ravel()
     stiffness.mult(product, other)
-    forces = np.zeros(3 * domain.owned)
+    forces = np.zeros(3 * domain.n_owned)
     contact.add_forces(u, forces)
     return {
         "pairs": contact.pair_count(u),
@@ -47,8 +47,8 @@ def what_is_found(comm, mesh, moved_mm, further_mm):
         "smallest": contact.smallest_distance_mm(u),
         "step": contact.max_step(u, domain.local(further_mm) * M_PER_MM),
         "forces": contact.forces(u),
-        "residual": domain.gathered(forces.reshape(-1, 3)),
-        "product": domain.gathered(other.array_r.reshape(-1, 3)),
+        "residual": domain.gather(forces.reshape(-1, 3)),
+        "product": domain.gather(other.array_r.reshape(-1, 3)),
         "pressure": contact.pressure(u),
     }, contact.near_pairs(u).pairs
 
@@ -91,7 +91,7 @@ def test_parts_of_the_ranks_follow_a_surface_that_moves_far(order):
     assert found[2] == pytest.approx(found[0], rel=1e-9)
 
 
-def test_parts_that_touch_are_joined_wherever_a_rank_sees_it():
+def test_parts_that_touch_are_joined_on_all_ranks():
     # only one corner of the blocks comes near, in one rank's part
     mesh = two_blocks(gap=0.5)
     x, y, z = mesh.vertices.T
@@ -100,4 +100,4 @@ def test_parts_that_touch_are_joined_wherever_a_rank_sees_it():
     for vertices, parts in ((mesh.vertices, 2), (lifted, 1)):
         domain, contact = contact_in(COMM, type(mesh)(vertices, mesh.tets), distance=0.15)
         assert domain.part.max() == 1
-        assert len(np.unique(contact.joined(domain.part))) == parts
+        assert len(np.unique(contact.join_touching(domain.part))) == parts

@@ -76,7 +76,7 @@ def test_the_energy_never_rises_from_one_iterate_to_the_next(contact):
     assert (np.diff(energies) <= 1e-12 * abs(energies[0])).all()
 
 
-def test_an_inverting_first_guess_is_dropped():
+def test_a_first_guess_that_inverts_elements_is_not_used():
     problem = growing_problem()
     guess = problem.rest()
     guess[:, 2] = -2.0 * problem.domain.local(problem.domain.positions)[:, 2]

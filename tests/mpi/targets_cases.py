@@ -29,21 +29,21 @@ TIGHT = {"solver": {"newton_tolerance": 1e-11}}
 
 
 def bent(week):
-    """Return where the body's vertices are to be after some weeks: larger, and bent smoothly."""
+    """Return the target of the body's vertices after some weeks: larger, and bent smoothly."""
     x, y, z = BODY.vertices.T
     wave = np.stack([1.2 * np.sin(y / 12), 0.8 * np.cos(z / 10), 1.0 * np.sin(x / 14)], axis=1)
     return 1.04**week * BODY.vertices + week * wave
 
 
 def towards(targets, **changes):
-    """Return a free body that is to have shapes, by week, and its state before."""
-    known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
+    """Return a free body with target shapes by week, and its state at the start."""
+    weeks = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0}
     settings = {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
-    alike = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
+    uniform = {"shear_modulus_cortex_pa": 300.0, "shear_modulus_core_pa": 300.0, "step_s": DAY_S}
     sizes = {"area_cm2": {21.0: 1.0, 23.0: 1.0}, "volume_ml": {21.0: 1.0, 23.0: 1.0}}
     names = {week: f"target_{week:05.2f}" for week in targets}
     growth = {"model": "shapes"} | sizes
-    parameters = parameters_from(known | settings | alike | {"growth": growth, "targets": names} | changes)
+    parameters = parameters_from(weeks | settings | uniform | {"growth": growth, "targets": names} | changes)
     maps = {
         f"{names[week]}_{axis}": places
         for week, at in targets.items()
@@ -57,8 +57,8 @@ def volume(vertices):
     return cell_sizes(vertices, linear_pieces(BODY)).sum()
 
 
-def away(state, target):
-    """Return how far vertices are from where they are to be, root mean square in mm, without rigid motion."""
+def misfit(state, target):
+    """Return the root mean square distance in mm to a target, without rigid motion."""
     now = state.positions * MM_PER_M
     sizes = vertex_sizes(now, linear_pieces(BODY))
     left = without_rigid_motion(now, target, sizes)
@@ -69,23 +69,23 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
     targets = {22.0: bent(1), 23.0: bent(2)}
     folding, start = towards(targets)
     first = after_steps(folding, start, 7)
-    assert away(start, targets[22.0]) > 0.9
-    assert away(first, targets[22.0]) < 0.05
+    assert misfit(start, targets[22.0]) > 0.9
+    assert misfit(first, targets[22.0]) < 0.05
     last = after_steps(folding, first, 7)
-    assert away(last, targets[23.0]) < 0.05
-    # each step tells how far it begins from the next shape
-    told = [row["to_target_mm"] for row in last.rows]
-    assert told[0] == pytest.approx(away(start, targets[22.0]), rel=1e-6)
-    assert told[7] == pytest.approx(away(first, targets[23.0]), rel=1e-6)
-    assert all(later < earlier for earlier, later in pairwise(told[:7]))
+    assert misfit(last, targets[23.0]) < 0.05
+    # the misfit at the start of each step is reported
+    misfits = [row["to_target_mm"] for row in last.rows]
+    assert misfits[0] == pytest.approx(misfit(start, targets[22.0]), rel=1e-6)
+    assert misfits[7] == pytest.approx(misfit(first, targets[23.0]), rel=1e-6)
+    assert all(later < earlier for earlier, later in pairwise(misfits[:7]))
     assert (COMM.bcast(last.positions) == last.positions).all()
 
-    # growth found is what it takes, wherever it was made up for: 4 % in each direction, and the bend
-    traces = first.grown[:3].sum(axis=0)
+    # the sum of growth is that of the target: 4 % in each direction, and the bend
+    traces = first.log_growth[:3].sum(axis=0)
     assert np.average(traces, weights=vertex_sizes(BODY.vertices, linear_pieces(BODY))) == pytest.approx(
         np.log(volume(targets[22.0]) / volume(BODY.vertices)), rel=0.05
     )
-    assert first.grown_s == 7 * DAY_S
+    assert first.log_growth_s == 7 * DAY_S
 
     motion = rigid(20, -35, 50, shift=(8.0, -3.0, 5.0))
     turned = {week: transform_points(at, motion) for week, at in targets.items()}
@@ -93,15 +93,15 @@ def test_shapes_a_week_apart_are_met_in_any_pose():
     np.testing.assert_allclose(again.positions, after_steps(folding, start, 2).positions, atol=1e-3 * M_PER_MM)
 
 
-def test_a_step_across_a_target_goes_on_towards_the_next_one():
+def test_a_step_across_a_target_continues_towards_the_next_one():
     shapes = {21.5: bent(0.5), 22.0: bent(1.5), 23.0: bent(2)}
     folding, start = towards(shapes)
     before = after_steps(folding, start, 3)
     # half a day before 21.5, and half a day after it
-    across = after_steps(folding, before, 1)
-    assert away(across, shapes[21.5]) > 0.1
-    assert away(across, 6 / 7 * shapes[21.5] + 1 / 7 * shapes[22.0]) < 0.05
-    assert away(after_steps(folding, across, 3), shapes[22.0]) < 0.05
+    crossed = after_steps(folding, before, 1)
+    assert misfit(crossed, shapes[21.5]) > 0.1
+    assert misfit(crossed, 6 / 7 * shapes[21.5] + 1 / 7 * shapes[22.0]) < 0.05
+    assert misfit(after_steps(folding, crossed, 3), shapes[22.0]) < 0.05
 
 
 @pytest.mark.one_rank
@@ -125,33 +125,33 @@ def test_growth_of_an_even_stretch_is_that_stretch(lengths):
 def test_shared_growth_is_that_of_one_rank():
     count, pieces = len(BODY.vertices), linear_pieces(BODY)
     domain = Domain(COMM, BODY)
-    shares = Stretches(pieces, count), Stretches(pieces, count, Share(COMM.rank, COMM.size, domain.summed))
+    shares = Stretches(pieces, count), Stretches(pieces, count, Share(COMM.rank, COMM.size, domain.sum_over_ranks))
     alone, shared = (log_growth(BODY.vertices, stretches, bent(1) - BODY.vertices, 3.0) for stretches in shares)
     assert shared == pytest.approx(alone, rel=1e-12, abs=1e-12 * np.abs(alone).max())
     assert (COMM.bcast(shared) == shared).all()
 
 
-def test_a_way_of_contact_that_is_far_too_long_is_shortened():
+def test_a_displacement_that_is_far_too_long_for_contact_is_shortened():
     mesh = two_blocks()
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), 0.1)
-    apart = problem.domain.local(problem.domain.positions).copy()
-    apart[:, :2], apart[:, 2] = 0.0, np.sign(apart[:, 2])
+    approach = problem.domain.local(problem.domain.positions).copy()
+    approach[:, :2], approach[:, 2] = 0.0, np.sign(approach[:, 2])
     for way_mm, part in ((100.0, 0.08), (4.0, 1.0)):
-        assert contact.max_step(problem.rest(), apart * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)
+        assert contact.max_step(problem.rest(), approach * way_mm * M_PER_MM) == pytest.approx(part, rel=1e-6)
 
 
 def following(growth):
     """Return a free ellipsoid that is to grow by (area, volume) per week as logarithms, and the state before."""
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
-    known = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S}
-    known |= {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
-    start = GrowthInputs.of(mesh, zones_of_run(mesh, parameters_from(known)), {}).size(mesh.vertices)
+    weeks = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S}
+    weeks |= {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
+    start = GrowthInputs.of(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(mesh.vertices)
     sizes = {"area_cm2": start.area_mm2 * CM2_PER_MM2, "volume_ml": start.volume_mm3 * ML_PER_MM3}
     curves = {
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}
         for (name, size), rate in zip(sizes.items(), growth, strict=True)
     }
-    parameters = parameters_from(known | {"growth": {"model": "sizes", **curves}})
+    parameters = parameters_from(weeks | {"growth": {"model": "sizes", **curves}})
     folding = Folding(COMM, mesh, zones_of_run(mesh, parameters), parameters)
     return folding, State.at_start(mesh.vertices * M_PER_MM, DAY_S)
 
@@ -176,11 +176,11 @@ def test_no_rate_is_negative_where_curves_shrink():
     assert (row["growth_rate_per_s"], row["core_growth_rate_per_s"], row["growth_limited"]) == (0.0, 0.0, 1)
 
 
-def test_what_a_step_lacked_is_corrected_after_a_resumption_too():
+def test_the_shortfall_of_a_step_is_corrected_after_a_resumption_too():
     folding, state = following((0.10, 0.15))
     middle = after_steps(folding, state, 3)
     whole = after_steps(folding, middle, 2)
     resumed = after_steps(following((0.10, 0.15))[0], middle, 2)
-    assert resumed.learnt == pytest.approx(whole.learnt, rel=1e-6)
+    assert resumed.correction == pytest.approx(whole.correction, rel=1e-6)
     assert resumed.rows[-1]["growth_rate_per_s"] == pytest.approx(whole.rows[-1]["growth_rate_per_s"], rel=1e-6)
     np.testing.assert_allclose(resumed.positions, whole.positions, atol=1e-3 * M_PER_MM)

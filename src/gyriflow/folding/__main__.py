@@ -22,7 +22,7 @@ from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..settings.varying import Maps, value_at
 from ..step import record_exit_code
 from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
-from .output import ZONES, log_event, say, warn, write_events
+from .output import ZONES, log_event, print_line, warn, write_events
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
 from .run import run
@@ -30,24 +30,24 @@ from .zones import zones_of_run
 
 
 def parse(arguments: list[str] | None = None) -> argparse.Namespace:
-    """Return the command line's values."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(prog="python -m gyriflow.folding", description=__doc__)
     parser.add_argument("mesh", type=Path, help="tetrahedral mesh, RAS+ mm (XDMF)")
     parser.add_argument("--params", type=Path, required=True, help="parameters (YAML)")
     parser.add_argument("--maps", type=Path, help="maps of parameters at the mesh's vertices (HDF5)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
-    parser.add_argument("--progress", type=Path, help="file that follows the run, a JSON object a line (.jsonl)")
+    parser.add_argument("--progress", type=Path, help="file of the run's events, one JSON object per line (.jsonl)")
     parser.add_argument(
         "--may-diverge",
         action="store_true",
-        help="a run that diverges ends well with the weeks that it has reached; its summary says why",
+        help="end without an error where the run diverges, with the weeks it has reached; the summary gives the reason",
     )
     return parser.parse_args(arguments)
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the folder for this run; StorageError where another run holds it or it cannot be written."""
+    """Lock the folder for this run; StorageError if another run has locked it or it cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / ".lock").open("w")
@@ -57,16 +57,16 @@ def locked(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise StorageError("another folding run works in this folder", path=folder) from None
+            raise StorageError("another folding run is using this folder", path=folder) from None
         yield
 
 
 def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameters) -> None:
-    """Raise StorageError where the disk has no room for the run's frames, kept twice while they are joined."""
+    """Raise StorageError if the disk has no room for the run's frames, which exist twice while they are joined."""
     # positions in double precision, fields in single
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
     frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
-    points = len(IntegrationPoints.of_degree(mesh.order).weights)
+    points = len(IntegrationPoints.exact_to_degree(mesh.order).weights)
     stretch = 8 * 6 * points * len(mesh.tets) if parameters.stress_memory_gw > 0 else 0
     # positions and two displacements
     checkpoint = 2 * (8 * 3 * 3 * len(mesh.vertices) + stretch)
@@ -74,11 +74,11 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     free = shutil.disk_usage(out).free
     if free < needed:
         room, expected = (f"{size / 2**20:.0f} MiB" for size in (free, needed))
-        raise StorageError("the disk has no room for this run", path=out, found=f"{room} free", expected=expected)
+        raise StorageError("not enough disk space for this run", path=out, found=f"{room} free", expected=expected)
 
 
 def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
-    """Reads, checks, prints what is to be solved, and solves it."""
+    """Read and check the inputs, print a summary of them, and run the simulation."""
     parameters = parameters_from(read_yaml(arguments.params))
     mesh = comm.bcast(read_tetrahedral_mesh(arguments.mesh) if comm.rank == 0 else None, root=0)
     zones = comm.bcast(zones_of_run(mesh, parameters) if comm.rank == 0 else None, root=0)
@@ -90,14 +90,14 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         memory = predicted_memory_mib(len(mesh.tets), comm.size, parameters.contact.kind, mesh.order)
         size = f"{len(mesh.tets)} elements, {3 * len(mesh.vertices)} unknowns, {comm.size} ranks"
         facts = {"elements": len(mesh.tets), "unknowns": 3 * len(mesh.vertices), "ranks": comm.size}
-        say(f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory))
+        print_line(f"{size}, about {memory:.0f} MiB", "size", **facts, memory_mib=round(memory))
         for name in ZONE_NAMES:
             zone = report["zones"][name]
-            say(f"  {name}: {zone['facets']} facets, {zone['area_mm2']:.0f} mm2")
+            print_line(f"  {name}: {zone['facets']} facets, {zone['area_mm2']:.0f} mm2")
         shares = ", ".join(f"{side} {share:.1%}" for side, share in report["clamped_share"].items())
-        say(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
+        print_line(f"  clamped share: {shares}; initial penetration {report['initial_penetration_mm']:g} mm")
         through = report["elements_through_cortex"]
-        say(f"  elements through the cortex: {through:.1f}")
+        print_line(f"  elements through the cortex: {through:.1f}")
         locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
         for warning in filter(None, (*zone_warnings(report), locking)):
             warn(warning)
@@ -109,7 +109,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
-    """Run `main` under the folder's lock and end every rank with the exit code of the first error."""
+    """Run `main` with the folder locked, and end every rank with the exit code of the first error."""
     try:
         if comm.rank == 0:
             with locked(arguments.out):
@@ -130,7 +130,7 @@ def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
     record_exit_code(code)
     sys.stdout.flush()
     if comm.size > 1:
-        comm.Abort(code)  # the others may wait in a collective call
+        comm.Abort(code)  # other ranks may be waiting in a collective call
     sys.exit(code)
 
 

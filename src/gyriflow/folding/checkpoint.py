@@ -1,7 +1,7 @@
-"""The state of a run between two steps, and its checkpoint: enough to go on after any interruption, on any ranks.
+"""The state of a run between two steps, and its checkpoint, from which it resumes on any number of ranks.
 
-Arrays are in the mesh file's order. A checkpoint names the mesh and the parameters it belongs to by a hash and carries
-a checksum of its own content; one that does not fit or is torn is not used.
+Arrays are in the mesh file's order. A checkpoint contains a hash of its mesh, parameters and code, and a checksum of
+its content; one that does not match or is corrupt is not used.
 """
 
 import hashlib
@@ -21,19 +21,32 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 
 ROOMS = ("folding", "mechanics", "geometry", "settings", "units")
-"""Where the modules lie on which the course of a run depends."""
-ARRAYS = ("positions", "last", "before_last", "stretch", "grown")
+"""Rooms with the modules that decide the course of a run."""
+ARRAYS = ("positions", "last", "before_last", "stretch", "log_growth")
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where a run stands: everything that the next step depends on.
+    """The state of a run between two steps: everything that the next step depends on.
 
-    The (n, 3) positions in m, the time since the start, and the present time step, smaller than the nominal one after a
-    halving; the (n, 3) displacements in m and the lengths of the two last steps, zero where there was none; steps since
-    the last halving. Where stress is remembered, the (m, q, 6) elastic stretch that the next step starts with; what
-    the last step has taught growth by sizes; where growth is not by rates, its logarithm (6, n) since the last output
-    week, and the time since then; the step table so far.
+    Attributes
+    ----------
+    positions
+        (n, 3), in m.
+    time_s, step_s
+        Time since the start, and the present time step, which is smaller than the nominal one after a halving.
+    last, before_last, last_s, before_last_s
+        Displacements (n, 3) in m and lengths of the last two steps; zero before them.
+    successes
+        Accepted steps since the last halving.
+    stretch
+        Elastic stretch (m, q, 6) at the end of the last step, if stress is remembered.
+    correction
+        Feedback of the last step to growth by sizes (`StepGrowth.correction`).
+    log_growth, log_growth_s
+        Logarithm (6, n) of growth since the last output week, unless growth is by rates, and the time since then.
+    rows
+        The step table so far.
     """
 
     positions: Floats
@@ -45,9 +58,9 @@ class State:
     before_last_s: float = 0.0
     successes: int = 0
     stretch: Floats | None = None
-    learnt: Sequence[float] | None = None
-    grown: Floats | None = None
-    grown_s: float = 0.0
+    correction: Sequence[float] | None = None
+    log_growth: Floats | None = None
+    log_growth_s: float = 0.0
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
@@ -55,10 +68,11 @@ class State:
         """Return the state before the first step, free of stress."""
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
-    def predicted(self, step_s: float) -> list[Floats]:
-        """Return (n, 3) first guesses in m for a step of a given length, the best one first where growth is steady.
+    def first_guesses(self, step_s: float) -> list[Floats]:
+        """Return first guesses (n, 3) in m of the displacement of the next step.
 
-        They are the two last steps' rates extended, and the last one's alone, for the step after growth has changed.
+        The first one extrapolates the rates of the last two steps linearly; the second one repeats the last rate, which
+        is better in the step after growth has changed.
         """
         if self.last_s == 0:
             return []
@@ -74,11 +88,17 @@ class State:
         step_s: float,
         row: dict,
         stretch: Floats | None = None,
-        learnt: Sequence[float] | None = None,
+        correction: Sequence[float] | None = None,
         log_growth: Floats | None = None,
     ) -> "State":
-        """Return the state after an accepted step with its (n, 3) displacement in m; what it left and taught."""
-        grown = self.grown if self.grown is None or log_growth is None else self.grown + log_growth
+        """Return the state after an accepted step with its displacement (n, 3) in m; others as the attributes.
+
+        `log_growth` is that of this step.
+        """
+        if log_growth is None:
+            log_growth = self.log_growth
+        elif self.log_growth is not None:
+            log_growth = self.log_growth + log_growth
         return replace(
             self,
             positions=self.positions + displacement,
@@ -89,18 +109,18 @@ class State:
             before_last_s=self.last_s,
             successes=self.successes + 1,
             stretch=stretch,
-            learnt=learnt,
-            grown=log_growth if grown is None else grown,
-            grown_s=self.grown_s + step_s,
+            correction=correction,
+            log_growth=log_growth,
+            log_growth_s=self.log_growth_s + step_s,
             rows=(*self.rows, row),
         )
 
 
 def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
-    """Return a hash of all that decides the course of a run: mesh, parameters, maps, and the code of model and solver.
+    """Return a hash of everything that decides the course of a run: mesh, parameters, maps, code of model and solver.
 
-    Left out is what only decides how far it goes, when it writes and on how many ranks: a run that failed can be
-    called again with an earlier end or more halvings and goes on.
+    Parameters that only decide where it ends, when it writes, and on how many ranks are left out: a run that failed
+    resumes with an earlier end or more halvings.
     """
     values = parameters.model_dump(mode="json")
     for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
@@ -141,7 +161,7 @@ def write_checkpoint(path: Path, key: str, state: State) -> None:
 
 
 def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
-    """Return the state of the run `key`, or None, and what to tell the user about it (empty: there is none)."""
+    """Return the state of the run `key`, or None, and a message for the user, empty without a checkpoint."""
     if not path.exists():
         return None, ""
     try:
@@ -152,10 +172,10 @@ def read_checkpoint(path: Path, key: str) -> tuple[State | None, str]:
         if _checksum(arrays, scalars) != checksum:
             raise ValueError("its checksum is wrong")
         values = json.loads(scalars)
-    except Exception as error:  # HDF5 raises whatever a torn file leads it into
-        return None, f"the checkpoint {path} is torn ({error}): not used, the run starts anew"
+    except Exception as error:  # HDF5 may raise anything on a corrupt file
+        return None, f"the checkpoint {path} is corrupt ({error}): not used, the run starts again"
     if values.pop("key") != key:
         return None, f"the checkpoint {path} belongs to another mesh or other parameters: not used"
     values["rows"] = tuple(values["rows"])
     state = State(**arrays, **values)
-    return state, f"going on from the checkpoint after step {len(state.rows)}"
+    return state, f"resuming from the checkpoint after step {len(state.rows)}"

@@ -1,4 +1,4 @@
-"""What a user should know of a run before its first step: a report, warnings, refusals."""
+"""Checks of a run before its first step: a report on its zones, warnings, refusals."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,16 +10,19 @@ from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
 from ..settings.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-MUCH_BETWEEN_PLANES = 0.05
+MAX_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
-LARGEST_POISSON_RATIO = 0.46
-"""Above this linear elements are clearly too stiff: at 0.45 the fastest wave of the slab grows 32 % too slowly with two
-of them through the cortex, at 0.48 40 %, at 0.49 47 %, at 0.499 69 %, the peak elsewhere."""
+MAX_POISSON_RATIO = 0.46
+"""Poisson's ratio above which linear elements are clearly too stiff. With two of them through the cortex, the fastest
+wave of a slab grows 32 % too slowly at 0.45, 40 % at 0.48, 47 % at 0.49 and 69 % at 0.499; another is fastest there."""
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
-    """Return facets and area per zone, the clamped share of each hemisphere, the initial penetration of the planes in
-    mm (0 by construction), and the number of elements through the cortex."""
+    """Return a report on the zones.
+
+    It has the facets and area of each zone, the clamped share of each hemisphere, the order of the elements, the
+    initial penetration of the planes in mm (0 by construction), and the number of elements through the cortex.
+    """
     pial = TriangleMesh(mesh.vertices, zones.facets)
     areas = face_areas(pial)
     centroid_x = mesh.vertices[zones.facets, 0].mean(axis=1)
@@ -31,7 +34,8 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
             for i, name in enumerate(ZONE_NAMES)
         },
         "clamped_share": {
-            side: float(areas[clamped & on].sum() / areas[on].sum()) if on.any() else 0.0 for side, on in sides.items()
+            side: float(areas[clamped & mask].sum() / areas[mask].sum()) if mask.any() else 0.0
+            for side, mask in sides.items()
         },
         "order": mesh.order,
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
@@ -40,19 +44,19 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
 
 
 def zone_warnings(report: dict) -> list[str]:
-    """Return what a user should know of the zones, from their report, before trusting a run."""
+    """Return warnings about the zones, from their report."""
     areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
     share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
-    if share <= MUCH_BETWEEN_PLANES:
+    if share <= MAX_BETWEEN_PLANES:
         return []
     return [
-        f"{share:.0%} of the pial area lies between the contact planes and feels no contact, so the hemispheres may "
-        "cross: lower folding.contact.gap_mm below twice the fissure's width"
+        f"{share:.0%} of the pial area lies between the contact planes and has no contact, so the hemispheres may "
+        "cross: set folding.contact.gap_mm below twice the width of the fissure"
     ]
 
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:
-    """Return the mean edge length in mm of the elements whose centroid lies in the cortex."""
+    """Return the mean edge length in mm of the elements whose centroid is in the cortex, or of all if none is."""
     centroids = sum(mesh.vertices[corners] for corners in mesh.corners.T) / 4
     depth = cKDTree(mesh.vertices[np.unique(zones.cortex_facets)]).query(centroids)[0]
     cortex = mesh.corners[depth <= thickness_mm]
@@ -64,18 +68,18 @@ def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float)
 def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
     """Raise an error for a brain that cannot be folded with these zones.
 
-    InputError where nothing grows, there is no cortex, no facet is clamped, or the fissure lies outside the brain;
-    MeshError where elements are inside out, the surface is not closed, or a part has no clamped facet and would float.
+    InputError if nothing grows, no facet has cortex, no facet is clamped, or the fissure lies outside the brain;
+    MeshError if elements are inverted, the surface is not closed, or a part has no clamped facet and would float.
     """
     if mesh.order == 2:
         folded = np.flatnonzero(lower_bounds(mesh.vertices, mesh.tets) <= 0)
         if len(folded):
             place = np.round(mesh.vertices[mesh.corners[folded[0]]].mean(axis=0), 1).tolist()
             count = f"{len(folded)} of {len(mesh.tets)}, one at {place} mm"
-            raise MeshError("the mesh has curved elements that are folded over", found=count)
+            raise MeshError("the mesh has inverted curved elements", found=count)
     low, high = mesh.vertices[:, 0].min(), mesh.vertices[:, 0].max()
-    alone = (zones.facet_zone == MEDIAL_WALL).any()
-    if not alone and not low < zones.fissure_x_mm < high:
+    single_hemisphere = (zones.facet_zone == MEDIAL_WALL).any()
+    if not single_hemisphere and not low < zones.fissure_x_mm < high:
         raise InputError(
             "the fissure lies outside the brain",
             found=f"fissure_x_mm {zones.fissure_x_mm:.2f}",
@@ -90,12 +94,12 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
         raise InputError("no vertex grows", remedy="Make the no-growth ellipsoid smaller (folding.no_growth).")
     if zones.free:
         return
-    # a wall that slides holds what else would turn away
+    # a sliding wall supports a hemisphere too
     clamped = zones.vertices_of(CLAMPED, BASE, *((MEDIAL_WALL,) if zones.anchors else ()))
     if not len(clamped):
         raise InputError(
             "no facet is clamped, so the brain would drift",
-            expected="pial facets inside the ellipsoid of no growth (folding.no_growth), or another folding.support",
+            expected="pial facets inside the ellipsoid without growth (folding.no_growth), or another folding.support",
         )
     part = connected_parts(mesh)
     parts = part.max() + 1
@@ -106,10 +110,10 @@ def refuse_impossible(mesh: TetrahedralMesh, zones: Zones) -> None:
 
 
 def stiffness_warning(poisson_ratio: float) -> str:
-    """Return what to say of a Poisson's ratio that linear elements are too stiff for; empty where they are not."""
-    if poisson_ratio <= LARGEST_POISSON_RATIO:
+    """Return a warning if linear elements are too stiff for a Poisson's ratio, else an empty text."""
+    if poisson_ratio <= MAX_POISSON_RATIO:
         return ""
     return (
-        f"folding.poisson_ratio {poisson_ratio:g} is nearer to incompressible than linear elements follow: above "
-        f"{LARGEST_POISSON_RATIO:g} they lock, and folds grow too slowly and at wrong lengths (docs/verification.md)"
+        f"folding.poisson_ratio is {poisson_ratio:g}: above {MAX_POISSON_RATIO:g} linear elements lock, and folds grow "
+        "too slowly and with wrong wavelengths (docs/verification.md); use quadratic ones (mesh.order: 2)"
     )

@@ -1,4 +1,4 @@
-"""The form compiler's cache: one for each kind of processor, one compilation at a time, no torn entries."""
+"""Compilation of forms and C code with a cache: one per kind of processor, one compilation at a time."""
 
 import fcntl
 import hashlib
@@ -14,13 +14,13 @@ from typing import Any
 import cffi
 from mpi4py import MPI
 
-# sums may be taken in any order, a fifth faster; all of -ffast-math would break the checks for numbers that are none
+# sums in any order, a fifth faster; all of -ffast-math would break checks for NaN
 REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
 COMPILER_ARGUMENTS = ["-O3", "-march=native", *REORDERED_SUMS]
 
 
 def processor() -> str:
-    """Return a text that differs between processors for which -march=native means different things."""
+    """Return a text that differs between processors for which -march=native gives different code."""
     described = Path("/proc/cpuinfo")
     lines = described.read_text().splitlines() if described.exists() else []
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())
@@ -28,27 +28,27 @@ def processor() -> str:
 
 @contextmanager
 def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
-    """Yield the options of the form compiler; forms are to be made inside the block, by all ranks.
+    """Yield the options of the form compiler, for all ranks to compile forms within the block.
 
-    Rank 0 holds the cache for the block, since concurrent runs share it and a compilation that was killed leaves a
-    source file for which everyone would wait.
+    Rank 0 locks the cache during the block, since concurrent runs share it, and a killed compilation leaves a source
+    file for which all later ones would wait.
     """
     kind = hashlib.sha256(processor().encode()).hexdigest()[:8]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
     options = {"cffi_extra_compile_args": COMPILER_ARGUMENTS, "cache_dir": str(cache)}
-    with ExitStack() as held:
+    with ExitStack() as stack:
         if comm.rank == 0:
             cache.mkdir(parents=True, exist_ok=True)
-            fcntl.flock(held.enter_context((cache / "lock").open("w")), fcntl.LOCK_EX)
-            drop_torn_entries(cache)
+            fcntl.flock(stack.enter_context((cache / "lock").open("w")), fcntl.LOCK_EX)
+            remove_incomplete_entries(cache)
         comm.barrier()
         yield options
         comm.barrier()
 
 
 def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, Any]:
-    """Return functions in C, compiled unless the cache has them, and the interface to their arguments."""
+    """Return the cffi interface and the library of C code, compiled unless cached; collective over the ranks."""
     name = f"gyriflow_{hashlib.sha256(repr((code, COMPILER_ARGUMENTS)).encode()).hexdigest()[:16]}"
     interface = cffi.FFI()
     interface.cdef(declarations)
@@ -61,11 +61,11 @@ def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, An
     return interface, interface.dlopen(str(library))
 
 
-def drop_torn_entries(cache: Path) -> None:
-    """Remove the files of every form that lacks its source, its library, or the mark that both are whole."""
+def remove_incomplete_entries(cache: Path) -> None:
+    """Remove the files of each form that has no source, no library, or no mark that both are complete."""
     names = {path.name.split(".")[0] for path in cache.glob("libffcx_*")}
     for name in names:
-        whole = (cache / f"{name}.c").exists() and (cache / f"{name}.c.cached").exists()
-        if not (whole and any(cache.glob(f"{name}.*.so"))):
+        complete = (cache / f"{name}.c").exists() and (cache / f"{name}.c.cached").exists()
+        if not (complete and any(cache.glob(f"{name}.*.so"))):
             for path in cache.glob(f"{name}.*"):
                 path.unlink(missing_ok=True)

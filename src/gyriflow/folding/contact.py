@@ -1,9 +1,9 @@
 """Contact of the pial surface with itself: Incremental Potential Contact (Li et al. 2020), with the IPC Toolkit.
 
-Pairs of surface parts nearer than a distance d̂ repel each other with a barrier that grows without bound as they close
-in, and no displacement may cross a pair on its way. Every rank has the whole surface (`contact_surface`) and searches
-for the pairs of its own part (`contact_search`). Energies, forces and stiffness are summed over the ranks, gaps and
-free ways are the smallest of any rank, so that all ranks decide alike.
+Pairs of surface parts nearer than a distance d̂ repel each other with a barrier potential that tends to infinity as
+they close in, and no displacement may move a pair through each other. Every rank has the whole surface
+(`contact_surface`) and searches for the pairs of its own part (`contact_search`). Energies, forces and stiffness are
+summed over the ranks, gaps and collision-free steps are minima over them, so that all ranks take the same decisions.
 """
 
 import ipctk
@@ -20,7 +20,7 @@ from ..units import M_PER_MM
 from .contact_search import ContactSearch, NearPairs
 from .contact_surface import ContactSurface
 from .domain import Domain
-from .surface_parts import bisected
+from .surface_parts import bisect_points
 
 DISTANCE_PER_EDGE = 0.2
 """Contact distance d̂ in mean edge lengths of the present surface: well below what the mesh resolves. As the surface
@@ -30,16 +30,16 @@ STIFFNESS_PER_MODULUS = 0.1
 holds them at about half of the distance; a stiffer barrier takes more iterations and changes nothing else."""
 EDGES_PER_SPACING = {1: 1, 2: 2}
 """Edges of the surface of contact between neighbouring nodes, by the order of the elements."""
-CLOSE, WIDE = 0.1, 0.75
+STIFFEN_BELOW, SOFTEN_ABOVE = 0.1, 0.75
 """Smallest gaps, as parts of the distance, below and above which the next step's barrier is twice and half as stiff.
-Stress that is kept presses folds ever harder; a barrier that is too soft for it lets them come so near that Newton's
-method stagnates. A change of the barrier moves the folds it holds, so it is changed only where it must be."""
+With stress memory folds press on each other ever harder, and a barrier that is too soft lets them come so near that
+Newton's method stagnates. A change of stiffness moves folds in contact, so it is made only if needed."""
 MAX_STIFFENING = 1024.0
-"""Largest multiple of its initial stiffness that the barrier is given."""
+"""Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_PART_OF_GAP = 0.999
 """Largest contact distance as a part of the smallest gap at the start of a run."""
-MAX_WAY_MM = 8.0
-"""Longest displacement of a vertex in one iteration: a solve that asks for more diverges."""
+MAX_DISPLACEMENT_MM = 8.0
+"""Longest displacement of a vertex in one iteration; a solve with a longer one diverges."""
 BARRIER = ipctk.TwoStageBarrier()
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
@@ -73,7 +73,7 @@ class Barrier:
 class SelfContact:
     """The barrier between all parts of the pial surface, a contribution to the energy of a step.
 
-    Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh as it was placed when the step began.
+    Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
     distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
     below the smallest gap at the start of the run: a body that does not grow must not move. MeshError where the surface
@@ -88,8 +88,8 @@ class SelfContact:
         self._initial_pa, self._given_mm, self._max_mm = stiffness_pa, distance_mm, np.inf
         start = self.surface.reference_mm()
         self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
-        # ranks on different processors may round differently, but each vertex has one owner
-        self._owned = domain.comm.bcast(bisected(start, domain.comm.size), root=0) == domain.comm.rank
+        # from rank 0, since other processors may round differently
+        self._owned = domain.comm.bcast(bisect_points(start, domain.comm.size), root=0) == domain.comm.rank
         self._search = ContactSearch(self.surface.faces, self._owned, start, 0.0)
         self.begin_step()
         part, mesh = self._search.part_at(start)
@@ -100,20 +100,17 @@ class SelfContact:
             )
         if distance_mm is None:
             gap = domain.comm.allreduce(self._search.near(start).gap_mm, op=MPI.MIN)
-            # rounding must not make a pair of surface parts exactly at the limit
+            # round-off must not make a pair of surface parts exactly at the limit
             self._max_mm = MAX_PART_OF_GAP * gap
             self.begin_step()
 
     def begin_step(self, last_row: dict | None = None) -> None:
-        """Refer to the mesh as it is placed now, with a barrier for its areas, edges and the last step's smallest gap.
-
-        `last_row` is the last row of the step table, if there is one.
-        """
+        """Take the mesh as it is placed, and set the barrier by its edges and the last row of the step table."""
         self._rest = self.surface.reference_mm()
-        # the same on all ranks, however their processors round
+        # from rank 0, as above
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._rest, self._edges)
-        of_edges = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
-        distance_mm = self._given_mm or min(of_edges, self._max_mm)
+        edge_based = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
+        distance_mm = self._given_mm or min(edge_based, self._max_mm)
         self.barrier = Barrier(distance_mm, adapted_stiffness(self._initial_pa, last_row))
         self._search = ContactSearch(self.surface.faces, self._owned, self._rest, distance_mm, self._search)
         self._near: NearPairs | None = None
@@ -125,15 +122,15 @@ class SelfContact:
             self._near = self._search.near(positions)
         return self._near
 
-    def joined(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the numbers (n,) of parts of the mesh, with parts that touch at the step's start made one."""
+    def join_touching(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the part numbers (n,) of the mesh's vertices, one for parts in contact when the step begins."""
         if part.max() == 0:
             return part
         near = self._search.near(self._rest)
         corners = [near.pairs[i].vertex_ids(near.mesh.edges, near.mesh.faces) for i in range(len(near.pairs))]
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]
-        # numbers below 0 stand for no vertex
+        # other numbers stand for missing vertices
         sides = [part_of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in corners]
         own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
         links = np.array(sorted(set().union(*self.domain.comm.allgather(own_links)))).reshape(-1, 2)
@@ -151,7 +148,7 @@ class SelfContact:
         return self.surface.nodal_sum(near.part, self.barrier.forces(near))
 
     def add_forces(self, u: Floats, out: Floats) -> None:
-        """Add the forces in N to the owned components (3 · owned,) of a vector."""
+        """Add the forces in N to the owned components (3 · n_owned,) of a vector."""
         self.surface.add_to(out, self.forces(u))
 
     def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat | None:
@@ -162,12 +159,12 @@ class SelfContact:
         return self.surface.matrix_sum(near.part, self.barrier.stiffness(near, convex=convex))
 
     def max_step(self, u: Floats, direction: Floats) -> float:
-        """Return the largest part, at most 1, of a direction (k, 3) in m that can be added to u without any touch."""
-        way = self.surface.displacement_mm(direction)
-        # all that is near a longer way would fill the memory
-        part = MAX_WAY_MM / max(float(np.linalg.norm(way, axis=1).max()), MAX_WAY_MM)
-        free = self._search.free_part(self.near_pairs(u), part * way)
-        return part * self.domain.comm.allreduce(free, op=MPI.MIN)
+        """Return the largest part, at most 1, of a direction (k, 3) in m that can be added to u without a collision."""
+        displacement = self.surface.displacement_mm(direction)
+        # the candidates near a longer displacement would fill the memory
+        part = MAX_DISPLACEMENT_MM / max(float(np.linalg.norm(displacement, axis=1).max()), MAX_DISPLACEMENT_MM)
+        step = self._search.collision_free_step(self.near_pairs(u), part * displacement)
+        return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
     def smallest_distance_mm(self, u: Floats) -> float:
         """Return the smallest distance between surface parts that do not adjoin, infinite if none is near."""
@@ -182,10 +179,10 @@ class SelfContact:
         near = self.near_pairs(u)
         forces, areas = np.zeros_like(self._rest), np.zeros(len(self._rest))
         forces[near.part.vertices] = self.barrier.forces(near)
-        # only a vertex' owner is sure to have all faces around it
+        # the owner of a vertex has all faces around it
         owned = near.part.owned
         areas[near.part.vertices[owned]] = np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
-        pressure = np.linalg.norm(self.domain.summed(forces), axis=1) / self.domain.summed(areas)
+        pressure = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1) / self.domain.sum_over_ranks(areas)
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values
@@ -196,7 +193,7 @@ def adapted_stiffness(initial_pa: float, last_row: dict | None) -> float:
     if last_row is None:
         return initial_pa
     gap, last_pa = last_row["min_distance_mm"] / last_row["contact_distance_mm"], last_row["contact_stiffness_pa"]
-    if gap < CLOSE:
+    if gap < STIFFEN_BELOW:
         return min(2 * last_pa, MAX_STIFFENING * initial_pa)
     # NaN where nothing is near
-    return last_pa if gap <= WIDE else max(last_pa / 2, initial_pa)
+    return last_pa if gap <= SOFTEN_ABOVE else max(last_pa / 2, initial_pa)

@@ -1,4 +1,4 @@
-"""The search for pairs of surface parts near each other, and for the first touch on a way, with the IPC Toolkit."""
+"""Search for pairs of surface parts near each other, and collision detection, with the IPC Toolkit."""
 
 from dataclasses import dataclass
 
@@ -9,27 +9,27 @@ from numpy.typing import NDArray
 from ..geometry.triangles import Floats
 from .surface_parts import SurfacePart, part_of_surface
 
-MARGIN_MM = 0.05
+CANDIDATE_MARGIN_MM = 0.05
 """Displacement of the surface after which candidates for pairs are searched for again."""
-ROOM_MM = 1.0
-"""Displacement after which each rank takes its part of the surface anew."""
+PART_MARGIN_MM = 1.0
+"""Displacement of the surface after which each rank takes its part of it again."""
 MAX_CLOSING = 0.9
 """Largest part of a gap that a step may close."""
-SWEEP = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
+CCD = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
 """Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's distance. Interval bisection, the
-other choice, takes minutes where surfaces meet flat on."""
+alternative, takes minutes if surfaces meet flat on."""
 
 
 @dataclass(frozen=True, eq=False)
 class SearchRange:
-    """Positions (s, 3) in mm between which the surface may lie, and half the distance that is searched around them."""
+    """The range of a search: positions (s, 3) in mm between which the surface moves, and half the distance searched."""
 
     first: Floats
     last: Floats
     reach: float
 
     def covers(self, distance_mm: float, *positions: Floats) -> bool:
-        """Return whether all pairs within a distance at some other positions have been found."""
+        """Return whether the search has found all pairs within a distance at other positions."""
         margin = self.reach - distance_mm / 2
         if np.isinf(margin):
             return True
@@ -59,10 +59,10 @@ class NearPairs:
 
 
 class ContactSearch:
-    """A rank's search in one step that starts with the surface at `rest_mm` (s, 3), for pairs within a distance.
+    """A rank's search for pairs within a distance, in one step that begins with the surface at `rest_mm` (s, 3).
 
-    The rank's part of the surface and the candidates for pairs are kept while they cover the positions asked for, also
-    those of a `previous` step's search: this saves time and changes no result. `owned` (s,) are the rank's vertices.
+    The rank's part of the surface and the candidates for pairs are cached, from the `previous` step on, as long as they
+    cover the positions: this saves time and changes no result. `owned` (s,) is the mask of the rank's vertices.
     """
 
     def __init__(
@@ -91,34 +91,34 @@ class ContactSearch:
         pairs.build(candidates, mesh, at, self._distance)
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
-    def free_part(self, start: NearPairs, way: Floats) -> float:
-        """Return the part of a way (s, 3) in mm from near pairs' positions that leads to no touch, at most 1."""
+    def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
+        """Return the part, at most 1, of a displacement (s, 3) in mm from `start` that makes no collision."""
         # everything that is not a pair is farther away than the contact distance
         gap = min(self._distance, start.gap_mm)
-        if 2 * float(np.linalg.norm(way, axis=1).max()) <= MAX_CLOSING * gap:
+        if 2 * float(np.linalg.norm(displacement, axis=1).max()) <= MAX_CLOSING * gap:
             return 1.0
-        first, last = start.positions, start.positions + way
+        first, last = start.positions, start.positions + displacement
         part, mesh = self.part_at(first, last)
         candidates = self._candidates_at(first, last)
-        if candidates is None and np.abs(way).max() <= ROOM_MM:
-            # a step's first guess leads nearly to its end, so that this search serves the whole step
+        if candidates is None and np.abs(displacement).max() <= PART_MARGIN_MM:
+            # a step's first guess leads nearly to its end, so that the whole step needs no other search
             part, mesh, candidates = self._search(first, last)
         ends = part.restrict(first), part.restrict(last)
         if candidates is not None:
-            return float(candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=SWEEP))
+            return float(candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD))
         return float(
-            ipctk.compute_collision_free_stepsize(mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=SWEEP)
+            ipctk.compute_collision_free_stepsize(mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=CCD)
         )
 
     def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
-        """Return a part of the surface that has the rank's pairs at each of some (s, 3) positions in mm."""
+        """Return a part of the surface that contains the rank's pairs at each of some (s, 3) positions in mm."""
         if self._part is None or not self._part[1].covers(self._distance, *positions):
-            way = max(float(np.abs(at - positions[0]).max()) for at in positions)
-            # a single rank's part is the whole surface, wherever it moves
-            room = np.inf if self._owned.all() else max(ROOM_MM, way)
-            around = SearchRange(positions[0], positions[0], self._distance / 2 + room)
-            self._part = part_of_surface(positions[0], self._faces, self._owned, 2 * around.reach), around
-            # candidates have the vertex numbers of the part before
+            displacement = max(float(np.abs(at - positions[0]).max()) for at in positions)
+            # a single rank has the whole surface
+            margin = np.inf if self._owned.all() else max(PART_MARGIN_MM, displacement)
+            covered = SearchRange(positions[0], positions[0], self._distance / 2 + margin)
+            self._part = part_of_surface(positions[0], self._faces, self._owned, 2 * covered.reach), covered
+            # candidates refer to vertex numbers of the old part
             self._mesh, self._candidates = None, None
         part = self._part[0]
         if self._mesh is None:
@@ -132,7 +132,7 @@ class ContactSearch:
 
     def _search(self, first: Floats, last: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh, ipctk.Candidates]:
         part, mesh = self.part_at(first, last)
-        reach = self._distance / 2 + MARGIN_MM
+        reach = self._distance / 2 + CANDIDATE_MARGIN_MM
         candidates = ipctk.Candidates()
         candidates.build(mesh, part.restrict(first), part.restrict(last), reach, self._broad_phase)
         self._candidates = candidates, SearchRange(first, last, reach)

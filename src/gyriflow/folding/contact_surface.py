@@ -1,4 +1,4 @@
-"""The surface of contact: its position on every rank, and sums over the ranks of what each computes on its part."""
+"""The surface of contact: its positions on every rank, and sums over ranks that compute on a part of it each."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,18 +8,19 @@ from scipy import sparse
 from ..geometry.tetrahedra import finer_surface
 from ..geometry.triangles import Floats
 from ..units import MM_PER_M
-from .domain import Domain, gathered
+from .domain import Domain, gather
 from .surface_parts import SurfacePart
 
 
 class ContactSurface:
-    """The pial surface with the (f, 3) `facets`, vertex indices of the mesh, as contact takes it.
+    """The pial surface as flat triangles; `facets` (f, 3) are its faces as vertex indices of the mesh.
 
-    A curved face becomes 16 flat triangles whose vertices follow the nodes. Four triangles between the nodes would turn
-    an even pressure into uneven nodal forces, which press quadratic elements into waves of their own size.
+    A face of a quadratic element becomes 16 triangles whose vertices are interpolated between its nodes. Four triangles
+    between the nodes would turn an even pressure into uneven nodal forces, and deform elements into waves of their own
+    size.
 
-    Attributes: the `nodes` (n,) of the mesh on the surface, the (f, 3) `faces` by the surface's own s vertices, and
-    the `weights` (s, n) of the nodes at these, the first n of which are the nodes themselves.
+    Attributes: the vertices `nodes` (n,) of the mesh on the surface, the `faces` (f, 3) by the numbers of the surface's
+    own s vertices, and the `weights` (s, n) of the nodes at these; the first n of these are the nodes themselves.
     """
 
     def __init__(self, domain: Domain, facets: NDArray[np.int64]) -> None:
@@ -30,7 +31,7 @@ class ContactSurface:
         if domain.order == 2:
             self.weights, faces = finer_surface(faces)
         self.faces = faces
-        owned = domain.vertex_of_node[: domain.owned]
+        owned = domain.vertex_of_node[: domain.n_owned]
         place = np.searchsorted(self.nodes, owned).clip(max=len(self.nodes) - 1)
         self._local = np.flatnonzero(self.nodes[place] == owned)
         self._rows_by_rank = domain.comm.allgather(place[self._local])
@@ -45,43 +46,43 @@ class ContactSurface:
 
     def displacement_mm(self, u: Floats) -> Floats:
         """Return the (s, 3) displacements in mm from those of the local nodes (k, 3) in m."""
-        return np.asarray(self.weights @ gathered(self.domain.comm, u[self._local], self._gathered_rows) * MM_PER_M)
+        return np.asarray(self.weights @ gather(self.domain.comm, u[self._local], self._gathered_rows) * MM_PER_M)
 
     def nodal_sum(self, part: SurfacePart, values: Floats) -> Floats:
         """Return the (n, 3) sum over all ranks of (p, 3) values on their parts, moved to the nodes."""
         self._interpolate(part)
-        return self.domain.summed(self._part_weights.T @ values)
+        return self.domain.sum_over_ranks(self._part_weights.T @ values)
 
     def add_to(self, out: Floats, nodal: Floats) -> None:
-        """Add (n, 3) values at the nodes to the owned components (3 · owned,) of a vector."""
+        """Add (n, 3) values at the nodes to the owned components (3 · n_owned,) of a vector."""
         out.reshape(-1, 3)[self._local] += nodal[self._rows]
 
     def matrix_sum(self, part: SurfacePart, matrix: sparse.csc_matrix | None) -> PETSc.Mat:
         """Return the sum over all ranks of symmetric (3p, 3p) matrices on their parts, by all nodes of the mesh."""
         comm, components = self.domain.comm, np.arange(3)
-        of_rank: list[sparse.csr_matrix | None] = [None] * comm.size
+        rows_for: list[sparse.csr_matrix | None] = [None] * comm.size
         if matrix is not None:
             self._interpolate(part)
             nodal = sparse.csr_matrix(self._part_to_nodes @ matrix @ self._nodes_to_part)
-            of_rank = [nodal[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank]
-        # each rank gets from all others the rows that it owns
-        own, of_rank[comm.rank] = of_rank[comm.rank], None
-        received = [own, *comm.alltoall(of_rank)]
+            rows_for = [nodal[(3 * rows[:, None] + components).ravel()] for rows in self._rows_by_rank]
+        # each rank receives the rows that it owns from all others
+        own, rows_for[comm.rank] = rows_for[comm.rank], None
+        received = [own, *comm.alltoall(rows_for)]
         rows = sparse.csr_matrix((3 * len(self._rows), 3 * len(self.nodes)))
         rows = sum((block for block in received if block is not None), rows)
-        counts = np.zeros((self.domain.owned, 3), dtype=PETSc.IntType)
+        counts = np.zeros((self.domain.n_owned, 3), dtype=PETSc.IntType)
         counts[self._local] = np.diff(rows.indptr).reshape(-1, 3)
         # owned rows are in the order of the nodes
         start = np.concatenate([[0], np.cumsum(counts.ravel())]).astype(PETSc.IntType)
         node, component = np.divmod(rows.indices, 3)
         columns = (3 * self._columns[node] + component).astype(PETSc.IntType)
-        size = (3 * self.domain.owned, 3 * len(self.domain.positions))
+        size = (3 * self.domain.n_owned, 3 * len(self.domain.positions))
         result = PETSc.Mat().createAIJ((size, size), bsize=3, csr=(start, columns, rows.data), comm=comm)
         result.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         return result
 
     def _interpolate(self, part: SurfacePart) -> None:
-        """Make the matrices between the nodes and a part, unless they are those of the last call."""
+        """Set the matrices between the nodes and a part, unless they are those of the last call."""
         if self._part is not part:
             self._part, self._part_weights = part, self.weights[part.vertices]
             components = sparse.kron(self._part_weights, np.eye(3), format="csr")

@@ -1,8 +1,8 @@
-"""The distributed mesh of the solver, and the way between its numbering and that of the mesh file.
+"""The distributed mesh of the solver, and the map between its numbering and that of the mesh file.
 
-Every rank also holds the positions of all vertices in the file's order: searches on the pial surface then give the same
-answer on every rank, and output needs no further communication. What differs between versions of dolfinx (0.9 to 0.11)
-and of the PETSc that comes with them is in this file.
+Every rank also holds the positions of all vertices in the file's order, so that searches on the pial surface give the
+same result on every rank and output needs no further communication. Differences between versions of dolfinx (0.9 to
+0.11), and of the PETSc that comes with them, are handled in this file.
 """
 
 import os
@@ -14,7 +14,7 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ..geometry.jacobians import NODES as NODE_PLACES
+from ..geometry.jacobians import NODES as NODE_COORDINATES
 from ..geometry.jacobians import coefficients, jacobians, lower_bounds, shape_slopes
 from ..geometry.tetrahedra import (
     NODES_OF_ORDER,
@@ -27,35 +27,35 @@ from ..geometry.tetrahedra import (
 from ..geometry.triangles import Floats
 from ..units import M_PER_MM
 
-# read by Scotch when it first shares out a mesh: else a run would not give the same numbers twice
+# Scotch reads these when it first partitions a mesh; without them a run does not give the same numbers twice
 for name in ("SCOTCH_RANDOM_FIXED_SEED", "SCOTCH_DETERMINISTIC", "SCOTCH_PTHREAD_NUMBER"):
     os.environ.setdefault(name, "1")
 
 # dolfinx numbers the nodes on edges from the last edge to the first
 TO_DOLFINX = {1: [0, 1, 2, 3], 2: [0, 1, 2, 3, 9, 8, 5, 7, 6, 4]}
-FROM_DOLFINX = {order: np.argsort(places) for order, places in TO_DOLFINX.items()}
-AT_NODES = shape_slopes(NODE_PLACES)
+FROM_DOLFINX = {order: np.argsort(nodes) for order, nodes in TO_DOLFINX.items()}
+GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 
 
-def gathered(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
-    """Return on every rank all (n, ...) values from those of each, which belong, rank by rank, to (n,) places."""
+def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
+    """Return on every rank the (n, ...) values of all ranks; `order` (n,) are their indices there, rank by rank."""
     shape = values.shape[1:]
-    received, everywhere = np.empty((len(order), *shape)), np.empty((len(order), *shape))
+    received, result = np.empty((len(order), *shape)), np.empty((len(order), *shape))
     comm.Allgatherv(np.ascontiguousarray(values), (received, comm.allgather(values.size)))
-    everywhere[order] = received
-    return everywhere
+    result[order] = received
+    return result
 
 
 class Domain:
-    """A tetrahedral mesh spread over the ranks of a communicator, in metres.
+    """A tetrahedral mesh distributed over the ranks of a communicator, in metres.
 
-    A vertex is a node of the mesh file here: a corner of elements or, where they are quadratic (`order` 2), a node on
-    an edge. `mesh` is the updated reference, which moves with every step, `space` that of displacements in m on it.
+    A vertex is here a node of the mesh file: a corner of elements or, in quadratic elements (`order` 2), a node on an
+    edge. `mesh` is the updated reference, which moves with every step; `space` is that of displacements in m on it.
 
-    Of all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
-    (n,), and the global `node_of_vertex` (n,), rank by rank. `vertex_of_node` (k,) is the file index of each local
-    node, the `owned` ones first, then ghosts. Of the local elements: nodes in the order of the file, `cells` (c, 4) or
-    (c, 10), their index there, `tet_of_cell` (c,), and their `volumes` (c,) in m³.
+    For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
+    (n,), and the global node `node_of_vertex` (n,). For the local nodes, of which the first `n_owned` are owned and the
+    others ghosts: the vertex `vertex_of_node` (k,). For the local elements: their nodes in the file's order, `cells`
+    (c, 4) or (c, 10), their index in the file `tet_of_cell` (c,), and their `volumes` (c,) in m³.
     """
 
     def __init__(self, comm: MPI.Comm, mesh: TetrahedralMesh) -> None:
@@ -66,15 +66,15 @@ class Domain:
         tets = mesh.tets[:, TO_DOLFINX[self.order]]
         cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        # by keywords, whose order changed between versions; without ghost cells, the default in all of them
+        # keywords, since the order of arguments differs between versions; no ghost cells, the default in all
         self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
         nodes_of_cells = self.space.dofmap.list
         self.cells = np.ascontiguousarray(nodes_of_cells[:, FROM_DOLFINX[self.order]])
-        self.owned = self.space.dofmap.index_map.size_local
-        nodes = self.owned + self.space.dofmap.index_map.num_ghosts
+        self.n_owned = self.space.dofmap.index_map.size_local
+        nodes = self.n_owned + self.space.dofmap.index_map.num_ghosts
         self._geometry_node = np.empty(nodes, dtype=np.int64)
-        # a list of one array for each type of cell from 0.11 on, where `dofmap` is on its way out
+        # from 0.11 on a list with one array per cell type, and `dofmap` is deprecated
         by_cell_type = getattr(self.mesh.geometry, "dofmaps", None)
         geometry_nodes = by_cell_type[0] if isinstance(by_cell_type, list) else self.mesh.geometry.dofmap
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
@@ -84,36 +84,36 @@ class Domain:
         self._measure(self.local(self.positions))
         self.tet_of_cell = np.array(self.mesh.topology.original_cell_index[: len(self.cells)])
         self._tets = np.concatenate(comm.allgather(self.tet_of_cell))
-        self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.owned]))
+        self._order = np.concatenate(comm.allgather(self.vertex_of_node[: self.n_owned]))
         self.node_of_vertex = np.empty_like(self._order)
         self.node_of_vertex[self._order] = np.arange(len(self._order))
 
-    def gathered(self, owned_values: Floats) -> Floats:
-        """Return on every rank the (n, 3) vectors of all vertices from the owned (owned, 3) ones of each."""
-        return gathered(self.comm, owned_values, self._order)
+    def gather(self, owned_values: Floats) -> Floats:
+        """Return on every rank the (n, 3) vectors of all vertices from the (n_owned, 3) owned ones of each rank."""
+        return gather(self.comm, owned_values, self._order)
 
-    def gathered_cells(self, cell_values: Floats) -> Floats:
-        """Return on every rank the (m, ...) values of all elements in the file's order, from local (c, ...) ones."""
-        return gathered(self.comm, cell_values, self._tets)
+    def gather_cells(self, cell_values: Floats) -> Floats:
+        """Return on every rank the (m, ...) values of all elements in the file's order from the local (c, ...) ones."""
+        return gather(self.comm, cell_values, self._tets)
 
-    def summed(self, values: Floats) -> Floats:
-        """Return on every rank the sum of the arrays of all."""
+    def sum_over_ranks(self, values: Floats) -> Floats:
+        """Return on every rank the sum of the ranks' arrays."""
         total = np.empty_like(values, order="C")
         self.comm.Allreduce(np.ascontiguousarray(values), total)
         return total
 
     def with_ghosts(self, owned: Floats) -> Floats:
-        """Return the (k, 3) vectors of the local nodes from the components (3 · owned,) of the owned ones."""
+        """Return the (k, 3) vectors of the local nodes from the components (3 · n_owned,) of the owned ones."""
         self._shared.array[: len(owned)] = owned
         self._shared.scatter_forward()
         return self._shared.array.reshape(-1, 3).copy()
 
     def dot(self, a: Floats, b: Floats) -> float:
-        """Return the product of two vectors of which each rank has its owned components (3 · owned,)."""
+        """Return the dot product of two distributed vectors, given their owned components (3 · n_owned,)."""
         return self.comm.allreduce(float(a @ b))
 
     def norm(self, owned: Floats) -> float:
-        """Return the Euclidean norm of such a vector."""
+        """Return the Euclidean norm of a distributed vector, given its owned components."""
         return float(np.sqrt(self.dot(owned, owned)))
 
     def local(self, values: NDArray) -> NDArray:
@@ -135,57 +135,59 @@ class Domain:
     def _measure(self, node_positions: Floats) -> None:
         self.volumes = volumes_between(node_positions, self.cells)
         if self.order == 2:
-            self._maps_at_nodes = jacobians(node_positions, self.cells, AT_NODES)
+            self._maps_at_nodes = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
             self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
 
     def volume_ratios(self, node_positions: Floats) -> Floats:
-        """Return det F of a move of local nodes to (k, 3) positions in m: (c, 1), or (c, 10) at quadratic nodes."""
-        if self.order == 1:
-            return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
-        return jacobians(node_positions, self.cells, AT_NODES) / self._maps_at_nodes
+        """Return det F after a move of the local nodes to (k, 3) positions in m.
 
-    def smallest_volume_ratio(self, node_positions: Floats) -> float:
-        """Return a number that det F of a move is nowhere below, in no element of any rank.
-
-        It is positive only where no element is turned inside out anywhere. For linear elements it is the smallest
-        det F itself; that of quadratic ones varies, and the bound is that of the map's determinant after the move, over
-        the largest it can have had before.
+        It has one value in a linear element, (c, 1), and one at each node of a quadratic one, (c, 10).
         """
         if self.order == 1:
-            return self.minimum(self.volume_ratios(node_positions))
-        return self.minimum(lower_bounds(node_positions, self.cells) / self._largest_maps)
+            return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
+        return jacobians(node_positions, self.cells, GRADIENTS_AT_NODES) / self._maps_at_nodes
 
-    def minimum(self, local_values: Floats) -> float:
-        """Return the smallest value over all ranks."""
+    def smallest_volume_ratio(self, node_positions: Floats) -> float:
+        """Return a lower bound of det F after a move, over the elements of all ranks.
+
+        It is positive only where no element is inverted anywhere. In linear elements it is the smallest det F. In
+        quadratic ones, where det F varies, it is a lower bound of the map's determinant after the move over an upper
+        bound of that before.
+        """
+        if self.order == 1:
+            return self.min_over_ranks(self.volume_ratios(node_positions))
+        return self.min_over_ranks(lower_bounds(node_positions, self.cells) / self._largest_maps)
+
+    def min_over_ranks(self, local_values: Floats) -> float:
+        """Return the smallest value of all ranks."""
         return self.comm.allreduce(float(local_values.min(initial=np.inf)), op=MPI.MIN)
 
-    def least(self, values: Floats, numbers: NDArray, places: Floats) -> tuple[float, int, Floats]:
-        """Return the smallest of the local values over all ranks, with its number in the file and its place."""
-        local_least = (np.inf, -1, np.full(3, np.nan))
+    def locate_minimum(self, values: Floats, indices: NDArray, positions: Floats) -> tuple[float, int, Floats]:
+        """Return the smallest of the local values over all ranks, with its index in the file and its position."""
+        smallest = (np.inf, -1, np.full(3, np.nan))
         if len(values):
             i = int(values.argmin())
-            local_least = (float(values[i]), int(numbers[i]), places[i])
-        return min(self.comm.allgather(local_least), key=lambda entry: entry[:2])
+            smallest = (float(values[i]), int(indices[i]), positions[i])
+        return min(self.comm.allgather(smallest), key=lambda entry: entry[:2])
 
     def local_facets(self, facets: NDArray[np.int64], tags: NDArray[np.int64]) -> dolfinx.mesh.MeshTags:
-        """Return the tags of boundary facets on the local facets.
+        """Return the tags (f,) of boundary facets (f, 3), vertex indices of the file, on the local facets.
 
-        They are given as vertex indices of the file; the triangles of a quadratic element's face have one tag.
+        The four triangles of a quadratic element's face have one tag. ValueError where the facets are not the boundary.
         """
         faces, tags = whole_faces(facets, self.order), tags[:: PIECES_OF_ORDER[self.order]]
         topology = self.mesh.topology
         topology.create_entities(2)
         topology.create_connectivity(2, 3)
         local = dolfinx.mesh.exterior_facet_indices(topology)
-        # corners first
+        # the corners are the first three nodes
         nodes = dolfinx.mesh.entities_to_geometry(self.mesh, 2, local).reshape(len(local), -1)[:, :3]
-        names = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
+        local_faces = np.sort(self.mesh.geometry.input_global_indices[nodes], axis=1)
         count = len(self.positions)
         weights = np.array([count * count, count, 1], dtype=np.int64)
-        numbers = np.sort(faces, axis=1) @ weights
-        order = np.argsort(numbers)
-        wanted = names @ weights
-        place = order[np.minimum(np.searchsorted(numbers, wanted, sorter=order), len(order) - 1)]
-        if (numbers[place] != wanted).any():
+        keys, local_keys = np.sort(faces, axis=1) @ weights, local_faces @ weights
+        order = np.argsort(keys)
+        index = order[np.minimum(np.searchsorted(keys, local_keys, sorter=order), len(order) - 1)]
+        if (keys[index] != local_keys).any():
             raise ValueError("the facets are not the boundary of the mesh")
-        return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[place].astype(np.int32))
+        return dolfinx.mesh.meshtags(self.mesh, 2, local, tags[index].astype(np.int32))

@@ -16,27 +16,27 @@ from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 from .tissue import Tissue
 from .zones import Zones
 
-NO_GROWTH = 1e-10
-"""Growth increment of a step that counts as none, a hundred-millionth of what the cortex grows."""
+GROWTH_TOL = 1e-10
+"""Difference of growth increments that counts as none: a hundred-millionth of the cortex' growth in a step."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """The size of a brain: of the surface under which cortex lies, and of all that the surface encloses."""
+    """The size of a brain: area of its pial surface, and volume inside."""
 
     area_mm2: float
     volume_mm3: float
 
     def rates_to(self, after: "Size", step_s: float) -> Floats:
-        """Return the (2,) rates in 1/s of the logarithms of area and volume that lead to another size in a step."""
+        """Return the (2,) rates in 1/s of the logarithms of area and volume between two sizes a step apart."""
         return np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3]) / step_s
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthInputs:
-    """What growth depends on besides shape and time.
+    """Inputs of growth that are constant through a run.
 
-    The mesh as (p, 4) linear tetrahedra between its vertices, and the run's zones and maps at all of these.
+    The mesh as (p, 4) linear tetrahedra between its vertices, and the run's zones and maps at these.
     """
 
     pieces: NDArray[np.int64]
@@ -58,25 +58,28 @@ class GrowthInputs:
 
 @dataclass(frozen=True, eq=False)
 class StepStart:
-    """What a growth model is told of a step.
+    """The state a growth model sees at the start of a step.
 
-    The (n, 3) positions of all vertices at its start, equal on every rank, the time since the start of the run, the
-    length of the step, and what the step before has taught.
+    The (n, 3) positions of all vertices, equal on every rank, the time since the start of the run, the length of the
+    step, and the `correction` that the last step has returned.
     """
 
     positions_mm: Floats
     time_s: float
     step_s: float
-    learnt: Sequence[float] | None = None
+    correction: Sequence[float] | None = None
 
     def week(self, p: FoldingParameters, part: float) -> float:
-        """Return the gestational week at a part of the step, of 0 at its start to 1 at its end."""
+        """Return the gestational week at a part of the step, from 0 at its start to 1 at its end."""
         return p.start_week + (self.time_s + part * self.step_s) / SECONDS_PER_GW
 
 
 @dataclass(frozen=True, eq=False)
 class StepGrowth(ABC):
-    """How tissue grows in one step: by the run's parameters with the step's rates, which frames show."""
+    """Growth of tissue in one step.
+
+    `parameters` are the run's, with the rates of this step, which frames show.
+    """
 
     parameters: FoldingParameters
     start: StepStart
@@ -86,40 +89,40 @@ class StepGrowth(ABC):
         """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
     def logarithm(self) -> Floats | None:
-        """Return ln G (6, n) at all vertices, None where growth is by the rates of the parameters."""
+        """Return ln G (6, n) at all vertices, None if growth is by the rates of the parameters."""
         return None
 
-    def learnt(self, after: Size) -> tuple[float, ...] | None:
-        """Return what a step that has led to a size teaches the next ones, None where that is nothing."""
+    def correction(self, after: Size) -> tuple[float, ...] | None:
+        """Return the feedback to the next steps after a step that has reached a size, None without feedback."""
         return None
 
     def row(self, after: Size) -> dict[str, Any]:
-        """Return what the step table says of growth after the step has led to a size."""
+        """Return the growth columns of the step table after a step that has reached a size."""
         return {"area_cm2": after.area_mm2 * CM2_PER_MM2, "volume_ml": after.volume_mm3 * ML_PER_MM3}
 
 
 StepModel = Callable[[StepStart], StepGrowth]
-"""Says how tissue grows in each step."""
+"""A growth model of a run: returns the growth of each step."""
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthByRates(StepGrowth):
-    """Growth by the parameters' rates of cortex and core, as in the middle of the step."""
+    """Growth by the parameters' rates of cortex and core, taken in the middle of the step."""
 
     def inverse(self, tissue: Tissue) -> Floats:
         p, start = self.parameters, self.start
         dg, dr = increments_at(p, tissue.weight, tissue.growing, tissue.maps, start.week(p, 0.5), start.step_s)
-        # the direction matters only where growth differs along and across it
-        chosen, normals = tissue.normals(np.abs(dg - dr) > NO_GROWTH)
-        return layered_inverse(tissue.at_points(dg), tissue.at_points(dr), chosen, normals)
+        # normals matter only where tangential and radial growth differ
+        layered, normals = tissue.normals(np.abs(dg - dr) > GROWTH_TOL)
+        return layered_inverse(tissue.at_points(dg), tissue.at_points(dr), layered, normals)
 
 
 def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: float) -> tuple[Any, Any]:
-    """Return the increments dg along the pial surface and dr across it, as stretches less 1.
+    """Return the tangential and radial growth increments dg and dr, as stretches minus 1.
 
     dg = (α_TAN w + α_CORE (1 − w)) · g · Δt and dr = (α_RAD + α_CORE)(1 − w) · g · Δt, with the cortical weight w, g 1
-    where tissue grows and else 0, and rates in 1/s: α_TAN of the cortex along its surface, α_RAD of the core along the
-    normal, and α_CORE of the core in all directions.
+    where tissue grows and else 0, and rates in 1/s: tangential of the cortex (α_TAN), radial of the core (α_RAD), and
+    isotropic of the core (α_CORE).
     """
     isotropic = core * (1 - w)
     return (tangential * w + isotropic) * (g * step_s), (radial * (1 - w) + isotropic) * (g * step_s)
@@ -128,7 +131,7 @@ def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: 
 def increments_at(
     p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
 ) -> tuple[Floats, Floats]:
-    """Return the increments of a step by the parameters' rates at a week, at points where maps have their values."""
+    """Return the increments of a step by the parameters' rates at a week, at the points that maps have values at."""
     tangential, radial, core = (
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)
@@ -136,13 +139,13 @@ def increments_at(
     return increments(w, g, tangential, radial, core, step_s)
 
 
-def layered_inverse(dg: Floats, dr: Floats, chosen: NDArray[np.bool_], normals: Floats) -> Floats:
+def layered_inverse(dg: Floats, dr: Floats, layered: NDArray[np.bool_], normals: Floats) -> Floats:
     """Return G⁻¹ (c, q, 3, 3) for G = (1 + dg)(I − N⊗N) + (1 + dr) N⊗N.
 
-    The (c,) `chosen` elements have unit normals N (w, q, 3); others grow by dg in all directions.
+    The elements of the mask `layered` (c,) have unit normals N (e, q, 3); others grow by dg in all directions.
     """
     inverse = (1 / (1 + dg))[..., None, None] * np.eye(3)
-    across = normals[..., :, None] * normals[..., None, :]
-    inverse[chosen] = (np.eye(3) - across) / (1 + dg[chosen])[..., None, None]
-    inverse[chosen] += across / (1 + dr[chosen])[..., None, None]
+    radial = normals[..., :, None] * normals[..., None, :]
+    inverse[layered] = (np.eye(3) - radial) / (1 + dg[layered])[..., None, None]
+    inverse[layered] += radial / (1 + dr[layered])[..., None, None]
     return inverse

@@ -1,4 +1,4 @@
-"""Energy, forces and stiffness of linear elements that forget their stress: two to four times as fast as by FFCx."""
+"""Energy, forces and stiffness of linear elements without stress memory, two to four times as fast as by FFCx."""
 
 from pathlib import Path
 
@@ -20,7 +20,8 @@ DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, 
 class LinearElements:
     """The local elements of a domain.
 
-    To be set are their shear modulus `mu` (c, 1) in Pa, and `G_inverse` (c, 1, 3, 3) of the step's growth tensor.
+    Attributes set by the user: their shear modulus `mu` (c, 1) in Pa, and the inverse growth tensor `G_inverse`
+    (c, 1, 3, 3) of the step.
     """
 
     def __init__(self, domain: Domain, material: Material) -> None:
@@ -32,16 +33,16 @@ class LinearElements:
         self.G_inverse: Floats = np.tile(np.eye(3), (len(domain.cells), 1, 1))
 
     def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
-        """Return the energy in J at displacements (k, 3) in m; add forces in N, stiffness in N/m to what is given.
+        """Return the energy in J at displacements u (k, 3) in m; add to the given forces in N and matrix in N/m.
 
-        Of the stiffness between two owned nodes there is the block above the diagonal only.
+        Blocks of the stiffness below the diagonal between owned nodes are omitted.
         """
         cells, nodes = self._domain.cells, self._domain.local(self._domain.positions)
         if matrix is not None and self._places is None:
             places = sparse.csr_array((np.arange(len(matrix.indices), dtype=np.int32), matrix.indices, matrix.indptr))
             rows, columns = np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, 4).ravel()
-            # of two blocks that mirror each other one is enough, but where ghosts are among their nodes
-            needed = (columns >= rows) | (columns >= self._domain.owned) | (rows >= self._domain.owned)
+            # blocks below the diagonal are needed only if one of their nodes is a ghost
+            needed = (columns >= rows) | (columns >= self._domain.n_owned) | (rows >= self._domain.n_owned)
             self._places = np.where(needed, places[rows, columns], -1)
         arrays = cells, nodes, u, self.G_inverse, self.mu, forces, self._places, None if matrix is None else matrix.data
         pointers = [self._interface.NULL if x is None else self._interface.from_buffer(x) for x in arrays]

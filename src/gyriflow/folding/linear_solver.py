@@ -1,8 +1,8 @@
-"""The linear systems of Newton's method: conjugate gradients with a preconditioner of two levels.
+"""Linear systems of Newton's method: conjugate gradients with a two-level additive Schwarz preconditioner.
 
-At tolerances of a hundredth every good method needs about thirty products with the tangent, and setting up multigrid
-costs more than that. So the preconditioner is one that is set up in the time of a few products: the inverse blocks on
-the diagonal, and the rigid motions of some hundred parts of the mesh as the coarse level.
+At tolerances of a hundredth any good method needs about thirty products with the tangent, and the setup of multigrid
+costs more than that. The setup of this preconditioner takes the time of a few products: inverse diagonal blocks, and
+the rigid motions of some hundred parts of the mesh as the coarse level.
 """
 
 from dataclasses import dataclass, replace
@@ -17,33 +17,34 @@ from ..geometry.triangles import Floats
 from .domain import Domain
 from .problem import NonlinearProblem
 from .products import PartMotions, multiply_blocks
-from .surface_parts import bisected
+from .surface_parts import bisect_points
 from .tangent import Residual, Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
 PLAIN, SHIFTED = range(2)
-PARTS = 256
+MAX_PARTS = 256
 """Parts of the mesh whose rigid motions are the coarse level."""
-LIFETIME = 8
-"""Tangents that a coarse level serves."""
-REGULARISED = 1e-6
-"""Part of its mean diagonal that is added to the coarse matrix."""
+COARSE_LIFETIME = 8
+"""Number of assembled tangents for which a coarse level is used."""
+REGULARISATION = 1e-6
+"""Shift of the coarse matrix, as a part of its mean diagonal entry."""
 _REASONS = PETSc.KSP.ConvergedReason
 INDEFINITE = (_REASONS.DIVERGED_INDEFINITE_MAT, _REASONS.DIVERGED_INDEFINITE_PC, _REASONS.DIVERGED_DTOL)
-"""What ends the solve of a tangent that is not positive definite; its residual may also grow before that is seen."""
+"""Ends of a solve with a tangent that is not positive definite; its residual may also grow before that is detected."""
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
-"""Parts of its diagonal that are added to a tangent until it is positive definite."""
+"""Shifts of a tangent's diagonal, as parts of it, that are tried in turn until it is positive definite."""
 
 
 class NotConvergedError(SolverError):
-    """The step was not solved; a smaller one may be."""
+    """The step was not solved; a smaller one may be solvable."""
 
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """A descent direction (k, 3) of the local nodes in m, and its slope: the residual's product with it, in J.
+    """A descent direction (k, 3) of the local nodes in m, and its slope, the derivative of the energy along it, in J.
 
-    With the iterations and the rung of the linear solve, and whether the tangent was positive definite as it was.
+    Further the iterations and the rung of the linear solve, and whether the tangent was positive definite without a
+    shift (`convex`).
     """
 
     values: Floats
@@ -61,29 +62,29 @@ class TwoLevelPreconditioner:
 
     def __init__(self, domain: Domain, tangent: Tangent) -> None:
         self._domain, self._tangent = domain, tangent
-        count = min(PARTS, max(len(domain.positions) // 50, 1))
-        owned_vertices = domain.vertex_of_node[: domain.owned]
-        # by global nodes, as the matrix' columns are
+        count = min(MAX_PARTS, max(len(domain.positions) // 50, 1))
+        owned_vertices = domain.vertex_of_node[: domain.n_owned]
+        # by global nodes, as the columns of the matrix
         self._vertex = np.concatenate(domain.comm.allgather(owned_vertices))
-        self._part_of_vertex = bisected(domain.positions, count)
+        self._part_of_vertex = bisect_points(domain.positions, count)
         self._part = self._part_of_vertex[self._vertex]
-        self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.owned)
+        self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.n_owned)
         self._parts = int(self._part.max()) + 1
-        # the motions of parts that have nodes of this rank: it needs no other rows of the coarse inverse
+        # the rows of the coarse inverse that this rank needs: motions of parts that have nodes of it
         self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
-        self._made_at = -LIFETIME
+        self._made_at = -COARSE_LIFETIME
 
     def renew(self) -> None:
-        """Take over the tangent's diagonal, and its coarse level where that has served its time: before each use."""
+        """Update the diagonal to the present tangent, and the coarse level after `COARSE_LIFETIME` tangents."""
         self._set_diagonal()
-        if self._tangent.elastic.assembled >= self._made_at + LIFETIME:
+        if self._tangent.elastic.assembled >= self._made_at + COARSE_LIFETIME:
             self._made_at = self._tangent.elastic.assembled
             self._set_coarse_level()
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Set y to the preconditioned x."""
-        coarse = self._domain.summed(self._motions.restrict(x.array_r, self._parts))
+        coarse = self._domain.sum_over_ranks(self._motions.restrict(x.array_r, self._parts))
         coarse[self._moved] = self._inverse_coarse @ coarse.astype(np.float32)
         multiply_blocks(self._inverse_diagonal, x.array_r, y.array_w)
         self._motions.add(coarse, y.array_w)
@@ -102,22 +103,22 @@ class TwoLevelPreconditioner:
         modes[matrix.fixed] = 0.0
         size, nodes = 6 * self._parts, np.arange(len(modes) + 1)
         prolongation = sparse.bsr_matrix((modes, self._part, nodes), shape=(3 * len(modes), size))
-        own = modes[self._own], self._part[self._own], nodes[: self._domain.owned + 1]
-        restriction = sparse.bsr_matrix(own, shape=(3 * self._domain.owned, size)).T.tobsr((6, 3))
-        coarse = self._domain.summed((restriction @ (matrix.half() @ prolongation)).toarray())
+        own = modes[self._own], self._part[self._own], nodes[: self._domain.n_owned + 1]
+        restriction = sparse.bsr_matrix(own, shape=(3 * self._domain.n_owned, size)).T.tobsr((6, 3))
+        coarse = self._domain.sum_over_ranks((restriction @ (matrix.half() @ prolongation)).toarray())
         coarse += coarse.T
         scale = np.trace(coarse) / size
-        coarse[np.diag_indices(size)] += REGULARISED * scale
+        coarse[np.diag_indices(size)] += REGULARISATION * scale
         motions = self._tangent.motions
         if motions is not None:
-            # stiff against what is taken out of all products, and would make it singular
-            held = self._domain.summed(restriction @ motions.modes)
-            coarse += 10 * scale / np.linalg.norm(held, 2) ** 2 * held @ held.T
+            # a stiffness against the removed motions, without which it would be singular
+            modes = self._domain.sum_over_ranks(restriction @ motions.modes)
+            coarse += 10 * scale / np.linalg.norm(modes, 2) ** 2 * modes @ modes.T
         self._inverse_coarse = inverse_matrix(coarse)[self._moved].astype(np.float32)
 
 
 def inverse_blocks(blocks: Floats) -> Floats:
-    """Return the inverses of (n, 3, 3) symmetric blocks, made positive definite."""
+    """Return the inverses of (n, 3, 3) symmetric blocks, as `positive_inverses` if they are indefinite."""
     a, b, c = blocks.swapaxes(0, 1)
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     determinants = np.einsum("ni,ni->n", a, cofactors[:, 0])
@@ -128,7 +129,7 @@ def inverse_blocks(blocks: Floats) -> Floats:
 
 
 def inverse_matrix(matrix: Floats) -> Floats:
-    """Return the inverse of a (k, k) symmetric matrix, made positive definite."""
+    """Return the inverse of a (k, k) symmetric matrix, as `positive_inverses` if it is indefinite."""
     factor, failed = dpotrf(matrix, lower=1)
     if failed:
         return positive_inverses(matrix)
@@ -137,17 +138,17 @@ def inverse_matrix(matrix: Floats) -> Floats:
 
 
 def positive_inverses(matrices: Floats) -> Floats:
-    """Return inverses of (..., k, k) symmetric matrices of which eigenvalues below 0 have changed sign."""
+    """Return inverses of (..., k, k) symmetric matrices with the absolute values of their eigenvalues."""
     values, directions = np.linalg.eigh(matrices)
     sizes = np.abs(values)
-    sizes = np.maximum(sizes, REGULARISED * sizes.max(axis=-1, keepdims=True))
+    sizes = np.maximum(sizes, REGULARISATION * sizes.max(axis=-1, keepdims=True))
     return np.asarray((directions / sizes[..., None, :]) @ directions.swapaxes(-1, -2))
 
 
 class LinearSolver:
-    """Finds descent directions from one tangent of a problem after the other.
+    """Solver of the linear systems of a problem; a solve fails after `max_iterations`.
 
-    What it keeps from one solve to the next decides how a direction is found. A solve fails after `max_iterations`.
+    It keeps the preconditioner and the last shift: they affect how a direction is found, not the solution of a step.
     """
 
     def __init__(self, problem: NonlinearProblem, max_iterations: int) -> None:
@@ -156,23 +157,23 @@ class LinearSolver:
         self._level = 0  # of the shift that the last tangent needed
         self._cg = PETSc.KSP().create(problem.domain.comm)
         self._cg.setType("cg")
-        # the norm that Newton's method is judged by
+        # the norm of Newton's convergence criterion
         self._cg.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._cg.setTolerances(atol=0.0, max_it=max_iterations)
 
     def solve(self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool) -> Direction:
-        """Return a solution of J d = −r that descends, with the tangent J and the residual r at one displacement.
+        """Return a descent direction d from J d = −r, with the tangent J and the residual r at one displacement.
 
-        `reduction` is the part of the right-hand side that may be left. Where J is indefinite, it is shifted; with
-        `convexify` its further parts are made convex before that. NotConvergedError where no shift helps.
+        The solve leaves at most a part `reduction` of the right-hand side. An indefinite J is shifted; with `convexify`
+        its parts of contact are first made semidefinite. NotConvergedError if no shift helps.
         """
         iterations = 0
         self._cg.setTolerances(rtol=reduction)
-        # where the tangent was not positive definite before, it may still not be
+        # a tangent after an indefinite one may still be indefinite
         first = max(self._level - 1, 0)
         if convexify and not self._problem.convex:
-            # parts that are pressed together tend to slide aside, which makes the tangent indefinite; made convex, it
-            # rarely is, but it is no longer exact
+            # surfaces pressed together tend to slide sideways, which makes the tangent indefinite; with semidefinite
+            # contact it rarely is, but it is not exact
             if first == 0:
                 reason, direction = self._run(tangent, residual)
                 iterations += direction.iterations
@@ -181,9 +182,9 @@ class LinearSolver:
                     return direction
             self._problem.convexify(tangent, residual.displacement)
         for level in range(first, len(SHIFTS)):
-            tangent.raise_diagonal(SHIFTS[level])
+            tangent.shift_diagonal(SHIFTS[level])
             reason, direction = self._run(tangent, residual)
-            tangent.raise_diagonal(0.0)
+            tangent.shift_diagonal(0.0)
             iterations += direction.iterations
             if reason > 0:
                 self._level = level
@@ -193,7 +194,7 @@ class LinearSolver:
         raise NotConvergedError("the linear solver found no descent direction")
 
     def _run(self, tangent: Tangent, residual: Residual) -> tuple[int, Direction]:
-        """Return PETSc's reason for the end of a solve, 0 without a descent, and the direction."""
+        """Return PETSc's convergence reason, 0 if the direction does not descend, and the direction."""
         if self._preconditioner is None:
             self._preconditioner = TwoLevelPreconditioner(self._problem.domain, tangent)
             multilevel = self._cg.getPC()
@@ -205,7 +206,7 @@ class LinearSolver:
         self._right.array_w[:] = residual.owned
         self._cg.solve(self._right, self._solution)
         owned = -self._solution.array_r
-        self._problem.clear_fixed(owned)  # which preconditioners miss by their tolerance
+        self._problem.clear_fixed(owned)  # fixed components are zero only to within the tolerance
         slope = self._problem.domain.dot(owned, residual.owned)
-        reason = self._cg.getConvergedReason() if slope < 0 else 0  # false where it is not a number
+        reason = self._cg.getConvergedReason() if slope < 0 else 0  # False for NaN
         return reason, Direction(self._problem.domain.with_ghosts(owned), slope, self._cg.getIterationNumber())

@@ -15,7 +15,7 @@ ENERGY_ROUND_OFF = 1e-12
 MIN_RESOLVED = 1e-6
 """Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
 MIN_PROGRESS = 1e-6
-"""Relative fall of the energy from which an iteration does not count towards `max_newton`."""
+"""Relative fall of the energy above which an iteration does not count towards `max_newton`."""
 MAX_ITERATIONS_FACTOR = 10
 """Iterations allowed in all, as a multiple of `max_newton`."""
 STAGNATION_FACTOR = 10.0
@@ -45,8 +45,8 @@ class NewtonSettings:
 class Solution:
     """A step's displacement (k, 3) of the local nodes in m, and the work it took.
 
-    Iterations, the last rung that a linear solve needed, and the residual relative to that at rest. It is `converged`
-    where that is below the tolerance: not where only round-off was left to gain.
+    Further the iterations, the highest rung of a linear solve, and the residual relative to that at rest. It has
+    `converged` if that is below the tolerance, and not if only round-off was left to gain.
     """
 
     displacement: Floats
@@ -61,8 +61,8 @@ class Solution:
 class Iterate:
     """An iterate: its residual at its displacement, and its energy in J if computed.
 
-    `progress` is the relative fall of the energy in the iteration, if computed; `exhausted` says that only round-off
-    is left to gain.
+    `progress` is the relative fall of the energy in the iteration, if computed; it is `exhausted` if only round-off is
+    left to gain.
     """
 
     residual: Residual
@@ -74,8 +74,8 @@ class Iterate:
 def forcing_term(final: float, left: float, tightest: float) -> float:
     """Return the part of the residual that a linear solve may leave (inexact Newton, Eisenstat and Walker 1996).
 
-    `final` ends the step, `left` is the part of its residual that the last iteration left (the next one leaves about
-    the square, however well it is solved), and `tightest` the tolerance with which the iteration converges fast.
+    `final` would end the step, `left` is the part of its residual that the last iteration left (the next one leaves
+    about the square of it, however accurate its linear solve), and `tightest` the tolerance for fast convergence.
     """
     if left**2 > MAX_FORCING:
         return max(MAX_FORCING, final)
@@ -85,9 +85,9 @@ def forcing_term(final: float, left: float, tightest: float) -> float:
 
 
 class NewtonSolver:
-    """Newton's method for one step after the other, with objects made once.
+    """Newton's method for the steps of a run.
 
-    What it keeps from one step to the next decides how a solution is found, and changes it within the tolerance only.
+    State that it keeps between steps affects how a solution is found, and changes it within the tolerance only.
 
     A residual below `residual_floor`, in N, counts as solved whatever the residual at rest. `last` is the residual of
     the present step's last iterate, also where the solve failed, and `inverted` det F (c, p) of the local elements at
@@ -118,7 +118,7 @@ class NewtonSolver:
         solution, before, stalled = Solution(iterate.residual.displacement), np.inf, 0
         while (norm := iterate.residual.norm) > tolerance and not iterate.exhausted:
             self.last = iterate.residual
-            # where folds snap or slide past each other, the energy falls far before the residual does
+            # where folds snap or slide along each other, the energy falls long before the residual does
             if max(stalled, solution.newton / MAX_ITERATIONS_FACTOR) >= settings.max_newton:
                 raise NotConvergedError(
                     "Newton's method did not converge",
@@ -129,7 +129,7 @@ class NewtonSolver:
             stagnates = before / 2 < norm <= STAGNATION_FACTOR * tolerance
             left = norm / before if solution.newton > 1 else max(norm / at_rest.norm, self._first_left)
             forcing = forcing_term(0.4 * tolerance / norm, left, settings.krylov_tolerance)
-            # a tangent with no more error than the linear solve may leave is as good as a new one
+            # a lagged tangent with an error below the forcing term is as good as a new one
             tangent = problem.tangent(iterate.residual, within=0.0 if stagnates else forcing)
             try:
                 iterate = self._iterate(iterate, tangent, forcing, solution, convexify=not stagnates)
@@ -172,7 +172,7 @@ class NewtonSolver:
         """Return the first of ever shorter moves along a direction that lowers the energy and inverts no element."""
         problem, start, norm = self.problem, iterate.residual.displacement, iterate.residual.norm
         slope, convex, before = direction.slope, direction.convex, iterate.energy
-        owned = direction.values[: problem.domain.owned].ravel()
+        owned = direction.values[: problem.domain.n_owned].ravel()
         if not problem.convex:
             # the energy is compared wherever its change is above round-off
             before = problem.energy(start) if before is None else before
@@ -183,7 +183,7 @@ class NewtonSolver:
             if problem.smallest_volume_ratio(u) > 0:
                 trial = problem.residual(u)
                 finite = np.isfinite(trial.norm)
-                # where a convex energy's slope has all but vanished, the energy fell by about half of it
+                # if the slope of a convex energy nearly vanishes, the energy fell by about half of it
                 flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
                 if convex and finite and trial.norm < norm and flat:
                     return Iterate(trial)

@@ -1,4 +1,4 @@
-"""What a run leaves: progress lines, frames for ParaView, the step table, and a summary."""
+"""Output of a run: progress lines, events, and the fields of frames for ParaView."""
 
 import json
 import logging
@@ -28,21 +28,21 @@ SUMMARY = "summary.json"
 ZONES = "zones.json"
 
 
-def say(text: str, event: str = "", **facts: float | str | None) -> None:
-    """Print a line at once, so that a log follows the run, and tell what has happened, if it is an event."""
+def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
+    """Print a line without buffering, so that a log follows the run, and log the `event` it stands for, if any."""
     print(text, flush=True)
     if event:
         log_event(event, **facts)
 
 
 def log_event(event: str, **facts: float | str | None) -> None:
-    """Hand an event with its facts on to the file of `write_events`, where there is one."""
+    """Write an event with its facts to the file of `write_events`, if there is one."""
     log.info(event, extra={"facts": facts})
 
 
 def warn(text: str) -> None:
-    """Print a warning, which is an event too."""
-    say(f"warning: {text}", "warning", message=text)
+    """Print a warning and log it as an event."""
+    print_line(f"warning: {text}", "warning", message=text)
 
 
 class _Events(logging.Formatter):
@@ -51,7 +51,7 @@ class _Events(logging.Formatter):
 
 
 def write_events(path: Path) -> None:
-    """Have all events written to a file from now on, each as a JSON object on a line of its own."""
+    """Write all events from now on to a file, one JSON object per line."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handler = logging.FileHandler(path, mode="w")
@@ -63,7 +63,7 @@ def write_events(path: Path) -> None:
 
 
 def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
-    """Return the line of a step: week, iterations, displacement, time."""
+    """Format the progress line of a step: week, iterations, displacement, time."""
     minutes, seconds = divmod(round(seconds_left), 60)
     return (
         f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
@@ -73,7 +73,7 @@ def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
 
 
 def frame_path(folder: Path, week: float) -> Path:
-    """Return the file of a single frame, kept until the run has ended."""
+    """Return the file of a single frame, which exists until the run has ended."""
     return folder / f"frame-{week_tag(week)}.h5"
 
 
@@ -83,13 +83,13 @@ def layer_fields(
     parameters: FoldingParameters,
     maps: Maps,
     week: float,
-    wanted: Iterable[str],
+    names: Iterable[str],
     log_growth: Floats | None = None,
 ) -> dict[str, NDArray]:
-    """Return the fields of a shape that are among `wanted` (names as in the parameter `fields`), per vertex.
+    """Return the fields of a shape at its vertices, for names of the parameter `fields`.
 
-    Positions are (n, 3) in mm. The names of the arrays carry their units. Growth is by the parameters' rates, or has
-    the logarithm (6, n).
+    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth has the logarithm (6, n) if given,
+    or else the rates of the parameters.
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
@@ -98,8 +98,8 @@ def layer_fields(
         increments = increments_at(parameters, weight, zones.growth, maps, week, parameters.step_s)
         growth = dict(zip(("tangential_growth_per_step", "radial_growth_per_step"), increments, strict=True))
     else:
-        growth = growth_along(log_growth, search.nearest_normals(positions_mm))
-    # of a vertex the highest number of its facets' zones
+        growth = growth_components(log_growth, search.nearest_normals(positions_mm))
+    # a vertex gets the highest of its facets' zones
     zone = np.zeros(len(positions_mm), dtype=np.int32)
     np.maximum.at(zone, zones.facets.ravel(), np.repeat(zones.facet_zone, 3).astype(np.int32))
     mu = shear_modulus(parameters, weight, maps, week)
@@ -110,25 +110,25 @@ def layer_fields(
         "growth": growth,
         "shear_modulus": {"shear_modulus_pa": mu},
         "bulk_modulus": {"bulk_modulus_pa": material.bulk_to_shear_ratio * mu},
-        "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in wanted else {},
+        "normal": {"pial_normal": search.nearest_normals(positions_mm)} if "normal" in names else {},
         "zones": {"zone": zone, "growing": zones.growth},
     }
-    return {name: values for key in wanted if key in fields for name, values in fields[key].items()}
+    return {name: values for key in names if key in fields for name, values in fields[key].items()}
 
 
-def growth_along(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
-    """Return the fields of growth with the logarithm (6, n) at vertices with the (n, 3) unit normals of the surface.
+def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
+    """Return tangential and radial growth and its main direction, from the logarithm (6, n) and unit normals (n, 3).
 
-    Its direction is that along the surface in which it is largest; its length is by how much it exceeds the growth
-    across that direction.
+    The main direction is the tangential one of largest growth; the length of its vector is the difference to the growth
+    across it.
     """
-    tensors, outwards = unpacked(log_growth.T), normals[:, :, None] * normals[:, None, :]
-    along = np.eye(3) - outwards
-    # the normal, with −1, comes first
-    values, axes = np.linalg.eigh(along @ tensors @ along - outwards)
+    tensors, radial = unpacked(log_growth.T), normals[:, :, None] * normals[:, None, :]
+    tangential = np.eye(3) - radial
+    # the first eigenvector is the normal, with −1
+    values, axes = np.linalg.eigh(tangential @ tensors @ tangential - radial)
     return {
         "tangential_growth_per_step": values[:, 1:].mean(axis=1),
-        "radial_growth_per_step": (tensors * outwards).sum(axis=(1, 2)),
+        "radial_growth_per_step": (tensors * radial).sum(axis=(1, 2)),
         "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
     }
 

@@ -30,10 +30,10 @@ FACET_DEGREE = {1: 2, 2: 4}
 
 
 class Contribution(Protocol):
-    """A further part of the energy, such as contact between folds, of displacements u (k, 3) of the local nodes in m.
+    """A further part of the energy, such as contact, as a function of displacements u (k, 3) of the local nodes in m.
 
-    Energies are in J and the same on all ranks, forces (their derivative, of the owned components) in N, stiffness in
-    N/m, None where it is zero.
+    The energy is in J and the same on all ranks; forces are its derivative by the owned components, in N; stiffness is
+    in N/m, None if it is zero.
     """
 
     def energy(self, u: Floats) -> float: ...
@@ -45,8 +45,8 @@ class Contribution(Protocol):
 class NonlinearProblem:
     """Energy, residual and tangent of one step, as functions of the displacement.
 
-    Displacements `u` are those of the local nodes, ghosts included, (k, 3) in m from the mesh as it is placed. What
-    else a step is solved with is set by `set_step`.
+    Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
+    that differs between steps is set by `set_step`.
 
     Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. With `remembers_stress`
     the mesh may be stretched elastically at the start of the step. `quadrature_degree` is that of the polynomials that
@@ -68,12 +68,12 @@ class NonlinearProblem:
     ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
-        # what compiled forms read; each evaluation sets it anew
+        # the coefficient of compiled forms; each evaluation sets it
         self._u = dolfinx.fem.Function(domain.space)
         self._forces = dolfinx.la.vector(domain.space.dofmap.index_map, 3)
-        self.points = IntegrationPoints.of_degree(domain.order, quadrature_degree)
+        self.points = IntegrationPoints.exact_to_degree(domain.order, quadrature_degree)
         # reference coordinates, and parts of the regular element's volume
-        self._rule = self.points.places[:, 1:].copy(), self.points.weights / 6
+        self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
         self._mu, self._G_inverse = self._field_at_points(()), self._field_at_points((3, 3))
         self._V = self._field_at_points((3, 3)) if remembers_stress else None
         self._undeformed = np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1))
@@ -87,17 +87,17 @@ class NonlinearProblem:
         dx = self._volume_measure()
         self._linear: LinearElements | None = None
         if domain.order == 1 and len(self.points.weights) == 1 and not remembers_stress:
-            # in the place of the form compiler's code
+            # instead of the form compiler's code
             self._linear, energy = LinearElements(domain, material), 0
         elif self._V is None:
             energy = material.energy_density(Fe, *moduli) * dx
         else:
-            # counted per volume of the state without stress
+            # per volume of the state without stress
             energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
         self._energy = energy + self._plane_energy(zones, penalty_pa_per_m) if penalty_pa_per_m else energy
 
         (coupling,) = self._compiled(ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * dx)
-        fixed = domain.local(zones.fixed)[: domain.owned]
+        fixed = domain.local(zones.fixed)[: domain.n_owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
         first = 3 * domain.space.dofmap.index_map.local_range[0]
         self._fixed_global = (first + self._fixed_owned).astype(PETSc.IntType)
@@ -131,7 +131,7 @@ class NonlinearProblem:
 
     @cached_property
     def _forms(self) -> list[dolfinx.fem.Form]:
-        """The energy, its residual and its tangent, as far as the form compiler has a part in them."""
+        """The form compiler's part of the energy, its residual and its tangent."""
         if not self._energy:
             return []
         residual = ufl.derivative(self._energy, self._u)
@@ -144,12 +144,12 @@ class NonlinearProblem:
     def set_step(
         self, mu: Floats, G_inverse: Floats, V: Floats | None = None, part: NDArray[np.int64] | None = None
     ) -> None:
-        """Set what a step is solved with, on the mesh as it is placed now.
+        """Set the coefficients of a step, on the mesh as it is placed now.
 
         At the integration points of the local elements: the shear modulus (c, q) in Pa, the inverse (c, q, 3, 3) of the
-        growth tensor, and the elastic left stretch (c, q, 3, 3) of the mesh where stress is remembered, by default
-        none. The rigid motions of a free body are taken out of each of the parts that the (n,) numbers of all vertices
-        name, by default of each connected part.
+        growth tensor and, with stress memory, the elastic left stretch V (c, q, 3, 3) of the mesh, by default none.
+        `part` (n,) are numbers of the vertices' parts, by default the connected parts; in a free body the rigid motions
+        of each part are removed.
         """
         set_at_points(self._mu, mu)
         set_at_points(self._G_inverse, G_inverse)
@@ -169,7 +169,7 @@ class NonlinearProblem:
         """Return a displacement without the rigid motions of a free body; that of another body as it is."""
         if self._tangent.motions is None:
             return u
-        owned = u[: self.domain.owned].flatten()
+        owned = u[: self.domain.n_owned].flatten()
         self._tangent.motions.remove(owned)
         return self.domain.with_ghosts(owned)
 
@@ -208,7 +208,7 @@ class NonlinearProblem:
         if self._forms:
             dolfinx.fem.assemble_vector(forces.array, self._forms[1])
         forces.scatter_reverse(InsertMode.add)
-        elastic = forces.array[: 3 * self.domain.owned].copy()
+        elastic = forces.array[: 3 * self.domain.n_owned].copy()
         self.clear_fixed(elastic)
         total = elastic.copy()
         for part in self.contributions:
@@ -219,7 +219,7 @@ class NonlinearProblem:
         return Residual(u, elastic, total, self.domain.norm(total))
 
     def clear_fixed(self, owned: Floats) -> None:
-        """Set the fixed ones among the owned components (3 · owned,) to exactly 0."""
+        """Set the fixed ones among the owned components (3 · n_owned,) to exactly 0."""
         owned[self._fixed_owned] = 0.0
 
     def _add_stiffness(self, u: Floats, blocks: MatrixCSR) -> None:
@@ -235,7 +235,7 @@ class NonlinearProblem:
         Its elastic part may be lagged, that is an earlier one, where that predicts the change of the elastic forces
         since to within a part `within`. All calls return the same object.
         """
-        # petsc4py keeps what several ranks share until all of them agree to let go of it
+        # petsc4py keeps objects that several ranks share until all ranks agree to destroy them
         PETSc.garbage_cleanup(self.domain.comm)
         self._tangent.elastic.update(at, within)
         self._tangent.parts = self._stiffness_parts(at.displacement, convex=False)
@@ -247,7 +247,7 @@ class NonlinearProblem:
 
     @property
     def convex(self) -> bool:
-        """Whether the energy is convex, apart from the effect of large rotations: not with contributions."""
+        """True if the energy is convex except for large rotations, that is without contributions."""
         return not self.contributions
 
     def _stiffness_parts(self, u: Floats, *, convex: bool) -> list[PETSc.Mat]:

@@ -21,7 +21,7 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, progress_line, say, warn
+from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, print_line, progress_line, warn
 from .simulation import Folding, advance
 from .steering import missed_curves
 from .zones import Zones
@@ -46,10 +46,10 @@ def run(
     folding = Folding(comm, mesh, zones, parameters, maps)
     key = run_key(mesh, parameters, maps)
     folder = out / f"checkpoint-{key}"
-    state, message = comm.bcast(resumable(folder, key, parameters) if comm.rank == 0 else None, root=0)
+    state, message = comm.bcast(load_state(folder, key, parameters) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
-        for note in filter(None, (message, *foreign_checkpoints(out, folder), shortened_steps(parameters))):
-            say(note)
+        for note in filter(None, (message, *foreign_checkpoints(out, folder), shortened_step_note(parameters))):
+            print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
         state = save_frame(folding, state, parameters.output_weeks[0], folder)
@@ -72,7 +72,7 @@ def run(
             "cpu_seconds": processor,
             "peak_memory_MiB": memory,
             "weeks": weeks,
-            "radius_ratio_01": [smallest_radius_ratios(mesh, read_positions(out / FRAMES, week)) for week in weeks],
+            "radius_ratio_01": [low_radius_ratio(mesh, read_positions(out / FRAMES, week)) for week in weeks],
             "reached_week": reached,
             "diverged": diverged,
             "resumed_after_step": resumed_after,
@@ -83,7 +83,7 @@ def run(
         if diverged is not None:
             warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
         ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
-        say(ended, "end", week=reached, error=diverged)
+        print_line(ended, "end", week=reached, error=diverged)
 
 
 def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool) -> tuple[State, str | None]:
@@ -118,15 +118,17 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
     pressure, elements = folding.fields.contact_pressure(names, solved), folding.fields.elements(names, solved)
     # a mean over the steps since the last frame; before the first one, that step's
-    grown = solved.growth.logarithm() if state.grown is None else state.grown * (p.step_s / state.grown_s)
+    log_growth = solved.growth.logarithm()
+    if state.log_growth is not None:
+        log_growth = state.log_growth * (p.step_s / state.log_growth_s)
     if folding.domain.comm.rank == 0:
         fields = {"positions": state.positions * MM_PER_M}
         if "displacement" in names:
             fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
         rates = solved.growth.parameters
-        fields |= layer_fields(fields["positions"], folding.zones, rates, folding.maps, week, names, grown)
+        fields |= layer_fields(fields["positions"], folding.zones, rates, folding.maps, week, names, log_growth)
         write_frame(frame_path(folder, week), week, fields | pressure, elements)
-    return replace(state, grown=None, grown_s=0.0)
+    return replace(state, log_growth=None, log_growth_s=0.0)
 
 
 def report_step(state: State, parameters: FoldingParameters, seconds_per_step: float) -> None:
@@ -134,7 +136,7 @@ def report_step(state: State, parameters: FoldingParameters, seconds_per_step: f
     row, end_week = state.rows[-1], parameters.end_week
     left_s = seconds_per_step * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
     facts = {"week": row["week"], "end_week": end_week, "step": row["step"], "left_s": left_s}
-    say(progress_line(row, end_week, left_s), "step", **facts)
+    print_line(progress_line(row, end_week, left_s), "step", **facts)
 
 
 def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
@@ -148,15 +150,15 @@ def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
     }
 
 
-def smallest_radius_ratios(mesh: TetrahedralMesh, positions: Floats) -> float:
+def low_radius_ratio(mesh: TetrahedralMesh, positions: Floats) -> float:
     """Return the first centile of the elements' radius ratios, for vertices at (n, 3) positions."""
     return float(np.quantile(radius_ratios(TetrahedralMesh(positions, mesh.tets)), 0.01))
 
 
-def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
-    """Return the state to go on from, or None, and what to tell the user.
+def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
+    """Return the state to resume from, or None, and a message for the user.
 
-    The frames of all output weeks that the state has passed must be there.
+    It is used only if the frames of all output weeks that it has passed exist.
     """
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
@@ -164,30 +166,30 @@ def resumable(folder: Path, key: str, parameters: FoldingParameters) -> tuple[St
     end_s = seconds_to(parameters.end_week, parameters)
     passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
     if not all(frame_path(folder, week).exists() for week in passed):
-        return None, f"the checkpoint {folder} has passed output weeks that were not asked for then: starting anew"
+        return None, f"the checkpoint {folder} has no frames of some output weeks that it has passed: starting again"
     within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
     return replace(state, rows=within), message
 
 
 def seconds_to(week: float, parameters: FoldingParameters) -> float:
-    """Return the time in s from the start of the run to a week."""
+    """Return the time in s from the start of a run to a week."""
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
 def foreign_checkpoints(out: Path, present: Path) -> list[str]:
-    """Return what to say of checkpoints of other meshes or parameters, which stay; only the newest two are kept."""
-    others = sorted(
+    """Delete all but the newest two checkpoints of other meshes or parameters, and return messages about these two."""
+    foreign = sorted(
         (path for path in out.glob("checkpoint-*") if path != present),
         key=lambda path: path.stat().st_mtime,
         reverse=True,
     )
-    for old in others[2:]:
+    for old in foreign[2:]:
         shutil.rmtree(old, ignore_errors=True)
-    return [f"{path} belongs to another mesh or other parameters: not used, kept for a return" for path in others[:2]]
+    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in foreign[:2]]
 
 
-def shortened_steps(parameters: FoldingParameters) -> str:
-    """Return what to say where the time step does not divide the time between two outputs; empty where it does."""
+def shortened_step_note(parameters: FoldingParameters) -> str:
+    """Return a note if the time step does not divide the time between two outputs, else an empty text."""
     step = parameters.step_s
     for a, b in pairwise(parameters.output_weeks):
         if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:

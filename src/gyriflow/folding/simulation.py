@@ -1,4 +1,4 @@
-"""One step after the other: growth, layers, a Newton solve, the moved mesh; halved steps where a solve fails."""
+"""Time stepping: in each step growth, layers and a Newton solve; steps whose solve fails are halved."""
 
 import math
 import time
@@ -24,7 +24,7 @@ from .growth_models import growth_model
 from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, Solution
-from .output import say, warn
+from .output import print_line, warn
 from .problem import NonlinearProblem
 from .step_fields import SolvedStep, StepFields
 from .stress import left_stretch, packed, relaxed, unpacked
@@ -32,13 +32,13 @@ from .tissue import Elements, Tissue
 from .zones import Zones
 
 PENALTY_PA_PER_M = 5.0e5
-"""Pressure per depth of penetration at the planes of contact (the paper)."""
+"""Pressure per depth of penetration at the contact planes (the paper)."""
 STEPS_BEFORE_GROWING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
 
 class Folding:
-    """A brain that folds: the solver's objects, made once, and one step at a time.
+    """A brain that folds: the solver's objects, made once, and its steps.
 
     The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions
     in m. `solved` is the last step that was accepted, at first one without displacement; `fields` gives its fields,
@@ -76,7 +76,7 @@ class Folding:
         floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
         self.solver = NewtonSolver(self.problem, newton, floor)
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
-        share = Share(comm.rank, comm.size, self.domain.summed)
+        share = Share(comm.rank, comm.size, self.domain.sum_over_ranks)
         self.model = growth_model(p, self.inputs, mesh.vertices, share)
         self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
         self.fields = StepFields(self.problem, self.contact, zones, p)
@@ -84,21 +84,21 @@ class Folding:
         self._pial = np.unique(zones.cortex_facets)
 
     def step(self, state: State, step_s: float) -> State:
-        """Return the state after a step of a given length; its last row of the step table describes the step.
+        """Return the state after a step of a given length, with a new row of the step table.
 
-        NotConvergedError where the step is too large.
+        NotConvergedError if the step is too large.
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
-        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.predicted(step_s)])
+        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.first_guesses(step_s)])
         u = solution.displacement
-        displacement = self.domain.gathered(u[: self.domain.owned])
+        displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
         thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
         stretch = None
         if self.parameters.stress_memory_gw > 0:
-            stretch = self.domain.gathered_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
+            stretch = self.domain.gather_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
@@ -112,13 +112,13 @@ class Folding:
             "rung": RUNGS[solution.rung],
         }
         self.solved = SolvedStep(u, step_s, growth)
-        after = state.after(displacement, step_s, row, stretch, growth.learnt(size), growth.logarithm())
+        after = state.after(displacement, step_s, row, stretch, growth.correction(size), growth.logarithm())
         row["seconds"] = time.monotonic() - began
         return after
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
-        """Set the problem of a step, and return the tissue with the layers of the step's middle, and the growth."""
-        start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.learnt)
+        """Set the problem of a step; return its tissue, with parameters of its middle, and its growth."""
+        start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.correction)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
             domain.place(state.positions)
@@ -127,7 +127,7 @@ class Folding:
         if self.contact is not None:
             self.contact.begin_step(state.rows[-1] if state.rows else None)
             if self.problem.free:
-                part = self.contact.joined(part)
+                part = self.contact.join_touching(part)
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
         self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part)
@@ -148,8 +148,8 @@ class Folding:
             "residual": solution.residual,
             "converged": solution.converged,
             "energy_J": self.problem.energy(u),
-            "min_J": self.domain.minimum(ratios),
-            "max_J": -self.domain.minimum(-ratios),
+            "min_J": self.domain.min_over_ranks(ratios),
+            "max_J": -self.domain.min_over_ranks(-ratios),
             "max_u_mm": float(length.max()),
             "mean_u_mm": float(length.mean()),
             "max_u_pial_mm": float(length[self._pial].max()),
@@ -160,16 +160,16 @@ class Folding:
 def advance(folding: Folding, state: State, until_s: float) -> State:
     """Return the state after one accepted step towards `until_s`; the step is halved while its solve fails.
 
-    SolverError where the smallest step fails too.
+    SolverError if the smallest step fails too.
     """
     p = folding.parameters
-    left = until_s - state.time_s
-    # a remainder shorter than a whole step can be halved as often as one
-    whole = min(p.step_s, left) if state.step_s >= p.step_s else p.step_s
+    remaining = until_s - state.time_s
+    # a remainder shorter than a whole step may be halved as often as a whole one
+    whole = min(p.step_s, remaining) if state.step_s >= p.step_s else p.step_s
     smallest = whole / 2**p.solver.max_halvings
     while True:
-        # do not take a separate step for a remainder that is only round-off
-        step_s = left if left < state.step_s * (1 + 1e-6) else state.step_s
+        # no separate step for a remainder of round-off
+        step_s = remaining if remaining < state.step_s * (1 + 1e-6) else state.step_s
         try:
             after = folding.step(state, step_s)
         except NotConvergedError as error:
@@ -178,11 +178,11 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
                 raise SolverError(
                     f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
                     found=f"{error}; {worst_places(folding.solver)}",
-                    remedy="The last good state is kept: the same command with an earlier folding.end_week, or more "
-                    "folding.solver.max_halvings, goes on from it. A finer mesh or less growth may help.",
+                    remedy="The last good state is kept: the same command with an earlier folding.end_week or more "
+                    "folding.solver.max_halvings resumes from it. A finer mesh or less growth may help.",
                 ) from None
             if folding.domain.comm.rank == 0:
-                say(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
+                print_line(f"step of {step_s:g} s failed ({error}): trying {half:g} s")
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:

@@ -1,4 +1,4 @@
-"""Zones, tags and fields of a run on its start mesh, and the hemispheres of its folded brain that follow from them."""
+"""Zones, tags and fields of a run on its start mesh, and the hemispheres of the folded brain by these tags."""
 
 from collections.abc import Callable
 
@@ -26,8 +26,8 @@ def start_regions(
 ) -> Regions:
     """Return the regions of a run on its start mesh, with the fields of the first step.
 
-    `left_faces` returns the mask of the left faces of the mesh's boundary; of a brain of one hemisphere it is not
-    asked. InputError where maps or zones are impossible.
+    `left_faces` returns the mask of the left faces of the mesh's boundary; it is not called for a single hemisphere.
+    InputError if maps or zones are impossible.
     """
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
@@ -47,9 +47,9 @@ def start_regions(
 def folded_surfaces(
     regions: Regions, positions_mm: Floats
 ) -> tuple[TriangleMesh, TriangleMesh | None, TriangleMesh | None]:
-    """Return the pial surface of a folded brain, and the left and the right facets of it, None where there are none.
+    """Return the pial surface of a folded brain and its left and right part, None if it has no such facets.
 
-    `positions_mm` (n, 3) are those of the nodes of the start mesh, on whose facets the regions say which side is which.
+    `positions_mm` (n, 3) are those of the vertices of the start mesh, whose facets have tags of their hemisphere.
     """
     surface = TriangleMesh(positions_mm, regions.facets)
     on_left = regions.facet_tags["hemisphere"] == LEFT

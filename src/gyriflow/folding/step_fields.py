@@ -56,7 +56,7 @@ class StepFields:
         fields: dict[str, Floats] = {}
         if set(ELEMENT_FIELDS).isdisjoint(names):
             return fields
-        slopes = problem.points.slopes
+        slopes = problem.points.gradients
         after = domain.local(domain.positions) + u
         total = deformation_gradients(self._start, after, domain.cells, slopes).reshape(-1, 3, 3)
         if "stress" in names:
@@ -73,7 +73,7 @@ class StepFields:
             fields["volume_ratio_step"] = np.linalg.det(problem.evaluate("deformation", u).reshape(-1, 3, 3))
             fields["volume_ratio"] = np.linalg.det(total)
         means = [values.reshape(-1, len(slopes)) @ problem.points.weights for values in fields.values()]
-        gathered = domain.gathered_cells(np.stack(means, axis=1))
+        gathered = domain.gather_cells(np.stack(means, axis=1))
         return dict(zip(fields, gathered.T, strict=True))
 
     def contact_pressure(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:

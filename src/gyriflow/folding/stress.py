@@ -1,11 +1,11 @@
-"""The elastic stretch that is carried on, and symmetric tensors as six values."""
+"""The elastic stretch kept from step to step, and symmetric tensors stored as six values."""
 
 import numpy as np
 
 from ..geometry.triangles import Floats
 
 UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
-"""Rows and columns of the six values that a symmetric tensor is kept as."""
+"""Rows and columns of the six values of a symmetric tensor."""
 
 
 def packed(tensors: Floats) -> Floats:
@@ -22,13 +22,13 @@ def unpacked(values: Floats) -> Floats:
 
 
 def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
-    """Return V^power (..., 3, 3) of Fe = V·R: the rotation R has no stress, and an isotropic material forgets it."""
+    """Return V^power (..., 3, 3) of Fe = V·R; an isotropic material does not depend on the rotation R."""
     squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))
     return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
 
 
 def relaxed(V: Floats, step_gw: float, memory_gw: float) -> Floats:
-    """Return (..., 3, 3) stretches after a time: the elastic strain ln V decays as exp(−t/τ), τ = `memory_gw`."""
+    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as exp(−t/τ), with τ = `memory_gw`."""
     if np.isinf(memory_gw):
         return V
     return left_stretch(V, float(np.exp(-step_gw / memory_gw)))

@@ -1,4 +1,4 @@
-"""How the elements of a mesh are stretched by a displacement, and how stiff they are to what diffuses, by C code."""
+"""Stretches of a mesh's elements under a displacement, and the stiffness matrix of diffusion on it, in C code."""
 
 from pathlib import Path
 
@@ -12,21 +12,21 @@ from ..geometry.triangles import Floats, Ints
 from .compilation import compiled
 from .stress import packed
 
-MOST_STRAIN = 0.3
-"""Largest logarithmic growth in any direction in a step: more belongs to elements that the target folds over."""
-SMALL = 0.12
-"""Largest entry of FᵀF − 1 for which the logarithm is taken by its series."""
+MAX_STRAIN = 0.3
+"""Largest principal Hencky strain of growth in a step: elements with more are inverted in the target."""
+MAX_SERIES_ENTRY = 0.12
+"""Largest entry of FᵀF − I for which the logarithm is computed by its series."""
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-"""Corners of an element's edges, in the order of the code's pairs."""
+"""Corners of an element's edges, in the order of the pairs in the C code."""
 DECLARATION = """void stretch(long count, double small, void *tets, void *X, void *x,
                               void *sums, void *pairs, void *gradients, void *large);"""
 
 
 class Stretches:
-    """The stretches and stiffness of (m, 4) tetrahedra between n vertices that move.
+    """Stretches and stiffness of (m, 4) tetrahedra between n vertices that move.
 
-    Where the stiffness has its entries is found once, which takes longer than all else. Processes that `share` the
-    elements, each with some of the `tets`, all have the whole.
+    The sparsity pattern of the stiffness is computed once, which takes longer than the rest. Processes that `share` the
+    elements each compute with some of the `tets`; all get the whole result.
     """
 
     def __init__(self, tets: Ints, count: int, share: Share = ALONE) -> None:
@@ -38,38 +38,38 @@ class Stretches:
         self._ends = np.divmod(numbers, count)
         vertices = np.arange(count)
         rows, columns = (np.concatenate([*ends, vertices]) for ends in (self._ends, self._ends[::-1]))
-        self._places = sparse.coo_matrix((np.arange(len(rows)), (rows, columns))).tocsr()
+        self._pattern = sparse.coo_matrix((np.arange(len(rows)), (rows, columns))).tocsr()
 
     def of(self, positions: Floats, displacement: Floats) -> tuple[Floats, Floats, sparse.csr_matrix]:
-        """Return sums at the vertices over the elements around them, and the (n, n) stiffness matrix.
+        """Return volume-weighted sums of ln U (n, 6), volumes (n,), and the (n, n) stiffness matrix.
 
-        Positions and displacement are (n, 3) in mm. The sums are (n, 6) of ln U and (n,) of the size, of which a
-        quarter of each element's volume counts at each of its corners.
+        Positions and displacement are (n, 3) in mm. Each element counts at each of its corners with a quarter of its
+        volume.
         """
         count, elements = self._count, len(self.tets)
         sums, pairs = np.zeros((count, 7)), np.empty((elements, len(PAIRS)))
         gradients, large = np.empty((elements, 3, 3)), np.empty(elements, dtype=np.uint8)
-        places = (np.ascontiguousarray(at, dtype=float) for at in (positions, positions + displacement))
-        arrays = self.tets, *places, sums, pairs, gradients, large
-        self._code.stretch(elements, SMALL, *map(self._interface.from_buffer, arrays))
+        both = (np.ascontiguousarray(x, dtype=float) for x in (positions, positions + displacement))
+        arrays = self.tets, *both, sums, pairs, gradients, large
+        self._code.stretch(elements, MAX_SERIES_ENTRY, *map(self._interface.from_buffer, arrays))
         corners = self.tets[large > 0]
         edges = positions[corners[:, 1:]] - positions[corners[:, :1]]
         logs = packed(log_stretch(gradients[large > 0])) * np.linalg.det(edges)[:, None] / 24
         np.add.at(sums[:, :6], corners, logs[:, None])
-        stiff = np.bincount(self._edge, pairs.ravel(), minlength=len(self._ends[0]))
-        everything = self.share.summed(np.concatenate([sums.ravel(), stiff]))
-        sums, between = everything[: 7 * count].reshape(count, 7), everything[7 * count :]
+        edge_sums = np.bincount(self._edge, pairs.ravel(), minlength=len(self._ends[0]))
+        totals = self.share.summed(np.concatenate([sums.ravel(), edge_sums]))
+        sums, off_diagonal = totals[: 7 * count].reshape(count, 7), totals[7 * count :]
         # rows sum to zero
-        own = -sum(np.bincount(ends, between, minlength=count) for ends in self._ends)
-        entries = np.concatenate([between, between, own])[self._places.data]
-        matrix = sparse.csr_matrix((entries, self._places.indices, self._places.indptr), shape=(count, count))
+        diagonal = -sum(np.bincount(ends, off_diagonal, minlength=count) for ends in self._ends)
+        entries = np.concatenate([off_diagonal, off_diagonal, diagonal])[self._pattern.data]
+        matrix = sparse.csr_matrix((entries, self._pattern.indices, self._pattern.indptr), shape=(count, count))
         return sums[:, :6], sums[:, 6], matrix
 
 
 def log_stretch(F: NDArray[np.floating]) -> Floats:
-    """Return the (..., 3, 3) logarithms ln U of the right stretch of gradients, no eigenvalue above `MOST_STRAIN`."""
+    """Return the (..., 3, 3) logarithms ln U of the right stretch of gradients, eigenvalues clipped to `MAX_STRAIN`."""
     values, axes = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
-    stretches = np.clip(0.5 * np.log(np.maximum(values, 1e-12)), -MOST_STRAIN, MOST_STRAIN)
+    stretches = np.clip(0.5 * np.log(np.maximum(values, 1e-12)), -MAX_STRAIN, MAX_STRAIN)
     return np.asarray((axes * stretches[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
 

@@ -1,8 +1,8 @@
 """A surface split between ranks: each pair of vertices, edges or faces near each other belongs to one rank.
 
-Each rank owns vertices that lie together, and keeps a part of the surface: all faces that can come near its own. A
-pair belongs to the owner of one of its vertices. That rank has all faces at the pair's vertices, so that area weights,
-and what several faces add to one pair, are those of the whole surface.
+Each rank owns a compact set of vertices and has a part of the surface: all faces that can come near its own. A pair
+belongs to the owner of one of its vertices. That rank has all faces at the vertices of the pair, so that area weights
+and contributions of several faces are those of the whole surface.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class SurfacePart:
         return result
 
 
-def bisected(positions: Floats, count: int) -> NDArray[np.int64]:
+def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
     """Return for points at (n, 3) positions the number (n,) of one of `count` boxes with nearly equally many points.
 
     A box is split across its longest side, in proportion to the counts on both sides, and so on (recursive coordinate

@@ -1,7 +1,8 @@
-"""The tangent of one iterate: what it does to a displacement, and the blocks on its diagonal.
+"""The tangent of an iterate: its products with displacements, and the blocks on its diagonal.
 
-The elastic part has the same places at every iterate. Contact couples other nodes each time and stays a small matrix of
-its own. No solver needs all entries in one matrix. Where nothing holds a body, its rigid motions are taken out.
+The elastic part has the same sparsity pattern at every iterate. Contact couples other nodes each time and is a small
+matrix of its own; no solver needs all entries in one matrix. In a free body, which no support holds, rigid motions are
+removed from all products (inertia relief).
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ from .products import PartMotions, SymmetricProducts
 
 
 def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return (n, 3) places from the centres of the parts that (n,) numbers name, over the size of the largest part."""
+    """Return (n, 3) positions relative to the centres of their parts (n,), divided by the largest component of all."""
     counts = np.bincount(part)
     centres = np.stack([np.bincount(part, weights=x) for x in positions.T], axis=1) / np.maximum(counts, 1)[:, None]
     arms = positions - centres[part]
@@ -28,7 +29,7 @@ def part_arms(positions: Floats, part: NDArray[np.int64]) -> NDArray[np.float32]
 
 
 def rigid_motions(arms: NDArray[np.float32]) -> Floats:
-    """Return the (n, 3, 6) translations of points, and their rotations about centres from which (n, 3) arms lead."""
+    """Return the (n, 3, 6) translations of points and their rotations about centres, from (n, 3) arms."""
     motions = np.zeros((len(arms), 3, 6))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -38,28 +39,28 @@ def rigid_motions(arms: NDArray[np.float32]) -> Floats:
 
 
 class RigidMotions:
-    """The translations and rotations of the parts of the present mesh that vertices belong to by (n,) numbers."""
+    """Translations and rotations of parts of the mesh as it is placed; `part` (n,) is the part of each vertex."""
 
     def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
-        vertices = domain.vertex_of_node[: domain.owned]
-        arms, of_part = part_arms(domain.positions, part)[vertices], part[vertices]
-        self._domain, self._motions, self._parts = domain, PartMotions(of_part, arms), int(part.max()) + 1
+        vertices = domain.vertex_of_node[: domain.n_owned]
+        self._domain, self._parts = domain, int(part.max()) + 1
+        arms, part = part_arms(domain.positions, part)[vertices], part[vertices]
+        self._motions = PartMotions(part, arms)
         motions = rigid_motions(arms)
-        of_number = [np.where((of_part == number)[:, None, None], motions, 0.0) for number in range(self._parts)]
-        self.modes: Floats = np.concatenate(of_number, axis=2).reshape(-1, 6 * self._parts)
-        self._inverse_gram = np.linalg.inv(domain.summed(self.modes.T @ self.modes))
+        by_part = [np.where((part == number)[:, None, None], motions, 0.0) for number in range(self._parts)]
+        self.modes: Floats = np.concatenate(by_part, axis=2).reshape(-1, 6 * self._parts)
+        self._inverse_gram = np.linalg.inv(domain.sum_over_ranks(self.modes.T @ self.modes))
 
     def remove(self, values: Floats) -> None:
-        """Take the rigid motions out of the owned components of a vector, in place."""
-        amounts = self._domain.summed(self._motions.restrict(values, self._parts))
+        """Remove the rigid motions from the owned components of a vector, in place."""
+        amounts = self._domain.sum_over_ranks(self._motions.restrict(values, self._parts))
         self._motions.add(-self._inverse_gram @ amounts, values)
 
 
 class ElasticMatrix:
-    """The elastic tangent as 3 × 3 blocks, which dolfinx holds.
+    """The elastic tangent as 3 × 3 blocks, in a matrix of dolfinx, which is filled twice as fast as PETSc's.
 
-    dolfinx' own block matrices are filled about twice as fast as PETSc's. Of two blocks between nodes of one rank that
-    mirror each other, `add` may leave out the one below the diagonal, which nothing reads.
+    Blocks below the diagonal between owned nodes are not read, since the matrix is symmetric; `add` may omit them.
 
     `coupling` is a form with the same sparsity pattern, `add` adds the blocks at a displacement, and `fixed` (owned, 3)
     are the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is
@@ -79,19 +80,18 @@ class ElasticMatrix:
         self.nodes = np.repeat(np.arange(owned), np.diff(self.row_ends))
         local_columns = self._blocks.indices[: len(self.nodes)]
         self.columns = column_map.local_to_global(local_columns)
-        # by global numbers, since the columns reach nodes that no local element has
+        # by global nodes, since columns include nodes of other ranks' elements
         self.fixed = np.concatenate(row_map.comm.allgather(fixed))
         rows = first + self.nodes
         self._diagonal = np.flatnonzero(rows == self.columns)
         crossed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
         self._crossed = np.flatnonzero(crossed)
         self._crossed_diagonal = np.einsum("bii->bi", crossed)[self._diagonal]
-        # one of two blocks that mirror each other is enough, but where they belong to different ranks
-        self._kept = np.flatnonzero((self.columns >= rows) | (local_columns >= owned)).astype(np.int32)
-        of_kept = self.nodes[self._kept], local_columns[self._kept]
-        self.products = SymmetricProducts(column_map, *of_kept)
-        # that and its transpose are the whole
-        self._share_of_half = np.where((rows == self.columns) | (local_columns >= owned), 0.5, 1.0)[self._kept]
+        # without the mirror images of blocks within a rank
+        self._stored = np.flatnonzero((self.columns >= rows) | (local_columns >= owned)).astype(np.int32)
+        self.products = SymmetricProducts(column_map, self.nodes[self._stored], local_columns[self._stored])
+        # so that these blocks and their transposes add up to the matrix
+        self._half_weights = np.where((rows == self.columns) | (local_columns >= owned), 0.5, 1.0)[self._stored]
 
     def assemble(self, u: Floats) -> None:
         """Assemble the tangent at a displacement (k, 3) of the local nodes in m."""
@@ -101,14 +101,14 @@ class ElasticMatrix:
         values = self.values
         values.reshape(-1)[self._crossed] = 0.0
         np.einsum("bii->bi", values)[self._diagonal] += self._crossed_diagonal
-        self.products.take(values, self._kept)
+        self.products.take(values, self._stored)
 
     def half(self) -> sparse.bsr_matrix:
-        """Return the owned rows of a matrix that is the whole one together with its transpose."""
-        ends = np.searchsorted(self.nodes[self._kept], np.arange(len(self.row_ends)))
-        blocks = self.values[self._kept] * self._share_of_half[:, None, None]
+        """Return the owned rows of a matrix that adds up to this one with its transpose."""
+        ends = np.searchsorted(self.nodes[self._stored], np.arange(len(self.row_ends)))
+        blocks = self.values[self._stored] * self._half_weights[:, None, None]
         shape = 3 * (len(self.row_ends) - 1), 3 * len(self.fixed)
-        return sparse.bsr_matrix((blocks, self.columns[self._kept], ends), shape=shape)
+        return sparse.bsr_matrix((blocks, self.columns[self._stored], ends), shape=shape)
 
     @property
     def values(self) -> Floats:
@@ -123,9 +123,9 @@ class ElasticMatrix:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """The residual at a displacement (k, 3) of the local nodes in m: owned components (3 · owned,) and their norm in N.
+    """The residual at a displacement (k, 3) of the local nodes in m: `owned` components (3 · n_owned,) and norm in N.
 
-    `elastic` is the part without contributions such as contact, and with a free body's resultant.
+    `elastic` are the forces of the elements alone, with their resultant also in a free body.
     """
 
     displacement: Floats
@@ -137,7 +137,7 @@ class Residual:
 class LaggedTangent:
     """The elastic tangent, kept from one displacement to the next while it predicts how forces change.
 
-    `lagged` says whether the tangent in use is that of an earlier displacement, `assembled` how often it was assembled.
+    It is `lagged` while the tangent in use is that of an earlier displacement; `assembled` counts assemblies.
     """
 
     def __init__(self, matrix: ElasticMatrix, domain: Domain) -> None:
@@ -148,7 +148,7 @@ class LaggedTangent:
         self._last: Residual | None = None
 
     def forget(self) -> None:
-        """Have the next tangent assembled, since mesh, stiffness, growth or kept stretch have changed."""
+        """Have the next tangent assembled, since mesh, stiffness, growth or stretch have changed."""
         self._last = None
 
     def update(self, at: Residual, within: float) -> None:
@@ -163,7 +163,7 @@ class LaggedTangent:
         """Return whether the tangent predicts the change of elastic forces since the last update to within a part."""
         if self._last is None:
             return False
-        change = (at.displacement - self._last.displacement)[: self._domain.owned].ravel()
+        change = (at.displacement - self._last.displacement)[: self._domain.n_owned].ravel()
         predicted = np.empty_like(change)
         self.matrix.products.multiply(change, predicted)
         error = predicted + self._last.elastic - at.elastic
@@ -173,8 +173,8 @@ class LaggedTangent:
 class Tangent:
     """The tangent of one iterate, which acts on displacements as a PETSc matrix of type python.
 
-    There is one for all iterates: the symmetric `matrix`. Further `parts`, in N/m, have no entries in rows and columns
-    of fixed components. `motions` are taken out of all products.
+    All iterates share one symmetric `matrix`. Further `parts`, in N/m, have no entries in rows and columns of fixed
+    components. `motions` are removed from all products.
     """
 
     def __init__(self, elastic: LaggedTangent, domain: Domain) -> None:
@@ -182,13 +182,13 @@ class Tangent:
         self.parts: Sequence[PETSc.Mat] = ()
         self.motions: RigidMotions | None = None
         self._shift: Floats | None = None
-        size = 3 * domain.owned, 3 * len(domain.positions)
+        size = 3 * domain.n_owned, 3 * len(domain.positions)
         self.matrix = PETSc.Mat().createPython((size, size), context=self, comm=domain.comm)
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.matrix.setUp()
 
-    def raise_diagonal(self, part: float) -> None:
-        """Add a part of its absolute diagonal to all products from now on; with 0 nothing."""
+    def shift_diagonal(self, part: float) -> None:
+        """Shift the diagonal by a part of its absolute values in all products from now on; with 0 not at all."""
         self._shift = part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel() if part else None
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -202,7 +202,7 @@ class Tangent:
             self.motions.remove(y.array_w)
 
     def diagonal(self) -> Floats:
-        """Return the (owned, 3, 3) blocks on the diagonal, as raised."""
+        """Return the (n_owned, 3, 3) blocks on the diagonal, with the shift."""
         blocks = self._diagonal()
         if self._shift is not None:
             np.einsum("nii->ni", blocks)[:] += self._shift.reshape(-1, 3)
@@ -214,7 +214,7 @@ class Tangent:
             start, columns, values = part.getValuesCSR()
             rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
             columns = columns - part.getOwnershipRange()[0]
-            within = rows // 3 == columns // 3
-            rows, columns = rows[within], columns[within]
-            np.add.at(blocks, (rows // 3, rows % 3, columns % 3), values[within])
+            on_diagonal = rows // 3 == columns // 3
+            rows, columns = rows[on_diagonal], columns[on_diagonal]
+            np.add.at(blocks, (rows // 3, rows % 3, columns % 3), values[on_diagonal])
         return blocks

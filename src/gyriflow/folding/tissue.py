@@ -16,9 +16,9 @@ from .zones import Zones
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """A rank's elements: their local nodes (c, 4) or (c, 10), the vertices of the mesh (k,) that these are, and points.
+    """A rank's elements: their local nodes `cells` (c, 4) or (c, 10), and the mesh's `vertices` (k,) that these are.
 
-    The integration `points` are the same in all elements.
+    All elements have the same integration `points`.
     """
 
     cells: NDArray[np.integer]
@@ -30,13 +30,13 @@ class Elements:
 class Tissue:
     """The tissue of a rank's elements in a step.
 
-    Its values are at the nodes of linear elements, (k,), but at the integration points of quadratic ones, (c, q), so
-    that the cortical weight may fall from 1 to 0 within an element: the cortical `weight`, `growing` (1, else 0) and
-    the parameters' `maps`. In quadratic elements depth is quadratic between the nodes; quantities that jump between
-    nodes, growth and maps, are linear between them.
+    The cortical `weight`, `growing` (1, else 0) and the parameters' `maps` are values at the nodes (k,) of linear
+    elements, and at the integration points (c, q) of quadratic ones, since the cortical weight may fall from 1 to 0
+    within a quadratic element. There depth is interpolated by the shape functions, and growth and maps, which may jump
+    between nodes, linearly.
 
-    `depth` (k,) is the distance of the nodes at `nodes` (k, 3) to the pial surface, in m. `nearest` are the pial
-    vertices (k,) nearest to the nodes of linear elements, or the normals (k, 3) at the nodes of quadratic ones.
+    `depth` (k,) is the distance in m of the nodes, at `nodes` (k, 3), to the pial surface. `nearest` are the pial
+    vertices (k,) nearest to the nodes of linear elements, or the pial normals (k, 3) there for quadratic ones.
     """
 
     elements: Elements
@@ -58,7 +58,7 @@ class Tissue:
         """
         points, cells = elements.points, elements.cells
         pial, nodes = PialSearch(positions, zones.cortex_facets), positions[elements.vertices]
-        # of the whole mesh, so that all ranks search equally far
+        # the maximum over the whole mesh, so that all ranks search equally far
         reach = WEIGHT_REACH * float(np.max(value_at(p.thickness_mm, week, maps))) * M_PER_MM
         growing = zones.growth[elements.vertices]
         maps = {name: maps[name][elements.vertices] for name in p.varying_maps}
@@ -66,49 +66,48 @@ class Tissue:
         if points.order == 1:
             to_vertex, nearest = pial.tree.query(nodes)
             depth = pial.distance(nodes, reach, to_vertex)
-            depth_of_values = depth
+            value_depth = depth
         else:
             depth, nearest = pial.distance_and_normals(nodes, reach)
-            growing = growing[cells] @ points.bounded.T
-            maps = {name: values[cells] @ points.bounded.T for name, values in maps.items()}
-            depth_of_values = np.maximum(depth[cells] @ points.smooth.T, 0.0)
-        weight = cortical_weight(depth_of_values * MM_PER_M, value_at(p.thickness_mm, week, maps))
+            growing = growing[cells] @ points.piecewise_linear.T
+            maps = {name: values[cells] @ points.piecewise_linear.T for name, values in maps.items()}
+            value_depth = np.maximum(depth[cells] @ points.interpolation.T, 0.0)
+        weight = cortical_weight(value_depth * MM_PER_M, value_at(p.thickness_mm, week, maps))
         return cls(elements, nodes, depth, pial, nearest, weight, growing, maps)
 
     def at_points(self, values: Floats) -> Floats:
-        """Return (..., c, q) values at the integration points from those at the tissue's own places."""
+        """Return (..., c, q) values at the integration points from values like `weight`."""
         points = self.elements.points
-        return values[..., self.elements.cells] @ points.smooth.T if points.order == 1 else values
+        return values[..., self.elements.cells] @ points.interpolation.T if points.order == 1 else values
 
     def interpolate(self, values: Floats, chunk: slice) -> Floats:
-        """Return (..., c, q) values at the points of some elements, linear between those (..., n) of all vertices."""
+        """Return (..., c, q) values at the points of some elements, linear between those (..., n) at all vertices."""
         elements, points = self.elements, self.elements.points
-        linear = points.smooth if points.order == 1 else points.bounded
+        linear = points.interpolation if points.order == 1 else points.piecewise_linear
         return np.asarray(values[..., elements.vertices[elements.cells[chunk]]] @ linear.T)
 
     def normals(self, needed: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
-        """Return which elements (c,) have a place where a normal is `needed`, and their (w, q, 3) unit normals.
+        """Return the mask (c,) of elements in which a normal is `needed`, and their (e, q, 3) unit normals.
 
-        Linear elements have one normal each, that of the pial vertex nearest to their centres.
+        A linear element has one normal, that of the pial vertex nearest to its centre.
         """
         cells, points = self.elements.cells, self.elements.points
         if points.order == 1:
-            chosen = np.asarray(needed[cells].any(axis=1))
-            normals = self.pial.normals_from(self.nodes[cells[chosen]].mean(axis=1), self.nearest[cells[chosen]])
-            return chosen, np.repeat(normals[:, None], len(points.weights), axis=1)
-        chosen = np.asarray(needed.any(axis=1))
-        return chosen, normals_between(self.nearest[cells[chosen]], points.smooth, points.bounded)
+            mask = np.asarray(needed[cells].any(axis=1))
+            normals = self.pial.normals_from(self.nodes[cells[mask]].mean(axis=1), self.nearest[cells[mask]])
+            return mask, np.repeat(normals[:, None], len(points.weights), axis=1)
+        mask = np.asarray(needed.any(axis=1))
+        return mask, interpolated_normals(self.nearest[cells[mask]], points)
 
 
-def normals_between(normals: Floats, smooth: Floats, bounded: Floats) -> Floats:
-    """Return the (c, q, 3) unit normals at points inside elements from those (c, k, 3) at their nodes.
+def interpolated_normals(normals: Floats, points: IntegrationPoints) -> Floats:
+    """Return the (c, q, 3) unit normals at the points of elements from those (c, k, 3) at their nodes.
 
-    Only the direction of a normal counts, not its sense: walls that face each other have the same. So normals are
-    turned to the side of the first before their mean is taken; where that all but vanishes, the nearest node's stands
-    for it. `smooth` and `bounded` are weights of the nodes at the points, see `IntegrationPoints`.
+    The sign of a normal does not count, since walls that face each other have opposite ones: all are turned to the side
+    of the first before they are interpolated. If the result nearly vanishes, the nearest node's normal is taken.
     """
     turned = normals * np.where(np.einsum("cki,ci->ck", normals, normals[:, 0]) < 0, -1.0, 1.0)[:, :, None]
-    mean = np.matmul(smooth, turned)
+    mean = np.matmul(points.interpolation, turned)
     length = np.linalg.norm(mean, axis=2, keepdims=True)
-    heaviest = turned[:, bounded.argmax(axis=1)]
-    return np.where(length > 0.1, mean / np.maximum(length, 0.1), heaviest)
+    nearest = turned[:, points.piecewise_linear.argmax(axis=1)]
+    return np.where(length > 0.1, mean / np.maximum(length, 0.1), nearest)

@@ -9,7 +9,7 @@ from .materials import Material
 
 def energy_code(material: Material) -> str:
     """Return C functions of I1, J, mu and K: psi in Pa, and psi_I, psi_J, psi_II, psi_IJ, psi_JJ."""
-    # the values are never used: the variables stand for names in C
+    # the values are not used: the variables stand for names in C
     variables = {name: ufl.variable(ufl.as_ufl(1.0)) for name in ("I1", "J", "mu", "K")}
     I1, J = variables["I1"], variables["J"]
     psi = material.energy_of_invariants(**variables)

@@ -1,4 +1,4 @@
-"""The materials that tissue can be made of. A material law is one class here, and its name in the configuration."""
+"""Material laws of tissue. A law is one class here, and its name in the configuration."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from ufl.variable import Label, Variable
 
 @dataclass(frozen=True)
 class Material(ABC):
-    """An isotropic hyperelastic material; everything that the model needs of it follows from its energy.
+    """An isotropic hyperelastic material, defined by its energy density.
 
-    Energies count per volume of the updated reference, without the factor det Fg: the paper's choice. Poisson's ratio
-    ν is the same in all tissue.
+    Energies are per volume of the updated reference, without the factor det Fg, as in the paper. Poisson's ratio ν is
+    the same in all tissue.
     """
 
     poisson_ratio: float
@@ -36,19 +36,18 @@ class Material(ABC):
         return cls.energy_of_invariants(ufl.inner(Fe, Fe), ufl.det(Fe), mu, K)
 
     def cauchy_stress(self, Fe: Expr, mu: Expr, K: Expr) -> Expr:
-        """Return Cauchy's stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
+        """Return the Cauchy stress σ = 1/Je · ∂ψ/∂Fe · Feᵀ in Pa, with ψ per volume of the state without stress.
 
-        The energy that the model minimises counts per volume before the step's growth (docs/model.md), so that the
-        stress in its equilibrium is smaller by the factor det Fg: by less than 2 % in a step of the reference
-        parameters.
+        The energy that the model minimises is per volume before the step's growth (docs/model.md), so that the stress
+        in its equilibrium is smaller by the factor det Fg, by less than 2 % in a step of the reference parameters.
         """
-        # with a number of its own it would be compiled anew in each process
+        # a fixed label, since a new one in each process would be compiled again
         Fe = Variable(Fe, Label(0))
         return ufl.diff(self.energy_density(Fe, mu, K), Fe) * Fe.T / ufl.det(Fe)
 
 
 class NeoHookean(Material):
-    """The slightly compressible neo-Hookean material of the paper: shape and volume store energy apart."""
+    """The slightly compressible neo-Hookean material of the paper, with separate energies of shape and volume."""
 
     name = "neo-hookean"
 
@@ -59,7 +58,7 @@ class NeoHookean(Material):
 
 
 class CompressibleNeoHookean(Material):
-    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (J − 1)² in the place of (ln J)².
+    """The compressible neo-Hookean material (Bonet and Wood 2008, §6.4.3), with (J − 1)² instead of (ln J)².
 
     Its energy is not split into those of shape and volume.
     """
@@ -73,4 +72,4 @@ class CompressibleNeoHookean(Material):
 
 
 MATERIALS: dict[str, type[Material]] = {law.name: law for law in (NeoHookean, CompressibleNeoHookean)}
-"""The laws by the names that the configuration has for them."""
+"""Material laws by their names in the configuration."""

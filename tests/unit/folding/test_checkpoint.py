@@ -37,7 +37,7 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     state = State.at_start(at(0.0), 1.0)
     for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
-    np.testing.assert_allclose(state.predicted(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
+    np.testing.assert_allclose(state.first_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):
@@ -66,7 +66,7 @@ def test_a_checkpoint_with_any_damage_is_whole_or_not_used(tmp_path, data):
             np.testing.assert_array_equal(getattr(read, name), value)
 
 
-def test_the_key_knows_mesh_and_parameters_but_not_ranks():
+def test_the_key_depends_on_mesh_and_parameters_but_not_on_ranks():
     mesh = box_mesh((1, 1, 1), (1.0, 1.0, 1.0))
     base = parameters_from(VALUES)
     assert run_key(mesh, base, {}) == run_key(mesh, parameters_from(VALUES | {"ranks": 7}), {})

@@ -17,7 +17,7 @@ from gyriflow.folding.diagnosis import elements_through, resolution_warning, unc
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
-from gyriflow.folding.run import shortened_steps
+from gyriflow.folding.run import shortened_step_note
 from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
@@ -36,9 +36,9 @@ RUN = {"start_week": 21.0, "end_week": 22.0, "fissure_x_mm": 0.0}
         (500000.0, [21.0, 22.0], [21, 22]),
     ],
 )
-def test_a_step_that_does_not_divide_the_time_between_outputs_is_said(step_s, weeks, shortened):
-    warning = shortened_steps(parameters_from(RUN | {"step_s": step_s, "output_weeks": weeks}))
-    assert warning == (Facts("step_s", step_s, *shortened) if shortened else "")
+def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(step_s, weeks, shortened):
+    note = shortened_step_note(parameters_from(RUN | {"step_s": step_s, "output_weeks": weeks}))
+    assert note == (Facts("step_s", step_s, *shortened) if shortened else "")
 
 
 class Stepper:
@@ -109,7 +109,7 @@ def rows(*through):
 
 
 @pytest.mark.fault(25)
-def test_a_cortex_that_outgrows_its_elements_is_told_once():
+def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     assert resolution_warning(rows(2.3, 2.1), 1) == ""
     assert resolution_warning(rows(2.3, 2.1, 1.9), 1) == Facts("GW 23.00", 2)
     assert resolution_warning(rows(2.3, 1.9, 1.8), 1) == ""
@@ -120,12 +120,12 @@ def test_a_cortex_that_outgrows_its_elements_is_told_once():
     assert resolution_warning(rows(np.nan), 1) == Facts(2)  # no element lies in the cortex at all
 
 
-def test_nearly_incompressible_tissue_is_told():
+def test_nearly_incompressible_tissue_gives_a_warning():
     assert stiffness_warning(0.45) == stiffness_warning(0.46) == ""
     assert stiffness_warning(0.48) == Facts(0.48)
 
 
-def test_a_step_above_its_tolerance_is_told():
+def test_a_step_above_its_tolerance_gives_a_warning():
     row = {"step": 7, "residual": 3e-6, "converged": True}
     assert unconverged_warning(row) == ""
     assert unconverged_warning(row | {"converged": False}) == Facts(7, "3.0e-06")

@@ -12,8 +12,8 @@ from shapes import ellipsoid_mesh, rigid
 from gyriflow.errors import SolverError
 from gyriflow.folding.growth import GrowthInputs, Size, StepStart
 from gyriflow.folding.growth_models import growth_model
-from gyriflow.folding.output import growth_along
-from gyriflow.folding.steering import SteeredStep, free_growth, joined, missed_curves, steered_rates
+from gyriflow.folding.output import growth_components
+from gyriflow.folding.steering import SteeredStep, blended, free_growth, missed_curves, steered_rates
 from gyriflow.folding.stress import packed
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.settings.folding import parameters_from
@@ -27,10 +27,10 @@ DAY_S = 86_400.0
 
 
 def test_a_brain_off_the_curve_comes_onto_it_within_a_week():
-    assert joined(CURVE, 100.0, 21.0, 23.0) == pytest.approx(math.sqrt(110 * 121))
-    assert joined(CURVE, 90.0, 21.0, 21.0) == pytest.approx(90.0)
-    assert joined(CURVE, 90.0, 21.0, 21.5) == pytest.approx(math.sqrt(100 * 110) * math.sqrt(0.9))
-    assert joined(CURVE, 90.0, 21.0, 22.0) == pytest.approx(110.0)
+    assert blended(CURVE, 100.0, 21.0, 23.0) == pytest.approx(math.sqrt(110 * 121))
+    assert blended(CURVE, 90.0, 21.0, 21.0) == pytest.approx(90.0)
+    assert blended(CURVE, 90.0, 21.0, 21.5) == pytest.approx(math.sqrt(100 * 110) * math.sqrt(0.9))
+    assert blended(CURVE, 90.0, 21.0, 22.0) == pytest.approx(110.0)
 
 
 def test_a_curve_that_is_missed_is_named_with_how_far():
@@ -50,7 +50,7 @@ def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
     p = parameters_from(RUN | GROWING | {"growth": {"model": "sizes", **curves}})
     first = StepStart(mesh.vertices, 0.0, p.step_s)
     step = growth_model(p, inputs, mesh.vertices)(first)
-    assert step.free * SECONDS_PER_GW == pytest.approx([math.log(1.13), math.log(1.2)], rel=1e-6)
+    assert step.free_rates * SECONDS_PER_GW == pytest.approx([math.log(1.13), math.log(1.2)], rel=1e-6)
     # a prescribed growth is the run's own
     assert growth_model(plain, inputs, mesh.vertices)(first).parameters == plain
 
@@ -72,20 +72,20 @@ def test_free_growth_of_a_body_is_known():
 @pytest.mark.parametrize("days", [0.5, 1.0])
 def test_curves_that_bend_are_met_at_output_weeks_by_a_body_that_realises_a_part_of_growth(share, days):
     """The area of the body grows by two thirds of its volume, and by a share of what the cortex grows more."""
-    p, size, learnt, step_s = parameters_from(RUN), Size(1e4, 5e4), None, days * DAY_S
+    p, size, correction, step_s = parameters_from(RUN), Size(1e4, 5e4), None, days * DAY_S
     steps_a_week = round(7 / days)
     for number in range(4 * steps_a_week):
         weeks = (number + 1) / steps_a_week
         grown = weeks + max(weeks - 2, 0)  # twice as fast from the second week on
         aim = Size(1e4 * math.exp(0.07 * grown), 5e4 * math.exp(0.09 * grown))
-        *rates, limited = steered_rates(size.rates_to(aim, step_s) - (learnt or (0.0, 0.0)), MADE, (0.0, 1e-5))
-        start = StepStart(np.empty((0, 3)), number * step_s, step_s, learnt)
+        *rates, limited = steered_rates(size.rates_to(aim, step_s) - (correction or (0.0, 0.0)), MADE, (0.0, 1e-5))
+        start = StepStart(np.empty((0, 3)), number * step_s, step_s, correction)
         step = SteeredStep(p, start, size, aim, MADE @ rates, limited)
         of_area, of_volume = MADE @ rates
         made = 2 / 3 * of_volume + share * (of_area - 2 / 3 * of_volume)
         size = Size(size.area_mm2 * math.exp(made * step_s), size.volume_mm3 * math.exp(of_volume * step_s))
         # a checkpoint keeps it as JSON
-        learnt = json.loads(json.dumps(step.learnt(size)))
+        correction = json.loads(json.dumps(step.correction(size)))
         assert size.volume_mm3 == pytest.approx(aim.volume_mm3, rel=1e-6)
         if (number + 1) % steps_a_week == 0:
             assert size.area_mm2 == pytest.approx(aim.area_mm2, rel=5e-3)
@@ -110,7 +110,7 @@ def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its
     first = np.array([[0.02, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, -0.3]])
     tensors = np.stack([first, turn @ first @ turn.T])
     normals = np.stack([[0.0, 0.0, 1.0], turn[:, 2]])
-    found = growth_along(packed(tensors).T, normals)
+    found = growth_components(packed(tensors).T, normals)
     assert found["tangential_growth_per_step"] == pytest.approx([0.035, 0.035])
     assert found["radial_growth_per_step"] == pytest.approx([-0.3, -0.3])
     directions = found["growth_direction_per_step"]

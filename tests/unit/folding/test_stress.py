@@ -81,7 +81,7 @@ def test_every_element_of_an_affine_motion_has_its_gradient(order):
         mesh = TetrahedralMesh(mesh.vertices + RNG.uniform(-0.02, 0.02, mesh.vertices.shape), mesh.tets)
     points = problem_of(NeoHookean, order).points
     moved = mesh.vertices @ SOME[0].T + [5.0, -1.0, 2.0]
-    F = deformation_gradients(mesh.vertices, moved, mesh.tets, points.slopes)
+    F = deformation_gradients(mesh.vertices, moved, mesh.tets, points.gradients)
     assert F.shape == (len(mesh.tets), len(points.weights), 3, 3)
     np.testing.assert_allclose(F, np.broadcast_to(SOME[0], F.shape), atol=1e-12)
 
