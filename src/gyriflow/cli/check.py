@@ -65,8 +65,8 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
             f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm",
             False,
         )
-    if missing := sum(len(atlas.missing) for atlas in used_atlases(config)):
-        yield f"  {missing} atlas file{'s are' if missing > 1 else ' is'} missing and will be downloaded", False
+    if count := sum(len(atlas.missing) for atlas in used_atlases(config)):
+        yield f"  {count} atlas file{'s are' if count > 1 else ' is'} missing and will be downloaded", False
     if not any(bad for _, bad in problems):
         yield "  input files: all are readable and fit their label schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
@@ -75,9 +75,9 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
 def work_of(
     path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
 ) -> Iterator[tuple[str, bool]]:
-    """Yield lines on what would run and what it takes, each with whether that is more than what is there.
+    """Yield lines about the jobs that would run and their needs, each with whether these exceed what is available.
 
-    `further` are arguments of Snakemake's. With `show`, it lists every job on the terminal first.
+    `further` are arguments for Snakemake. With `show`, Snakemake lists every job on the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
     if not jobs:
@@ -97,7 +97,7 @@ def work_of(
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
     """Return the jobs that Snakemake would run, without targets; with `show` it lists them on the terminal.
 
-    Ends the program as Snakemake does where it refuses.
+    Ends the program with Snakemake's exit code if it fails.
     """
     jobs = []
 
@@ -107,15 +107,15 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
             jobs.append(PlannedJob(job["rule_name"], dict(job["wildcards"] or {}), job["threads"], job["reason"]))
         return show or record.levelno >= logging.ERROR
 
-    # Snakemake makes folders even where it only looks
+    # Snakemake makes folders even in a dry run
     state = directory.resolve() / ".snakemake"
     made = [path for path in (*reversed(state.parents), state) if not path.exists()]
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(take)
-    # it also goes into the working directory
+    # it also changes the working directory
     with chdir(Path.cwd()):
-        where = ["--configfile", str(config.resolve()), "--directory", str(directory.resolve())]
-        code = launch([*where, "--dry-run", *further])
+        options = ["--configfile", str(config.resolve()), "--directory", str(directory.resolve())]
+        code = launch([*options, "--dry-run", *further])
     logger.removeFilter(take)
     if made and made[0].exists():
         shutil.rmtree(made[0])
@@ -130,34 +130,34 @@ def _contents(study: Study) -> str:
     brains, folded = len(study.brains), len(study.run_simulations)
     parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
     parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
-    parts += [f"{len(compared.members)} of study {name}" for name, compared in study.sweeps.items()]
+    parts += [f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")
     return ", ".join(parts)
 
 
 def coarse_cortices(study: Study) -> Iterator[str]:
-    """Yield for each run, before anything is solved, whether its mesh is too coarse for its cortex at the start."""
+    """Yield a warning for each simulation whose mesh is too coarse for the cortex at its start."""
     mesh = study.config.mesh
     needed = ELEMENTS_NEEDED[mesh.order]
-    for one in study.run_simulations:
-        thickness = one.settings.thickness_mm
-        # maps and measured thicknesses are known once the surface is made
+    for simulation in study.run_simulations:
+        thickness = simulation.settings.thickness_mm
+        # maps and measured thicknesses are unknown before the surface is made
         if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
             continue
-        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, one.start.week)
+        through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, simulation.start.week)
         if (elements := through / mesh.surface_edge_mm) < 0.99 * needed:
-            enough_mm = math.floor(100 * through / needed) / 100
+            fine_mm = math.floor(100 * through / needed) / 100
             yield (
-                f"run {one.run} from {one.start.id}: about {elements:.1f} elements through the cortex, "
-                f"{needed:g} are needed; mesh.surface_edge_mm: {enough_mm:g} would be fine enough"
+                f"run {simulation.run} from {simulation.start.id}: about {elements:.1f} elements through the cortex, "
+                f"{needed:g} are needed; use mesh.surface_edge_mm: {fine_mm:g}"
             )
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
-    """Yield what is wrong or doubtful about the input files of the brains, and whether it is wrong.
+    """Yield problems and warnings about the input files of the brains, each with whether it is a problem.
 
-    Wrong are files that cannot be read and labels of another scheme, doubtful is a size that is not that of the week.
+    Unreadable files and labels of another scheme are problems; an unusual size for the week is a warning.
     """
     for brain in config.brains:
         try:
@@ -218,16 +218,16 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     hours = (folding_s + other_s) / 3600
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
     yield f"time    about {format_duration(seconds)} on {on}, within a factor of {ERROR_FACTOR:g}", False
-    of_folding = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
-    yield f"work    about {hours:.2g} core hours{of_folding}", False
+    share = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
+    yield f"work    about {hours:.2g} core hours{share}", False
     at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
     memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
-    # the memory of this machine says nothing of a cluster's
+    # the memory of this machine does not limit a cluster
     here = cores <= (os.cpu_count() or 1)
     yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, _memory_mib() if here else None)
-    there = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
-    yield from _fits("disk", disk, shutil.disk_usage(there).free / 2**20)
+    folder = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    yield from _fits("disk", disk, shutil.disk_usage(folder).free / 2**20)
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:

@@ -19,11 +19,11 @@ LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
 BIDS_LABEL_OPTIONS = ("--participant-label", "--participant_label", "--session-label", "--session_label")
 """Options of BIDS apps with several values after each other."""
-ELSEWHERE = ("--profile", "--executor", "-e")
-"""Options of Snakemake's by which jobs run on other machines."""
+REMOTE_OPTIONS = ("--profile", "--executor", "-e")
+"""Options of Snakemake with which jobs run on other machines."""
 
 FOLDER = click.Path(file_okay=False, path_type=Path)
-THERE = click.Path(exists=True, file_okay=False, path_type=Path)
+EXISTING_DIR = click.Path(exists=True, file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
@@ -33,7 +33,7 @@ cores_option = click.option(
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
-dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Only say what would run, and why.")
+dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Only show what would run, and why.")
 
 
 class Commands(click.Group):
@@ -98,7 +98,7 @@ def main() -> None:
     A study, from its data to its report:
       gyriflow init my-data         write my-data/gyriflow.yaml for the files there
       cd my-data
-      gyriflow check                check the files; say what will run and how long it will take
+      gyriflow check                check the files; show what will run and how long it takes
       gyriflow run                  run it; after an interruption, run it again to resume
       gyriflow status               show the progress (from another terminal)
       gyriflow view                 open the report
@@ -118,7 +118,7 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("folder", type=THERE)
+@click.argument("folder", type=EXISTING_DIR)
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @scheme_option
@@ -142,14 +142,14 @@ def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> 
 @cores_option
 @stages_option
 def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str]) -> None:
-    """Check a study; say what it would run and need.
+    """Check a study; show what it would run and need.
 
     Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default.
     """
     from .check import check_study
 
     problems = 0
-    for line, bad in check_study(_chosen(config, directory), directory, cores, stages):
+    for line, bad in check_study(_find_config(config, directory), directory, cores, stages):
         click.echo(line)
         problems += bad
     if problems:
@@ -172,12 +172,12 @@ def run(
     CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
     named = bool(further) and further[0].endswith((".yaml", ".yml", ".json"))
-    config = _chosen(Path(further[0]) if named else None, directory)
+    config = _find_config(Path(further[0]) if named else None, directory)
     # an option of one value stands before the targets
     options = ["--verbose"] if verbose else []
-    # the cores of this machine are no limit to a cluster, whose profile says how many jobs it may have
+    # a cluster is limited by its profile, not by the cores of this machine
     default = click.get_current_context().get_parameter_source("cores") == ParameterSource.DEFAULT
-    if not (default and any(argument.partition("=")[0] in ELSEWHERE for argument in further)):
+    if not (default and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)):
         options += ["--cores", str(cores)]
     sys.exit(_run(config, directory, cores, dry_run, options, *stages, *further[int(named) :]))
 
@@ -225,7 +225,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
 @click.option("--until", type=float, required=True, help="Gestational week to predict.")
 @click.option("--atlas", help="Atlas whose growth is used: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
 @scheme_option
-@click.option("--folder", type=THERE, help="Folder with the atlas' files. [default: download them]")
+@click.option("--folder", type=EXISTING_DIR, help="Folder with the atlas' files. [default: download them]")
 @click.option("--image", type=EXISTING_FILE, help="T2-weighted volume of the scan.")
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas.")
 @click.option("--quick", is_flag=True, help="Use a coarse mesh and steps of one day, for a first look.")
@@ -239,7 +239,7 @@ def predict(
     """Predict a brain at a later week from its tissue LABELS.
 
     It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it. The report
-    says where the predicted surfaces and labels are. After an interruption, the same command resumes.
+    shows where the predicted surfaces and labels are. After an interruption, the same command resumes.
     """
     from .init import write_prediction
 
@@ -252,7 +252,7 @@ def predict(
 
 
 @main.command()
-@click.argument("data", type=THERE, metavar="BIDS")
+@click.argument("data", type=EXISTING_DIR, metavar="BIDS")
 @click.argument("out", type=FOLDER)
 @click.argument("level", type=click.Choice(LEVELS))
 @click.option(*BIDS_LABEL_OPTIONS[:2], "participants", multiple=True, help="Only these participants.")
@@ -276,16 +276,16 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import publish_derivatives
-    from .init import remember, remembered, write_bids
+    from .init import store_options, with_earlier_options, write_bids
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
     options = work / "bids.json"
     if level == "group":
-        selection = remembered(options, selection)
+        selection = with_earlier_options(options, selection)
     brains, reasons = write_bids(data, config, **selection)
     if level == "participant" and not dry_run:
-        remember(options, selection)
+        store_options(options, selection)
     work_to_do = "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
     click.echo("\n".join(reasons))
     click.echo(f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}: {', '.join(brains)}")
@@ -321,9 +321,9 @@ def view(directory: Path, only_print: bool) -> None:
         click.launch(str(report))
 
 
-def _chosen(config: Path | None, directory: Path) -> Path:
-    chosen = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), Path(CONFIG))
-    if not chosen.is_file():
+def _find_config(config: Path | None, directory: Path) -> Path:
+    found = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), Path(CONFIG))
+    if not found.is_file():
         remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."
-        raise InputError("there is no configuration", path=chosen.absolute(), remedy=remedy)
-    return chosen
+        raise InputError("there is no configuration", path=found.absolute(), remedy=remedy)
+    return found

@@ -1,4 +1,4 @@
-"""Which files of a folder are brains, by their names, the labels in them, and the table of participants."""
+"""Recognise the brains of a folder by file names, labels and the table of participants."""
 
 import re
 from collections import Counter, defaultdict
@@ -33,12 +33,12 @@ SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.
 """The entities of BIDS in a path."""
 HIDDEN = ("results", "resources", "derivatives-gyriflow")
 UNSET = "CHOOSE"
-"""Stands where the files do not tell: `gyriflow check` then asks for it."""
+"""Placeholder for values that the files do not give; `gyriflow check` then asks for them."""
 
 
 @dataclass
-class Recognised:
-    """A brain: its entry of `brains`, and what is to be filled in."""
+class FoundBrain:
+    """A recognised brain: its entry of `brains`, and notes about values to fill in."""
 
     entry: dict[str, Any]
     notes: list[str] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Recognised:
     """Of labels what `scheme_fits` returns."""
 
 
-def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> list[Recognised]:
+def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> list[FoundBrain]:
     """Return the brains of a folder and those in it, the youngest first, from files whose paths match a pattern.
 
     Data sets that gyriflow itself has made are left out. All labels are of the `scheme`, where one is named.
@@ -55,10 +55,12 @@ def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> li
     files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
     exports = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
     files = [file for file in files if fnmatch(str(file), pattern) and not any(map(file.is_relative_to, exports))]
+    scans, no_ages = [], "its name does not give the week"
     try:
-        scans, no_ages = read_scans(folder / "participants.tsv"), "not told by its name"
+        scans = read_scans(folder / "participants.tsv")
     except InputError as error:
-        scans, no_ages = [], str(error) if (folder / "participants.tsv").is_file() else "not told by its name"
+        if (folder / "participants.tsv").is_file():
+            no_ages = str(error)
     brains = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
     if not brains:
         expected = "tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names"
@@ -70,7 +72,7 @@ def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> li
         seen[name] += 1
         if brain.entry["week"] == UNSET and not brain.notes:
             brain.notes.append(f"week: {no_ages}")
-        # several files of one scan are no scans of several weeks
+        # several files of one scan do not make a series
         if counts[name] > 1:
             brain.entry.pop("subject", None)
             brain.notes.append(f"{counts[name]} files are of {name}: keep one")
@@ -81,7 +83,7 @@ def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> li
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
-    """Return the shipped schemes that know all labels of a volume, each with what speaks against it, or ""."""
+    """Return the shipped schemes with all labels of a volume, each with a contradiction or ""."""
     numbers = set(np.unique(labels).tolist()) - {0}
     layout, causes = layout_of(labels), {}
     for name, scheme in SCHEMES.items():
@@ -102,16 +104,16 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:
         problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
-        raise InputError(problem, path=file, found=fits.get(scheme) or "labels that it does not know")
-    brain = Recognised(entry, fits=fits)
+        raise InputError(problem, path=file, found=fits.get(scheme) or "labels that are not in it")
+    brain = FoundBrain(entry, fits=fits)
     choose_schemes([brain], scheme)
     if brain.notes:
         raise InputError("has labels of an unknown scheme", path=file, found=brain.notes[0], remedy="Name --scheme")
     return brain.entry
 
 
-def choose_schemes(brains: Sequence[Recognised], given: str | None = None) -> None:
-    """Set the scheme of brains with labels, of a data set as a whole: that `given`, else the only one that fits all.
+def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> None:
+    """Set the scheme of all brains with labels: `scheme`, otherwise the only scheme that fits all of them.
 
     Where none fits all, each has its own. A note asks where several fit or none does, and where the scans of one
     subject would have several.
@@ -119,32 +121,32 @@ def choose_schemes(brains: Sequence[Recognised], given: str | None = None) -> No
     each = [[name for name, against in (brain.fits or {}).items() if not against] for brain in brains]
     fitting = [set(names) for names in each if names]
     common = set.intersection(*fitting) if fitting else set()
-    of_subject: dict[str, set[str]] = defaultdict(set)
+    by_subject: dict[str, set[str]] = defaultdict(set)
     for brain, names in zip(brains, each, strict=True):
-        chosen = [given] if given else sorted(common & set(names)) or names
-        if len(chosen) == 1:
-            brain.entry["scheme"] = chosen[0]
-            of_subject[brain.entry.get("subject", "")].add(chosen[0])
-        elif chosen:
-            brain.notes.append(f"scheme: {' or '.join(chosen)}, which the labels fit both")
+        choices = [scheme] if scheme else sorted(common & set(names)) or names
+        if len(choices) == 1:
+            brain.entry["scheme"] = choices[0]
+            by_subject[brain.entry.get("subject", "")].add(choices[0])
+        elif choices:
+            brain.notes.append(f"scheme: {' or '.join(choices)} both fit the labels")
         else:
             against = [f"; not {name}: {cause}" for name, cause in (brain.fits or {}).items()]
-            brain.notes.append(f"scheme: no shipped one fits{''.join(against) or ', none knows all labels'}")
+            brain.notes.append(f"scheme: no shipped one fits{''.join(against) or ', none has all labels'}")
     for brain in brains:
-        schemes = of_subject[brain.entry.get("subject", "")]
+        schemes = by_subject[brain.entry.get("subject", "")]
         if brain.entry.get("subject") and len(schemes) > 1:
             brain.entry["scheme"] = UNSET
             brain.notes.append(f"scheme: scans of {brain.entry['subject']} fit {' and '.join(sorted(schemes))}")
 
 
-def scheme_reasons(brains: Sequence[Recognised]) -> Iterator[str]:
+def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
     """Yield for each chosen scheme how many volumes have it, then what speaks against it and against each other one."""
     for name, number in Counter(brain.entry.get("scheme", UNSET) for brain in brains).items():
         if name != UNSET:
             fits = [brain.fits or {} for brain in brains if brain.entry.get("scheme") == name]
-            causes = {other: cause for known in fits for other, cause in known.items() if cause}
+            causes = {fitted: cause for schemes in fits for fitted, cause in schemes.items() if cause}
             yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
-            yield from (f"  {'but' if other == name else f'not {other}:'} {causes[other]}" for other in causes)
+            yield from (f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}" for fitted in causes)
 
 
 def _is_own(description: Path) -> bool:
@@ -153,7 +155,7 @@ def _is_own(description: Path) -> bool:
     return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
 
 
-def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
+def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[FoundBrain]:
     surfaces: dict[tuple[str, str], dict[str, Path]] = {}
     for file in files:
         kind, side = LAYER_NAME.search(file.name), SIDE_NAME.search(file.name)
@@ -172,10 +174,10 @@ def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recog
             source = {"hemisphere": {"file": file, "side": first}}
         elif len(white) == 2:
             source["white"] = [str(white["left"]), str(white["right"])]
-        yield _recognised(Path(file), scans, source)
+        yield _found_brain(Path(file), scans, source)
 
 
-def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[Recognised]:
+def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[FoundBrain]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
     for file in volumes:
         if LABEL_NAME.search(file.name):
@@ -183,14 +185,14 @@ def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iter
                 labels = read_label_volume(folder / file).labels
             except InputError:
                 continue
-            images = [str(other) for other in volumes if other.parent == file.parent and "_T2w." in other.name]
+            images = [str(path) for path in volumes if path.parent == file.parent and "_T2w." in path.name]
             image = {"image": images[0]} if len(images) == 1 else {}
-            brain = _recognised(file, scans, {"labels": str(file), "scheme": UNSET} | image)
+            brain = _found_brain(file, scans, {"labels": str(file), "scheme": UNSET} | image)
             brain.fits = scheme_fits(labels)
             yield brain
 
 
-def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Recognised:
+def _found_brain(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> FoundBrain:
     entities = SUBJECT_AND_SESSION.search(file.as_posix())
     named = [scan for scan in scans if _names(file, scan.subject) and _names(file, scan.session)]
     # a participant's row holds for its sessions too, but the session's own comes first
@@ -202,7 +204,7 @@ def _recognised(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> Re
     subject = entities[1] if entities else scan.subject if scan else None
     entry = {"id": _id(file), "week": week} | ({"subject": subject} if subject else {})
     further = covariates(scan) if scan else {}
-    return Recognised(entry | further | source, [f"week: {scan.cause}"] if scan and scan.cause else [])
+    return FoundBrain(entry | further | source, [f"week: {scan.cause}"] if scan and scan.cause else [])
 
 
 def _names(file: Path, part: str | None) -> bool:
