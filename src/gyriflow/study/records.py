@@ -173,14 +173,6 @@ class Chain:
     def later_weeks(self) -> list[float]:
         return self.weeks[1:]
 
-    @property
-    def surfaces(self) -> list[str]:
-        return [brain.pial for brain in self.later]
-
-    @property
-    def reports(self) -> list[str]:
-        return [brain.report for brain in self.later]
-
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
