@@ -90,8 +90,8 @@ def page_of(tests):
     lines = [
         "# Reliability",
         "",
-        "What goes wrong, and what a user then gets ([exit codes](questions.md)). Each row is tried by tests; an",
-        "outcome is given where not all of them passed.",
+        "What can go wrong, and the result for the user ([exit codes](questions.md)). Each row is tested; an outcome is",
+        "given if not all tests passed.",
         "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
@@ -99,10 +99,10 @@ def page_of(tests):
     section = None
     for number, (of, fault, gets) in known["fault"].items():
         if of != section:
-            lines += ["", f"## {of}", "", "| | fault | what the user gets |", "| --- | --- | --- |"]
+            lines += ["", f"## {of}", "", "| | fault | result |", "| --- | --- | --- |"]
             section = of
         lines.append(_row(number, (fault, gets), tests.get(("fault", number), {})))
-    lines += ["", "## Promises", "", "| | what holds |", "| --- | --- |"]
+    lines += ["", "## Promises", "", "| | promise |", "| --- | --- |"]
     lines += [_row(number, texts, tests.get(("promise", number), {})) for number, texts in known["promise"].items()]
     return "\n".join(lines) + "\n"
 
