@@ -325,5 +325,5 @@ def _find_config(config: Path | None, directory: Path) -> Path:
     found = config or next((path for path in (Path(CONFIG), directory / CONFIG) if path.is_file()), Path(CONFIG))
     if not found.is_file():
         remedy = f"Write one from the files of a folder: {command_name()} init FOLDER. The demo's is {DEMO}."
-        raise InputError("there is no configuration", path=found.absolute(), remedy=remedy)
+        raise InputError("found no configuration", path=found.absolute(), remedy=remedy)
     return found

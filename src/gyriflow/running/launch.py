@@ -92,10 +92,10 @@ def hold_lock(directory: Path) -> IO[str] | None:
 
 
 def clear_stale_lock(directory: Path, max_wait_s: float = 3.0) -> None:
-    """Remove Snakemake's locks from a working directory in which no run is live.
+    """Remove Snakemake's locks from a working directory if nothing runs in it.
 
-    A run that is about to end is waited for, at most `max_wait_s` seconds. StorageError if a run is still live, or if
-    the directory cannot be written.
+    Waits at most `max_wait_s` seconds for a run to end. StorageError if it still runs, or if the directory cannot be
+    written.
     """
     deadline = time.monotonic() + max_wait_s
     while (file := hold_lock(directory)) is None:

@@ -91,7 +91,7 @@ def find_report(directory: Path) -> Path:
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
     path = directory / CONFIG
-    # the command that runs a configuration reports what is wrong with it
+    # problems of the configuration are reported when it is run
     with suppress(InputError):
         if (record := directory / STUDY_RECORD).is_file():
             path = Path(read_json(record)["configuration"][-1])

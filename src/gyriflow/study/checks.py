@@ -42,7 +42,7 @@ def problems_between(config: Config) -> list[KeyProblem]:
 
 
 def names(config: Config) -> Iterator[KeyProblem]:
-    """Yield problems of the names of brains, runs, studies and schemes, some of which are folder names."""
+    """Yield problems of the names of brains, runs, studies and schemes. Some are used as folder names."""
     if not config.brains and not config.atlas:
         yield KeyProblem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
     counts = Counter(brain.id for brain in config.brains)

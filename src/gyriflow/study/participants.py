@@ -37,8 +37,8 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?")
 class Scan:
     """A row of a table of participants, or of one of their sessions.
 
-    The subject is the participant, the session None where the row is of none. The week is None where the age cannot be
-    used, and the cause says why. Values are the row's texts by column; `age_column` is the one the age was taken from.
+    The subject is the participant; the session is None if the row has none. The week is None if the age cannot be used;
+    `cause` gives the reason. Values are the row's texts by column; the age was read from the column `age_column`.
     """
 
     id: str
@@ -75,7 +75,7 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Sca
         file = place / f"{name}_sessions.tsv"
         # any other name leads elsewhere
         sessions = _read(file) if SUBJECT_NAME.fullmatch(name) and file.is_file() else None
-        # sessions without ages say nothing that is asked here
+        # a table of sessions without ages does not help
         ages = sessions if sessions is not None and sessions.column else table
         if not ages.column:
             raise _lacks(ages, "gestational ages", (*UNIT_OF_AGE, f"{AGE} with Units in {path.stem}.json"))
@@ -97,7 +97,7 @@ def _scan(name: str, values: dict[str, str], table: _Table, further: Mapping[str
 
 
 def read_week(text: str, unit: str = "weeks") -> tuple[float | None, str]:
-    """Return a gestational age in weeks, to the two decimals of file names, and what is wrong with it."""
+    """Return a gestational age in weeks, rounded to the two decimals of file names, and the problem with it, or ''."""
     if whole := WEEKS_AND_DAYS.fullmatch(text):
         week = int(whole[1]) + int(whole[2] or whole[3]) / 7
     elif NUMBER.fullmatch(text):
@@ -144,11 +144,11 @@ ALMOST = 0.85
 def participants_brains(
     settings: ParticipantsSettings, folder: Path
 ) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], list[str]]:
-    """Return the entries of `brains` that a table stands for, by id the rows that can't be used, and problems.
+    """Return the entries of `brains` made from a table, the rows that cannot be used by id, and problems.
 
-    Of the rows, `week` is the age if it is known, and `cause` what is missing. Problems are those that can't be left
-    out with a row: a row that can't be used has the id of another one. `folder` is that of the configuration.
-    InputError where the table cannot be read or lacks what every row needs.
+    Each unusable row has `week`, its age if it is known, and `cause`, the reason. A problem is an unusable row with the
+    id of another row. `folder` is the configuration's. InputError if the table cannot be read or lacks a column that
+    every row needs.
     """
     path = located(folder, settings.file)
     scans = read_scans(path, settings.columns)
@@ -172,10 +172,10 @@ def participants_brains(
 
 
 def covariates(scan: Scan) -> dict[str, dict[str, str]]:
-    """Return the key `covariates` of a scan's brain: the columns of its table that mean nothing else."""
+    """Return the key `covariates` of a scan's brain: the columns of its table without another meaning."""
     keys = {*IDS, SESSION, FILES, SIDE, *BRAIN_KEYS, scan.age_column}
-    others = {key: value for key, value in scan.values.items() if key not in keys and value not in NOTHING}
-    return {"covariates": others} if others else {}
+    values = {key: value for key, value in scan.values.items() if key not in keys and value not in NOTHING}
+    return {"covariates": values} if values else {}
 
 
 def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
@@ -186,7 +186,7 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
         most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")
         if len(files) > most:
             return {}, f"files: found {len(files)}, {'; '.join(files)}; expected {expected}"
-        values |= _of_files(files, side)
+        values |= _file_keys(files, side)
     for column in values:
         if column not in BRAIN_KEYS:
             continue
@@ -205,7 +205,7 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
     return entry, "" if set(SOURCES) & set(entry) else f"found no data; expected files, or one of {', '.join(PATHS)}"
 
 
-def _of_files(files: list[str], side: str | None) -> dict[str, str]:
+def _file_keys(files: list[str], side: str | None) -> dict[str, str]:
     if side is not None:
         return {"hemisphere.file": files[0], "hemisphere.side": side}
     if len(files) == 2:

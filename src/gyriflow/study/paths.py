@@ -1,4 +1,4 @@
-"""Where results lie, each named here alone. Names in braces are the wildcards of the rules."""
+"""Paths of all results. Names in braces are the wildcards of the rules."""
 
 import re
 from collections.abc import Iterable
@@ -53,7 +53,7 @@ TEMPLATE_MAPS = f"{PLACE}/{{side}}.template.shape.gii"
 
 
 def white_of(*sides: Side) -> dict[str, str]:
-    """Return what is made of the white surfaces of some hemispheres: themselves, maps on them, and their metrics."""
+    """Return the files of white surfaces of hemispheres, of the maps on them, and of their metrics."""
     surfaces = {f"{side}_surface": f"{BRAIN}/surface/{side}.white.surf.gii" for side in sides}
     maps = {f"{side}_maps": f"{BRAIN}/metrics/{side}.white.shape.gii" for side in sides}
     return {**surfaces, **maps, "metrics": f"{BRAIN}/metrics/white.csv"}

@@ -202,7 +202,7 @@ def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]
 
 
 def _up_to_last_scan(run: Run, start: Brain, series: Series) -> Run:
-    """Return a run that ends with the last scan if it follows the scans of one subject, each of which has its own."""
+    """Return a run that ends with the last scan if it follows the scans of one subject."""
     scans = series.brains.get(series.with_brain(start), ())
     last = max((brain.week for brain in scans), default=start.week)
     if _shapes(run) != "self" or start.config.subject is None or several_subjects(scans) or last <= start.week:

@@ -308,7 +308,7 @@ class Study:
         return {
             **{**simulation.names, "start_week": simulation.start.week, "week": last.week},
             **{"beside": atlas_brain.id, "beside_week": atlas_brain.week},
-            # those whose growth it has
+            # the population whose growth was used
             "population": atlas_brain.population,
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
             "surfaces": [*last.parts.values()],
