@@ -68,7 +68,7 @@ BY_TESTS = {
         ("src/gyriflow/report/scene.py", '("A", "P")),', '("P", "A")),'),
     ],
     "report/test_page.py": [
-        ("src/gyriflow/report/page.py", "DEEP_MM = 0.5", "DEEP_MM = 5"),
+        ("src/gyriflow/report/page.py", "MAX_PENETRATION_MM = 0.5", "MAX_PENETRATION_MM = 5"),
         ("src/gyriflow/report/page.py", '"area_difference", "+.1f", 100', '"area_difference", "+.1f", 1'),
         ("src/gyriflow/settings/terms.py", "{1: 2.0, 2: 0.8}", "{1: 1.0, 2: 0.8}"),
     ],

@@ -15,7 +15,7 @@ from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.report.labels import SIMPLER_WAYS
+from gyriflow.report.labels import SIMPLER_PREDICTIONS
 
 from .conftest import COARSE
 
@@ -50,7 +50,7 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
     outcome = workflow.run(*tables, *further, "--cores", "2", "--configfile", name, timeout_s=1500)
     assert outcome.returncode == 0, outcome.stdout[-1000:] + outcome.stderr[-3000:]
     prediction, validation = (pd.read_csv(workflow.directory / table) for table in tables)
-    assert set(prediction["model"]) == {"run", *SIMPLER_WAYS}
+    assert set(prediction["model"]) == {"run", *SIMPLER_PREDICTIONS}
     assert list(prediction["horizon"].unique()) == pytest.approx([1.1, 1.5])
     assert set(validation["kind"]) == {"predicted"}
     assert set(validation["week"]) == {22.6, 23.0}

@@ -108,4 +108,4 @@ rule calibration_tables:
 rule calibrate:
     input:
         rules.calibration_tables.output if CALIBRATED else [],
-        asked_for(FIGURES, "calibrate"),
+        target_files(FIGURES, "calibrate"),

@@ -47,18 +47,18 @@ for name, jobs in by_rule(FIGURES).items():
 
 rule figures:
     input:
-        asked_for(FIGURES, "figures", "growth"),
+        target_files(FIGURES, "figures", "growth"),
 
 
 rule influence_figures:
     input:
-        asked_for(FIGURES, "influence_figures"),
+        target_files(FIGURES, "influence_figures"),
 
 
 # figures and tables of the paper; brains are measured only at the weeks of comparison
 rule paper:
     input:
-        asked_for(FIGURES, "paper"),
+        target_files(FIGURES, "paper"),
         rules.growth_rates.output if study.growth_brains else [],
         rules.replication.output if study.run_simulations else [],
         rules.studies.input,

@@ -39,4 +39,4 @@ rule growth_curves:
 rule growth:
     input:
         rules.growth_rates.output if study.growth_brains else [],
-        asked_for(FIGURES, "growth"),
+        target_files(FIGURES, "growth"),

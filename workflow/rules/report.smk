@@ -13,7 +13,7 @@ rule study_records:
     input:
         # logs and benchmark files are not inputs, since a missing one would repeat its job
         rules.figures.input,
-        asked_for(FIGURES, "brain", "small"),
+        target_files(FIGURES, "brain", "small"),
         rules.metrics.input,
         rules.quality_table.output,
         run_params=study.files(PARAMETERS),
@@ -88,7 +88,7 @@ SURFACES = {
         name: [[row.week, halves_of(row)] for row in simulation.measurements]
         for name, simulation in zip(run_names(study.pairs), study.run_simulations)
     },
-    "real": [
+    "observed": [
         [brain.week, halves_of(brain.measurement)] for brain in sorted(VIEWED, key=lambda brain: brain.week)
     ],
 }
@@ -99,7 +99,7 @@ rule html_report:
         rules.figures.input,
         rules.metrics.input,
         rules.influence_figures.input,
-        asked_for(FIGURES, "report", "quality", "brain"),
+        target_files(FIGURES, "report", "quality", "brain"),
         quality=rules.quality_table.output[0],
         metrics=f"{STUDY}/metrics.csv",
         centiles=rules.metrics_tables.output.centiles,
@@ -107,7 +107,7 @@ rule html_report:
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
-        worth=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
+        accuracy=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],
         surfaces=files_in(SURFACES),
         provenance=rules.study_records.output.report,
         methods=rules.study_records.output.methods,
@@ -133,8 +133,8 @@ rule html_report:
         brains=study.brain_descriptions,
         prediction=study.prediction_facts,
         surfaces=SURFACES,
-        measured=measured_name(VIEWED),
-        norm=measured_name(study.brains[brain] for brain in study.norm_reference),
+        observed_name=observed_name(VIEWED),
+        norm=observed_name(study.brains[brain] for brain in study.norm_reference),
         config=study.used_settings,
     script:
         "../scripts/html_report.py"

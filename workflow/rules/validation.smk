@@ -234,4 +234,4 @@ rule validation_tables:
 rule validate:
     input:
         rules.validation_tables.output if study.validated else [],
-        asked_for(FIGURES, "validate"),
+        target_files(FIGURES, "validate"),

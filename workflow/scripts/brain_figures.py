@@ -8,7 +8,7 @@ from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
 from gyriflow.io.volumes import read_volume_map
 from gyriflow.report.pictures import ROUND_VIEWS, shape_maps, small_pictures
-from gyriflow.report.quality import Brain, quality_page, quality_row, tissue_groups
+from gyriflow.report.quality import QualityBrain, quality_page, quality_row, tissue_groups
 from gyriflow.running.jobs import read_messages
 from gyriflow.step import step
 
@@ -29,7 +29,7 @@ with step(snakemake.log[0]):
     warnings = list(dict.fromkeys(message for level, message in read_messages(params.log) if level == "warning"))
     expected = expected_volume_ml(report["week"])
     row = quality_row(params.columns, report, read_json(files.measured) if files.measured else {}, warnings, expected)
-    brain = Brain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
+    brain = QualityBrain(surface, report["fissure_x_mm"], thickness, white, image, tissues)
     halves = [
         (read_surface(hemisphere), read_vertex_maps(maps))
         for hemisphere, maps in zip(files.hemispheres, files.maps, strict=True)

@@ -4,7 +4,7 @@ from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml, yaml_text
-from gyriflow.report.page import Origin, Tables, brain_page, hide_paths, report_page, shown_figures, study_page
+from gyriflow.report.page import Origin, Tables, brain_page, hide_paths, page_figures, report_page, study_page
 from gyriflow.report.view3d import surfaces_view
 from gyriflow.step import step
 
@@ -19,7 +19,7 @@ def with_content(figures):
     paths = [figure["path"] for figure in figures]
     pictures = [path for path in paths if path.endswith(".png")]
     contents = dict(zip(pictures, picture_addresses(pictures, PICTURE_BYTES), strict=True))
-    return shown_figures(figures, {path: contents.get(path) or read_body(path) for path in paths})
+    return page_figures(figures, {path: contents.get(path) or read_body(path) for path in paths})
 
 
 def read_weeks(weeks):
@@ -36,11 +36,11 @@ with step(snakemake.log[0]):
         page = brain_page(brains[name], tables, origin, with_content(figures), norm=params.norm)
         write_text(path, report_page(template, parts, {"groups": []}, **page))
     small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
-    prediction = params.prediction and params.prediction | {"worth": read_yaml(files.worth)}
+    prediction = params.prediction and params.prediction | {"accuracy": read_yaml(files.accuracy)}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
     page = study_page(params.brains, tables, origin, with_content(params.figures), **about)
-    runs, real = params.surfaces["runs"], params.surfaces["real"]
+    runs, observed = params.surfaces["runs"], params.surfaces["observed"]
     runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
-    view = surfaces_view(runs, read_weeks(real), measured=params.measured)
+    view = surfaces_view(runs, read_weeks(observed), observed_name=params.observed_name)
     write_json(output.view, view)
     write_text(output.report, report_page(template, parts, view, **page))

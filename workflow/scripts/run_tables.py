@@ -8,7 +8,7 @@ from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.tables import weekly_norms
-from gyriflow.report.tables import OF_EVERY_RUN, html_table, resolution_over_steps, runs_table
+from gyriflow.report.tables import COMMON_PARAMETERS, html_table, resolution_over_steps, runs_table
 from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
@@ -28,7 +28,7 @@ with step(snakemake.log[0]):
         rows.append({"run": run, "subject": brain, **settings, **found})
         # targets are in files
         settings.pop("targets", None)
-        runs[name] = settings | {key: value for key, value in found.items() if key in OF_EVERY_RUN}
+        runs[name] = settings | {key: value for key, value in found.items() if key in COMMON_PARAMETERS}
         weeks = read_weeks(frames)
         positions = [read_positions(frames, week) for week in weeks]
         _, pial = boundary_surface(TetrahedralMesh(positions[0], read_tets(frames)))

@@ -14,7 +14,7 @@ from ..settings.base import validated
 from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
-from ..study.loading import OF_FOLDING, load
+from ..study.loading import FOLDING_SECTIONS, load
 from ..study.series import unmatched_reason
 from .recognition import SUBJECT_AND_SESSION, UNSET, FoundBrain, recognise, recognise_labels, scheme_reasons
 
@@ -192,7 +192,7 @@ def write_bids(
         text |= {"start": starts or youngest, "runs": runs, **further}
         text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (further.get("folding") or {})
     else:
-        text |= {key: value for key, value in further.items() if key not in OF_FOLDING}
+        text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
     write_text(path, yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in brains], list(scheme_reasons(brains))

@@ -1,7 +1,7 @@
 """Charts over the weeks: metrics of brains and of their regions, norms, and the spectra of folds.
 
-As in the other charts, `runs` are all runs of a study, which settle the colours, and `measured` is what measured brains
-are called.
+As in the other charts, `runs` are all runs of a study, which determine the colours, and `observed_name` is the name of
+observed brains.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,13 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..settings.terms import FOLD_BANDS, MEASURED, REAL_BRAIN, SIDES
+from ..settings.terms import FOLD_BANDS, MEASURED, OBSERVED_BRAIN, SIDES
 from .labels import metric_title, value_labels
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
     NEUTRAL_COLOUR,
-    REAL_COLOUR,
+    OBSERVED_COLOUR,
     RUN_COLOURS,
     from_zero,
     panel_figure,
@@ -37,15 +37,15 @@ from .style import (
     week_axis,
 )
 
-OVERVIEW = (
+OVERVIEW_METRICS = (
     *("volume", "area", "gyrification_index", "gyrification_index_envelope", "mean_curvedness", "mean_shape_index"),
     *("mean_sulcal_depth", "folding_index", "mean_thickness"),
 )
-WITH_NORMS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness", "mean_thickness")
-OF_REGIONS = ("area", "mean_sulcal_depth", "mean_curvature", "mean_local_gyrification_index", "mean_thickness")
+NORM_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness", "mean_thickness")
+REGION_METRICS = ("area", "mean_sulcal_depth", "mean_curvature", "mean_local_gyrification_index", "mean_thickness")
 """The metrics of each chart, in their order."""
 SUBJECT_MARKERS = ("s", "^", "D", "v", "P", "X", "<", ">")
-"""Of the subjects of a cohort, up to what a legend holds."""
+"""Markers of the subjects of a cohort. With more subjects, none has a marker of its own."""
 NO_SUBJECTS: Mapping[str, str] = {}
 NOT_FROM_ZERO = ("mean_curvature", "mean_local_gyrification_index")
 LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
@@ -54,7 +54,7 @@ _HATCH = "//////"
 
 
 def _present(metrics: pd.DataFrame, names: Sequence[str]) -> list[str]:
-    """Return the names of the metrics that a table has; InputError where it has none of them."""
+    """Return the names of the metrics that a table has; InputError if it has none of them."""
     present = [name for name in names if (metrics["metric"] == name).any()]
     if not present:
         raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=list(names))
@@ -66,30 +66,30 @@ def _title(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _lines(axes: Axes, rows: pd.DataFrame, colours: Mapping[str, Any]) -> None:
-    for run, of_run in rows[rows["run"] != MEASURED].groupby("run", sort=False):
-        ordered = of_run.sort_values("week")
+    for run, run_rows in rows[rows["run"] != MEASURED].groupby("run", sort=False):
+        ordered = run_rows.sort_values("week")
         axes.plot(ordered["week"], ordered["value"], "o-", color=colours[str(run)], markersize=2.5)
 
 
 def _markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
-    """Return the marker of each subject that has measured brains; none where there are more than a legend holds."""
+    """Return the marker of each subject with observed brains; none if there are more subjects than markers."""
     brains = rows.loc[rows["run"] == MEASURED, "subject"]
-    shown = list(dict.fromkeys(subjects[brain] for brain in brains if brain in subjects))
-    return dict(zip(shown, SUBJECT_MARKERS, strict=False)) if 1 < len(shown) <= len(SUBJECT_MARKERS) else {}
+    people = list(dict.fromkeys(subjects[brain] for brain in brains if brain in subjects))
+    return dict(zip(people, SUBJECT_MARKERS, strict=False)) if 1 < len(people) <= len(SUBJECT_MARKERS) else {}
 
 
 def _stars(
     axes: Axes,
     rows: pd.DataFrame,
-    colour: Any = REAL_COLOUR,
+    colour: Any = OBSERVED_COLOUR,
     *,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     markers: Mapping[str, str] = NO_SUBJECTS,
     shades: Mapping[str, Any] = NO_SUBJECTS,
     column: str = "value",
-    **look: Any,
+    **style: Any,
 ) -> None:
-    """Draw measured brains, some in a shade of their own; the scans of a subject are joined and have its marker."""
+    """Draw observed brains, in their `shades` or else `colour`; scans of a subject are joined and have its marker."""
     for person, scans in rows.groupby(rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False):
         ordered, marker = scans.sort_values("week"), markers.get(str(person), "*")
         if person and len(scans) > 1:
@@ -97,16 +97,15 @@ def _stars(
         size = 7 if marker == "*" else 4.5
         own = ordered["subject"].map(lambda brain: shades.get(brain, colour))
         for shade, part in ordered.groupby(own, sort=False):
-            shown = {"color": shade, "markersize": size, "zorder": 3} | look
-            axes.plot(part["week"], part[column], marker, **shown)
+            axes.plot(part["week"], part[column], marker, **{"color": shade, "markersize": size, "zorder": 3} | style)
 
 
 def _shades(groups: Mapping[str, str], colours: Mapping[str, Any]) -> tuple[dict[str, Any], list[Artist]]:
-    """Return the colour of each brain of a group, one that no run has, and the entries of the legend."""
+    """Return the colour of each brain in a group, not used by any run, and the legend entries."""
     free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
-    of_groups = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
-    entries: list[Artist] = [star(name, colour, marker="o", markersize=5) for name, colour in of_groups.items()]
-    return {brain: of_groups[name] for brain, name in groups.items() if name in of_groups}, entries
+    group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    entries: list[Artist] = [star(name, colour, marker="o", markersize=5) for name, colour in group_colours.items()]
+    return {brain: group_colours[name] for brain, name in groups.items() if name in group_colours}, entries
 
 
 @styled
@@ -114,24 +113,24 @@ def metrics_chart(
     metrics: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw a panel per metric of whole brains over weeks: runs as lines, measured brains as black stars.
+    """Draw a panel per metric of whole brains over weeks: runs as lines, observed brains as black stars.
 
-    The scans of a subject are joined, with a marker for each as far as a legend holds, and groups of brains have
-    colours. Metrics that the table lacks are left out.
+    The scans of a subject are joined. Subjects have markers if there are at most eight; groups of brains have colours.
+    Metrics that the table lacks are left out.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
-        `run` is "real" for measured brains; InputError if the table has none of the metrics.
-    subjects : {brain: whose scan it is}, where that is known
-    groups : {brain: what it is in a covariate}
+        `run` is "real" for observed brains; InputError if the table has none of the metrics.
+    subjects : {brain: subject}, if known
+    groups : {brain: its value of a covariate}
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
-    present, colours = _present(whole, OVERVIEW), run_colours(whole["run"], runs)
+    present, colours = _present(whole, OVERVIEW_METRICS), run_colours(whole["run"], runs)
     markers, (shades, entries) = _markers(whole, subjects), _shades(groups, colours)
     figure, panels = panel_figure(len(present))
     for axes, name in zip(panels, present, strict=True):
@@ -140,9 +139,9 @@ def metrics_chart(
         _stars(axes, rows[rows["run"] == MEASURED], subjects=subjects, markers=markers, shades=shades)
         _title(axes, rows)
         week_axis(axes, whole["week"])
-    told = [*(subjects if markers else ()), *shades]
-    stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(told), "run"]
-    run_legend(figure, colours, measured=measured if len(stars) else "", markers=markers, extra=entries)
+    named = [*(subjects if markers else ()), *shades]
+    stars = whole.loc[(whole["run"] == MEASURED) & ~whole["subject"].isin(named), "run"]
+    run_legend(figure, colours, observed_name=observed_name if len(stars) else "", markers=markers, extra=entries)
     return figure
 
 
@@ -155,15 +154,15 @@ def norms_chart(
     reference: Sequence[str],
     brains: Sequence[str],
     runs: Sequence[str] = (),
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw a panel per metric of whole brains: reference brains, the curve through them, and the others.
+    """Draw a panel per metric of whole brains: reference brains, their norm curve, other brains and runs.
 
-    The band holds 90 % of further brains by Student's distribution, where their spread is known; quantiles are drawn as
-    bars where a week has five brains or more. Stars are measured brains, of the reference black, others coloured, as
-    are groups; lines are runs.
+    The band should contain 90 % of further brains (Student's distribution) and is drawn if their spread is known. Bars
+    are quantiles of weeks with at least five brains. Stars are observed brains: black in the reference, else coloured,
+    as are groups. Lines are runs.
 
     Parameters
     ----------
@@ -171,49 +170,49 @@ def norms_chart(
     curves : columns hemisphere, metric, week, expected, low, high
     norms : columns hemisphere, metric, week, brains, q05, q50, q95
     reference
-        Brains that the curves go through.
+        Brains that the curves were fitted to.
     brains
-        Those with the hemispheres of these. Others, and what is simulated from them, are not drawn.
+        Brains with the same hemispheres as the reference. Only they, and simulations from them, are drawn.
     subjects, groups : as for `metrics_chart`
 
-    InputError where none of the metrics is there.
+    InputError if the table has none of the metrics.
     """
     whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
-    present, colours = _present(whole, WITH_NORMS), run_colours(whole["run"], runs)
+    present, colours = _present(whole, NORM_METRICS), run_colours(whole["run"], runs)
     markers, (shades, extra) = _markers(whole, subjects), _shades(groups, colours)
     figure, panels = panel_figure(len(present), panel_in=2.0, foot_in=0.6)
-    others = False
+    has_other_brains = False
     for axes, name in zip(panels, present, strict=True):
         rows = whole[whole["metric"] == name]
-        # a table without rows has no numbers to draw
+        # without rows, the columns are not numeric
         if len(band := curves[(curves["hemisphere"] == "whole") & (curves["metric"] == name)]):
             axes.fill_between(band["week"], band["low"], band["high"], color=NEUTRAL_COLOUR, linewidth=0)
             axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
         bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
-        axes.vlines(bars["week"], bars["q05"], bars["q95"], color=REAL_COLOUR, linewidth=1.0)
-        axes.plot(bars["week"], bars["q50"], "_", color=REAL_COLOUR, markersize=7)
+        axes.vlines(bars["week"], bars["q05"], bars["q95"], color=OBSERVED_COLOUR, linewidth=1.0)
+        axes.plot(bars["week"], bars["q50"], "_", color=OBSERVED_COLOUR, markersize=7)
         _lines(axes, rows, colours)
-        real = rows[rows["run"] == MEASURED]
-        within = real["subject"].isin(reference)
-        _stars(axes, real[within], subjects=subjects, markers=markers, shades=shades)
-        _stars(axes, real[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades)
-        others |= bool((~within & ~real["subject"].isin(shades)).any())
+        observed = rows[rows["run"] == MEASURED]
+        within = observed["subject"].isin(reference)
+        _stars(axes, observed[within], subjects=subjects, markers=markers, shades=shades)
+        _stars(axes, observed[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades)
+        has_other_brains |= bool((~within & ~observed["subject"].isin(shades)).any())
         _title(axes, rows)
         week_axis(axes, rows["week"])
-    extra += [star("other measured brains", RUN_COLOURS[-1])] if others else []
+    extra += [star("other observed brains", RUN_COLOURS[-1])] if has_other_brains else []
     if curves["low"].notna().any():
         extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
     elif len(curves):
         extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
-    run_legend(figure, colours, measured=measured, markers=markers, extra=extra)
+    run_legend(figure, colours, observed_name=observed_name, markers=markers, extra=extra)
     return figure
 
 
 @styled
-def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, measured: str = REAL_BRAIN) -> Figure:
+def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN) -> Figure:
     """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
 
-    Measured brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
+    Observed brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
 
     Parameters
     ----------
@@ -221,7 +220,7 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, measured: s
     asymmetry : columns subject, run, week, region, metric, asymmetry_index
     """
     regions, asymmetry = runs_by_name(regions), runs_by_name(asymmetry)
-    colours, present = region_colours(regions["region"]), _present(regions, OF_REGIONS)
+    colours, present = region_colours(regions["region"]), _present(regions, REGION_METRICS)
     lines = dict(zip(run_colours(regions["run"]), LINES, strict=False))
     figure, panels = panel_figure(len(present) + 1, foot_in=0.75)
     for axes, name in zip(panels, present, strict=False):
@@ -239,7 +238,7 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, measured: s
     panels[-1].set_title("asymmetry of area, 2 (L − R)/(L + R)")
     extra = [Line2D([], [], color=c, marker="s", linestyle="none", label=name) for name, c in colours.items()]
     extra += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in lines.items()]
-    run_legend(figure, {}, extra=[*extra, star(measured, MUTED_COLOUR)])
+    run_legend(figure, {}, extra=[*extra, star(observed_name, MUTED_COLOUR)])
     return figure
 
 
@@ -254,7 +253,7 @@ def _region_lines(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], 
     week_axis(axes, values["week"])
 
 
-def _of_bands(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
+def _band_rows(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
     """Return the rows of the bands with a column `trusted`."""
     trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
     return spectra.assign(trusted=trusted)[spectra["band"].isin(bands)]
@@ -266,9 +265,9 @@ def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: f
 
 
 def _spectra_legend(
-    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], measured: str, groups: list[Artist], *, bars: bool
+    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], name: str, groups: list[Artist], *, bars: bool
 ) -> None:
-    """Draw the legend of a chart of bands, with groups and what is drawn of bands that are cut off or not resolved."""
+    """Draw the legend of a chart of bands, with groups and the marks of bands that are cut off or not resolved."""
     untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
     label = "band cut off or not resolved"
     extra: list[Artist] = []
@@ -277,64 +276,64 @@ def _spectra_legend(
         hollow = star(label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white")
         extra.append(hatched if bars else hollow)
     if MEASURED in untrusted:
-        words = "the same, of the real brain" if extra else label
+        words = "the same, observed brain" if extra else label
         extra.append(star(words, markersize=8, markerfacecolor="white"))
-    name = measured if (rows["run"] == MEASURED).any() else ""
-    run_legend(figure, colours, measured=name, bars=bars, extra=[*groups, *extra])
+    name = name if (rows["run"] == MEASURED).any() else ""
+    run_legend(figure, colours, observed_name=name, bars=bars, extra=[*groups, *extra])
 
 
-def _sides_of(rows: pd.DataFrame) -> list[str]:
-    """Return the hemispheres that some brain of a table has, left first."""
+def _sides_in(rows: pd.DataFrame) -> list[str]:
+    """Return the hemispheres that occur in a table, left first."""
     return [side for side in SIDES if (rows["hemisphere"] == side).any()]
 
 
 @styled
 def influence_spectra(
     members: Mapping[str, pd.DataFrame | None],
-    real: Sequence[pd.DataFrame],
+    observed: Sequence[pd.DataFrame],
     *,
     values: Mapping[str, Mapping[str, Any]],
     week: float,
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw the relative power in B4 to B6 of the members of a study at one week beside the measured brain's.
+    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week.
 
-    Members are bars, from pale to dark in the order of their values, measured brains stars, a panel per hemisphere.
-    Bars of bands that are cut off or not resolved by the surface are hatched, such stars open, and so are all where a
-    band that they are shares of is cut off. A band without any power is said to be beyond the modes.
+    A panel per hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. Bars are hatched
+    and stars open if the band, or one in the denominator of the relative power, is cut off, or if the surface does not
+    resolve it. A band without any power is labelled as beyond the modes.
 
     Parameters
     ----------
     members : {run: columns subject, week, hemisphere, band, relative_power, complete, denominator_complete, resolved}
-        None for a member that has not come to the week.
-    real : the same of measured brains, where `run` is "real"
+        None for a run that ended before the week.
+    observed : the same of observed brains, with run "real"
     values : {run: {parameter: value}}
-        What is varied, in the order of the study.
+        The varied parameters, in the order of the sweep.
     week : in GW
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
     simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
-    rows = _of_bands(pd.concat([*simulated, *real]), FOLD_BANDS)
+    rows = _band_rows(pd.concat([*simulated, *observed]), FOLD_BANDS)
     rows = rows[rows["week"] == week]
-    sides = _sides_of(rows)
+    sides = _sides_in(rows)
     figure, panels = panel_figure(len(sides), per_row=2, panel_in=2.3, sharey=True)
     width = 0.8 / len(colours)
     for axes, hemisphere in zip(panels, sides, strict=True):
         side = rows[rows["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
-            of_run = side[side["run"] == run]
-            position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in of_run["band"]]
-            bars = axes.bar(position, of_run["relative_power"], width=0.92 * width, color=colour)
-            for bar, trusted in zip(bars, of_run["trusted"], strict=True):
+            run_rows = side[side["run"] == run]
+            position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in run_rows["band"]]
+            bars = axes.bar(position, run_rows["relative_power"], width=0.92 * width, color=colour)
+            for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
                 if not trusted:
                     bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
-        for _, of_real in side[side["run"] == MEASURED].iterrows():
-            centre, power = FOLD_BANDS.index(of_real["band"]), of_real["relative_power"]
-            axes.hlines(power, centre - 0.42, centre + 0.42, color=REAL_COLOUR, linewidth=0.9)
-            face = REAL_COLOUR if of_real["trusted"] else "white"
-            axes.plot(centre, power, "*", color=REAL_COLOUR, markerfacecolor=face, markersize=8)
+        for _, row in side[side["run"] == MEASURED].iterrows():
+            centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
+            axes.hlines(power, centre - 0.42, centre + 0.42, color=OBSERVED_COLOUR, linewidth=0.9)
+            face = OBSERVED_COLOUR if row["trusted"] else "white"
+            axes.plot(centre, power, "*", color=OBSERVED_COLOUR, markerfacecolor=face, markersize=8)
         for place, band in enumerate(FOLD_BANDS):
             if not side.loc[side["band"] == band, "relative_power"].notna().any():
                 _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
@@ -344,7 +343,7 @@ def influence_spectra(
         axes.set_title(f"{hemisphere} hemisphere")
     panels[0].set_ylabel("relative power")
     from_zero(panels[0])
-    _spectra_legend(figure, rows, colours, measured, [], bars=True)
+    _spectra_legend(figure, rows, colours, observed_name, [], bars=True)
     return figure
 
 
@@ -353,14 +352,14 @@ def spectra_weeks_chart(
     spectra: pd.DataFrame,
     *,
     runs: Sequence[str] = (),
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
     """Draw the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
 
-    Runs are lines, measured brains black stars, those of a subject joined and of groups coloured; bands that are cut
-    off, are shares of such, or are not resolved have open markers.
+    Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
+    the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
 
     Parameters
     ----------
@@ -369,8 +368,8 @@ def spectra_weeks_chart(
     """
     with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
-    rows = _of_bands(runs_by_name(spectra), bands)
-    sides, colours = _sides_of(rows), run_colours(rows["run"], runs)
+    rows = _band_rows(runs_by_name(spectra), bands)
+    sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, entries = _shades(groups, colours)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
     figure, panels = panel_figure(len(sides) * len(bands), **layout)
@@ -383,11 +382,11 @@ def spectra_weeks_chart(
             else:
                 axes.plot(series["week"], series["relative_power"], color=colours[run])
             for trusted, part in series.groupby("trusted"):
-                look: dict[str, Any] = {} if trusted else {"markerfacecolor": "white"}
+                style: dict[str, Any] = {} if trusted else {"markerfacecolor": "white"}
                 if run == MEASURED:
-                    _stars(axes, part, shades=shades, column="relative_power", **look)
+                    _stars(axes, part, shades=shades, column="relative_power", **style)
                 else:
-                    axes.plot(part["week"], part["relative_power"], "o", color=colours[run], markersize=3, **look)
+                    axes.plot(part["week"], part["relative_power"], "o", color=colours[run], markersize=3, **style)
         week_axis(axes, rows["week"])
         if not here["relative_power"].notna().any():
             _beyond_the_modes(axes, 0.5, axes.transAxes)
@@ -400,5 +399,5 @@ def spectra_weeks_chart(
             axes.set_ylabel(f"{hemisphere} hemisphere\nrelative power")
     for axes in panels[: len(bands)]:
         from_zero(axes)
-    _spectra_legend(figure, rows, colours, measured, entries, bars=False)
+    _spectra_legend(figure, rows, colours, observed_name, entries, bars=False)
     return figure

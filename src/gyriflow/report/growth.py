@@ -1,4 +1,4 @@
-"""Charts of growth: areas, volumes and rates of series of brains, and how far the tissue of runs moves."""
+"""Charts of growth: areas, volumes and growth rates of series of brains, and displacements of runs."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..settings.terms import REAL_BRAIN
+from ..settings.terms import OBSERVED_BRAIN
 from .style import (
     MUTED_COLOUR,
     RUN_COLOURS,
@@ -25,9 +25,9 @@ from .style import (
 )
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
-"""Colours of the series; the one left out is the folding's."""
-MOST_PANELS = 4
-"""Series whose rates have a panel each, with more they share one."""
+"""Colours of the series, without that of the simulations."""
+MAX_RATE_PANELS = 4
+"""Up to so many series have a panel of rates each; more share one."""
 PUBLISHED_MARKERS = ("s", "^", "D", "v")
 
 
@@ -37,41 +37,41 @@ def growth_chart(
     rates: pd.DataFrame,
     *,
     folding_rate_per_s: float | Mapping[float, float] | None = None,
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw cortical area, volume over weeks, and the tangential growth rate of each interval as bars: three panels.
+    """Draw cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
 
-    Several series of brains share the panels of areas and of volumes; each has a panel of bars, on one scale.
+    Series of brains share the panels of area and volume. Up to four have a panel of bars each, on one scale.
 
     Parameters
     ----------
     areas : columns series, subject, week, area_cm2, volume_ml
     rates : columns series, from_week, to_week, rate_per_s (1/s)
     folding_rate_per_s
-        Growth rate of the folding in 1/s, drawn as a line over the bars: a number, or values by week that are linear
-        in between and constant beyond.
+        Growth rate of the simulations in 1/s, drawn as a line over the bars: a number, or values by week, linear in
+        between and constant beyond.
     """
     names = list(dict.fromkeys(rates["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    together = len(names) > MOST_PANELS
-    panels = 1 if together else len(names)
-    figure, (of_areas, of_volumes, *of_rates) = panel_figure(2 + panels, panel_in=2.4, foot_in=0.0)
+    is_shared = len(names) > MAX_RATE_PANELS
+    panels = 1 if is_shared else len(names)
+    figure, (area_axes, volume_axes, *rate_axes) = panel_figure(2 + panels, panel_in=2.4, foot_in=0.0)
     labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
-    for axes, (column, label) in zip((of_areas, of_volumes), labels.items(), strict=True):
+    for axes, (column, label) in zip((area_axes, volume_axes), labels.items(), strict=True):
         _sizes_panel(axes, areas, column, colours)
         axes.set_ylabel(label)
         if len(names) == 1:
-            axes.set_title(wrap(measured, 32))
-    if together:
-        _rates_together(of_rates[0], rates, colours)
+            axes.set_title(wrap(observed_name, 32))
+    if is_shared:
+        _rates_together(rate_axes[0], rates, colours)
         return figure
-    for axes, (name, colour) in zip(of_rates, colours.items(), strict=True):
+    for axes, (name, colour) in zip(rate_axes, colours.items(), strict=True):
         _rates_panel(axes, rates[rates["series"] == name], colour, folding_rate_per_s)
         title = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
         # the legend stands below the title
         axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
-    low, high = zip(*(axes.get_ylim() for axes in of_rates), strict=True)
-    for axes in of_rates:
+    low, high = zip(*(axes.get_ylim() for axes in rate_axes), strict=True)
+    for axes in rate_axes:
         axes.set_ylim(min(low), max(high))
     return figure
 
@@ -80,13 +80,13 @@ def _sizes_panel(axes: Axes, areas: pd.DataFrame, column: str, colours: Mapping[
     """Draw areas or volumes over weeks, a colour per series."""
     for number, (name, colour) in enumerate(reversed(list(colours.items()))):
         rows = areas[areas["series"] == name].sort_values("week")
-        # series often agree: the later ones then are seen within the earlier ones
-        look: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white" if number else colour}
-        axes.plot(rows["week"], rows[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **look)
+        # series often agree: smaller marks of later series stay visible within those of earlier ones
+        style: dict[str, Any] = {"markersize": 3 + 2.5 * number, "markerfacecolor": "white" if number else colour}
+        axes.plot(rows["week"], rows[column], "o-", color=colour, zorder=2 - 0.1 * number, label=name, **style)
     from_zero(axes)
     week_axis(axes, areas["week"])
     if 1 < len(colours) <= len(SERIES_COLOURS):
-        # in the place of a title, where no curve can be
+        # in place of a title, so that it hides no curve
         axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.01), borderaxespad=0, reverse=True)
 
 
@@ -104,10 +104,10 @@ def _rates_together(axes: Axes, rates: pd.DataFrame, colours: Mapping[str, str])
 def _rates_panel(
     axes: Axes, rates: pd.DataFrame, colour: str, folding_rate_per_s: float | Mapping[float, float] | None
 ) -> None:
-    """Draw the growth rate of each interval of one series as a bar, and the folding's rate as a line."""
+    """Draw the growth rate of each interval of one series as a bar, and the simulated rate as a line."""
     labels = [f"{first:g}–{last:g}" for first, last in zip(rates["from_week"], rates["to_week"], strict=True)]
     bars = axes.bar(labels, rates["rate_per_s"] * 1e7, width=0.7, color=colour)
-    # in front of the folding's line, where they meet
+    # in front of the line of the simulated rate
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     crowded = len(rates) > 8
     texts = axes.bar_label(bars, fmt=lambda rate: f"{rate:.2f}".replace("-", "−"), fontsize=6.5, padding=2)
@@ -116,29 +116,29 @@ def _rates_panel(
     axes.axhline(0, color="black", linewidth=0.6)
     if folding_rate_per_s is not None:
         _folding_line(axes, rates, folding_rate_per_s)
-        # above the axes, where no bar can be
+        # above the axes, so that it hides no bar
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), borderaxespad=0)
     axes.set_ylabel("growth rate (10⁻⁷ s⁻¹)")
     axes.margins(y=0.25 if crowded else 0.12)
     axes.set_xlabel("gestational interval (GW)")
     axes.tick_params(axis="x", rotation=45 if len(labels) > 6 else 0)
-    # room for three bars at least, else a single one fills the panel
+    # room for at least three bars, so that a single one does not fill the panel
     spare = max(0.0, 3 - len(labels)) / 2
     axes.set_xlim(-0.6 - spare, len(labels) - 0.4 + spare)
 
 
 def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[float, float]) -> None:
-    """Draw the folding's growth rate over bars of equal width, one per interval of the rates."""
-    look: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
+    """Draw the simulated growth rate over bars of equal width, one per interval."""
+    style: dict[str, Any] = {"color": RUN_COLOURS[1], "linestyle": "--"}
     if not isinstance(rate_per_s, Mapping):
-        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **look)
+        axes.axhline(rate_per_s * 1e7, label=f"folding: {rate_per_s * 1e7:.3g}·10⁻⁷ s⁻¹", **style)
         return
     weeks = np.array(sorted(rate_per_s))
     values = 1e7 * np.array([rate_per_s[week] for week in weeks])
     ends = np.array([*rates["from_week"], rates["to_week"].iloc[-1]])
-    shown = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
-    places = np.interp(shown, ends, np.arange(len(ends)) - 0.5)
-    axes.plot(places, np.interp(shown, weeks, values), label="folding", **look)
+    drawn = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
+    places = np.interp(drawn, ends, np.arange(len(ends)) - 0.5)
+    axes.plot(places, np.interp(drawn, weeks, values), label="folding", **style)
 
 
 @styled
@@ -147,28 +147,27 @@ def displacement_chart(
 ) -> Figure:
     """Draw the maximal and the mean displacement norm of all nodes per week.
 
-    Norms between output weeks that lie further apart are divided by the weeks between them. Runs are lines, published
-    values grey.
+    Norms are divided by the weeks between output weeks. Runs are lines, published values grey.
 
     Parameters
     ----------
     displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
     published
-        Its `displacement` has `from_weeks`, from each to the next, and rows with `source`, `max_mm` and `mean_mm`.
+        `displacement` has `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
-    colours, others = run_colours(named["run"], runs), _published_norms(published)
-    markers = dict(zip(others["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
-    rows = pd.concat([others, named[named["nodes"] == "all"]])
-    rows["middle"], span = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
+    colours, published_rows = run_colours(named["run"], runs), _published_norms(published)
+    markers = dict(zip(published_rows["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
+    rows = pd.concat([published_rows, named[named["nodes"] == "all"]])
+    rows["middle"], duration = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
     figure, panels = panel_figure(2, per_row=2)
     for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
-        per_week = rows.assign(per_week=rows[column] / span).sort_values("middle")
+        per_week = rows.assign(per_week=rows[column] / duration).sort_values("middle")
         for run, line in per_week.groupby("run", sort=False):
-            look: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
+            style: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
             if run in markers:
-                look |= {"marker": markers[run], "linestyle": "--"}
-            axes.plot(line["middle"], line["per_week"], label=run, **look)
+                style |= {"marker": markers[run], "linestyle": "--"}
+            axes.plot(line["middle"], line["per_week"], label=run, **style)
         axes.set_title(f"{label} displacement, all nodes")
         axes.set_ylabel("displacement (mm per week)")
         from_zero(axes)
@@ -183,7 +182,7 @@ def displacement_chart(
 
 
 def _published_norms(published: Mapping[str, Any] | None) -> pd.DataFrame:
-    """Return published norms with the columns of a study's table, as those of runs with the name of their source."""
+    """Return published norms as a table like that of the study, with their sources as runs."""
     weeks = np.array(published["displacement"]["from_weeks"] if published else [], dtype=float)
     rows = published["displacement"]["rows"] if published else []
     columns = ("max_mm", "mean_mm")

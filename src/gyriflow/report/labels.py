@@ -5,14 +5,14 @@ from typing import Any
 
 from ..quantities import METRICS, VERTEX_MAPS
 
-SIMPLER_WAYS = {
+SIMPLER_PREDICTIONS = {
     "scaled": "start, scaled: no folding",
     "atlas": "the atlas' brain, scaled",
     "atlas_deformed": "the atlas' brain, deformed onto the start",
     "displaced": "start, moved as the atlas",
-    "target": "what the run grows towards",
+    "target": "target shape of the run",
 }
-"""Simpler ways to predict a brain, by the names of the study's table."""
+"""Labels of the simpler predictions of a brain, by their names in the study's table."""
 PARAMETER_TITLES = {
     "thickness": "cortical thickness",
     "shear_modulus_cortex": "shear modulus of the cortex",
@@ -28,9 +28,9 @@ PARAMETER_TITLES = {
     "seconds": "time of the solve (s)",
     "peak_memory_MiB": "memory (MiB)",
 }
-"""Parameters of the folding, without the endings of their names, which tell the unit; others are called as they are."""
+"""Titles of parameters, by their keys without the suffix of the unit. Other parameters keep their names."""
 
-# as at the ends of names, the longer first, and in the column `unit` of tables
+# suffixes of names, longer ones first, and the column `unit` of tables
 _ENDINGS = {
     "_mm_per_gw": "mm/GW",
     "_per_s": "s⁻¹",
@@ -46,9 +46,9 @@ _UNITS = {"cm2": "cm²", "mm2": "mm²", "mm3": "mm³", "1/mm": "mm⁻¹", "1": "
 
 
 def with_unit(name: str, unit: object) -> str:
-    """Return a name with a unit of the tables behind it, for example "time step (s)"."""
-    shown = _UNITS.get(unit, unit) if isinstance(unit, str) else ""
-    return f"{name} ({shown})" if shown else name
+    """Append the unit from a table to a name, for example "time step (s)"."""
+    text = _UNITS.get(unit, unit) if isinstance(unit, str) else ""
+    return f"{name} ({text})" if text else name
 
 
 def metric_title(name: str) -> str:
@@ -67,7 +67,7 @@ def plain(name: str) -> str:
 
 
 def week_label(week: float) -> str:
-    """Return a gestational week as shown, for example "21 GW" or "21.5 GW"."""
+    """Return a gestational week as text, for example "21 GW" or "21.5 GW"."""
     return f"{week:g} GW"
 
 
@@ -83,16 +83,16 @@ def column_label(key: Hashable) -> str:
 
 
 def parameter_label(key: str) -> str:
-    """Return what a key of the folding is called on an axis, with its unit, for example "cortical thickness (mm)"."""
+    """Return the axis label of a parameter, with its unit, for example "cortical thickness (mm)"."""
     ending = next((ending for ending in _ENDINGS if key.endswith(ending)), "")
     name, unit = key.removesuffix(ending), _ENDINGS.get(ending)
     return with_unit(PARAMETER_TITLES.get(name, plain(name.replace(".", " "))), unit)
 
 
 def value_labels(values: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a heading for each member of a study: its values with their units, for example "1.5 mm".
+    """Return a heading for each run of a sweep: its values with units, for example "1.5 mm".
 
-    Where several keys are varied, each is named.
+    If several keys are varied, each is named.
     """
     return ["\n".join(_value_label(*item, alone=len(member) == 1) for item in member.items()) for member in values]
 

@@ -13,23 +13,23 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh
-from .scene import PIXELS_PER_INCH, TISSUE, View, half_extents, picture_axes, render, sees
+from .scene import PIXELS_PER_INCH, TISSUE, View, half_extents, is_visible, picture_axes, render
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
 _DOTS_PER_INCH = 300
-# room round the largest brain, so that it touches none in the next row or column
+# space around the largest brain, so that brains in neighbouring rows and columns do not touch
 _MARGIN = 1.12
-MOST_COLUMNS = 8
+MAX_COLUMNS = 8
 _PANEL_IN = 1.75
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
 _EDGE_IN = 0.1
 _TOP_IN = 0.1
-# of a heading
+# width of a letter of a heading
 _LETTER_IN = 0.055
 _LABEL_LETTERS = 26
-# part of the width that the scale bar may take; colour bars follow
+# maximum share of the width for the scale bar; the colour bar is right of it
 _SCALE_SHARE = 0.36
 _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
 
@@ -40,11 +40,11 @@ class Panel:
 
     Attributes
     ----------
-    mesh, colours : the part that is seen, and its (n, 3) or (m, 3) colours
-    caption : what stands below
+    mesh, colours : the visible part, and its (n, 3) or (m, 3) colours
+    caption : text below
     light : `TISSUE` or `MAP` of the scene
-    mark : (3,) a point of the surface around which a ring is drawn, dotted where it lies on the side turned away
-    lines : (k, 2, 3) ends of lines that are drawn on it
+    mark : (3,) a point of the surface marked by a ring, dotted if the point is on the far side
+    lines : (k, 2, 3) ends of lines on the surface
     """
 
     mesh: TriangleMesh
@@ -58,7 +58,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A row of a grid: its label, its panels, None where there is nothing to show, and what is said there instead."""
+    """A row of a grid: its label, its panels (None if there is nothing to show), and the text of empty panels."""
 
     label: str
     panels: Sequence[Panel | None]
@@ -69,8 +69,8 @@ class Row:
 class _Layout:
     """Sizes in inches.
 
-    `left` is where the first panel begins, `panels` are the widths of all columns, in `blocks` that stand below each
-    other. `foot` is the height of what stands below all of them.
+    `left` is the left edge of the first panel, `panels` are the widths of all columns, `blocks` the columns of each
+    block, one below the other. `foot` is the height below all blocks.
     """
 
     width: float
@@ -83,10 +83,7 @@ class _Layout:
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Columns that stand beside each other: their headings, rows, and the heights in inches of these.
-
-    `heights` are those of each row's pictures and of the captions below them.
-    """
+    """Adjacent columns: their headings and rows, and `heights` in inches of each row's pictures and captions."""
 
     columns: slice
     heads: Sequence[str]
@@ -114,9 +111,9 @@ def panel_grid(
 ) -> Figure:
     """Draw rows of surfaces under column headings, all at one scale in mm, with a scale bar below.
 
-    More than eight columns go on in a further block below. Each view is named by its row's label, and the letters of
-    its ends stand in the first panel that shows it. Several rows, or the panels of a single one, have the letters a,
-    b, c … by which a caption calls them.
+    More than eight columns continue in a further block below. The row's label names the view, and the first panel of a
+    view has the letters of its ends. Several rows, or the panels of a single row, have the letters a, b, c … for the
+    caption.
 
     Parameters
     ----------
@@ -124,7 +121,7 @@ def panel_grid(
     legend : entries of a legend
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
-    layout = _lay_out(rows, has_bar=colour_bar is not None, entries=len(legend))
+    layout = _layout(rows, has_bar=colour_bar is not None, entries=len(legend))
     heads = [wrap(head, int(panel / _LETTER_IN)) for head, panel in zip(columns, layout.panels, strict=True)]
     blocks = [_block(rows, heads, block, layout.inches_per_mm) for block in layout.blocks]
     head_in = _dots(0.2 + 0.12 * max(head.count("\n") for head in heads))
@@ -135,7 +132,7 @@ def panel_grid(
         _draw_heads(figure, block, layout, middle=top - head_in / 2)
         top -= head_in
         for row, (pictures, captions) in zip(block.rows, block.heights, strict=True):
-            # a letter for each of several rows, or for each panel of a single one
+            # a letter for each row, or for each panel of a single row
             count = 1 if len(rows) > 1 else len(block.heads) if len(columns) > 1 else 0
             _draw_row(
                 figure, row, block.columns, layout, list(islice(letters, count)), bottom=top - pictures, height=pictures
@@ -149,14 +146,14 @@ def panel_grid(
     return figure
 
 
-def _lay_out(rows: Sequence[Row], *, has_bar: bool, entries: int) -> _Layout:
-    """Return the sizes of a grid above so many entries of a legend: one scale, as large as the page allows."""
-    # half of what each column shows in mm: its widest brain and a margin
-    of_columns = zip(*(row.panels for row in rows), strict=True)
-    widest = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in of_columns]
+def _layout(rows: Sequence[Row], *, has_bar: bool, entries: int) -> _Layout:
+    """Return the sizes of a grid above a legend with so many entries: one scale, as large as the page allows."""
+    # half the width of each column in mm: its widest brain and a margin
+    columns = zip(*(row.panels for row in rows), strict=True)
+    widest = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns]
     halves = _MARGIN * np.maximum(widest, _NARROWEST * max(widest))
-    # blocks of columns, of as equal numbers as possible
-    size = -(-len(halves) // -(-len(halves) // MOST_COLUMNS))
+    # blocks with as equal numbers of columns as possible
+    size = -(-len(halves) // -(-len(halves) // MAX_COLUMNS))
     blocks = [slice(start, start + size) for start in range(0, len(halves), size)]
     lines = max(row.label.count("\n") for row in rows)
     label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
@@ -175,13 +172,13 @@ def _legend_columns(width: float) -> int:
 
 
 def _block(rows: Sequence[Row], heads: Sequence[str], columns: slice, inches_per_mm: float) -> _Block:
-    """Return a block without the rows of which it shows nothing."""
-    shown = [row for row in rows if row.absent or any(row.panels[columns])]
-    return _Block(columns, heads[columns], shown, [_heights_in(row, columns, inches_per_mm) for row in shown])
+    """Return a block without its empty rows."""
+    visible = [row for row in rows if row.absent or any(row.panels[columns])]
+    return _Block(columns, heads[columns], visible, [_heights_in(row, columns, inches_per_mm) for row in visible])
 
 
 def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
-    """Return the heights of a row's pictures and of what stands below them."""
+    """Return the heights of a row's pictures and captions."""
     panels = [panel for panel in row.panels[block] if panel is not None]
     tallest = max((half_extents(panel.mesh, panel.view)[1] for panel in panels), default=0.0)
     # the label is written along the height
@@ -220,12 +217,12 @@ def _draw_row(
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
         if index < len(letters):
-            # beside the row's label, or above the letters of the ends, of this picture and the one before
-            look: dict[str, Any] = {"ha": "left", "va": "bottom"}
+            # next to the row's label, or above the letters of the ends
+            style: dict[str, Any] = {"ha": "left", "va": "bottom"}
             if row.label and not index:
-                look = {"ha": "right", "va": "top"}
-            look |= {"xytext": (-2, 2), "textcoords": "offset points", "xycoords": "axes fraction"}
-            axes.annotate(letters[index], (0.0, 1.0), fontsize=9, fontweight="bold", **look)
+                style = {"ha": "right", "va": "top"}
+            style |= {"xytext": (-2, 2), "textcoords": "offset points", "xycoords": "axes fraction"}
+            axes.annotate(letters[index], (0.0, 1.0), fontsize=9, fontweight="bold", **style)
         if panel is None:
             axes.text(0.5, 0.5, row.absent, transform=axes.transAxes, ha="center", va="center", fontsize=6.5)
             continue
@@ -245,7 +242,7 @@ def _draw_row(
 def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
     middle = (panel.mesh.vertices.min(axis=0) + panel.mesh.vertices.max(axis=0)) / 2
     right, up = (float((point - middle) @ axis) for axis in picture_axes(panel.view))
-    line = "-" if sees(panel.mesh, point, panel.view) else ":"
+    line = "-" if is_visible(panel.mesh, point, panel.view) else ":"
     for colour, thickness in (("white", 2.0), ("black", 1.0)):
         ring = Circle((right, up), 0.05 * np.ptp(axes.get_xlim()) / 2, fill=False)
         ring.set(edgecolor=colour, linewidth=thickness, linestyle=line if colour == "black" else "-")

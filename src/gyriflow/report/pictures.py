@@ -1,4 +1,4 @@
-"""Pictures of surfaces: simulated beside measured brains, maps, regions and zones."""
+"""Pictures of surfaces: simulated and observed brains, maps, regions and zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle, pairwise
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
 from ..quantities import SIGNED_COLOURS, VERTEX_MAPS
 from ..settings.folding import FoldingParameters
-from ..settings.terms import REAL_BRAIN, ZONE_NAMES
+from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2, SECONDS_PER_GW
 from .labels import column_label, map_title, plain, value_labels
-from .panels import MOST_COLUMNS, Panel, Row, panel_grid
+from .panels import MAX_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
     UNKNOWN_COLOUR,
@@ -32,7 +32,7 @@ from .scene import (
 )
 from .style import (
     NEUTRAL_COLOUR,
-    REAL_SURFACE_COLOUR,
+    OBSERVED_SURFACE_COLOUR,
     RIGHT_COLOUR,
     RUN_COLOURS,
     SIMULATED_SURFACE_COLOUR,
@@ -50,12 +50,12 @@ SIDE_VIEWS = ("left", "top")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
 ROUNDING = 1e-9
-LINES_MM, LONG = 4.0, 0.9
-"""How far lines that show directions are apart, and the part of the vectors that they show the length of."""
-SEEN_FLAT = 0.3
-"""Cosine of the angle between a normal and a view from which on lines are drawn: beyond, the outline shortens them."""
+LINES_MM, DIRECTION_QUANTILE = 4.0, 0.9
+"""Spacing of direction lines, and the quantile of the vectors' lengths above which all lines are equally long."""
+MIN_FACING_COSINE = 0.3
+"""Minimum cosine between a normal and the view for lines: closer to the outline they would be foreshortened."""
 ABSENT = "ended\nbefore\nthis week"
-"""What stands in the place of a member of a study that has not come to the week."""
+"""Text in place of a run that ended before the week."""
 ZONE_COLOURS = {
     **{"free": "#D55E00", "clamped": "#009E73", "left contact": "#0072B2", "right contact": RIGHT_COLOUR},
     **{"between planes": "#CC79A7", "base": "#999999", "side x": "#56B4E9", "side y": "#E69F00"},
@@ -63,13 +63,13 @@ ZONE_COLOURS = {
 }
 """Colours of the boundary's zones, near the paper's red, green, blue, yellow and purple."""
 SMALL_DEEP_MM, SMALL_PER_MM, SMALL_PER_INCH = 5.0, 4.0, 400
-"""Of small pictures: the end of the scale of depth, and dots per mm of the brain and per inch of the print."""
+"""Small pictures: upper end of the depth scale, and dots per mm of the brain and per inch of print."""
 TINTS = (0.0, 0.4, 0.7)
-"""How far towards white the colours of further regions are."""
+"""Shares of white in the colours of further regions."""
 
 
 def _ordered(*groups: Mapping) -> list:
-    """Return the keys of all groups, weeks and intervals in order, names as they come."""
+    """Return the keys of all groups: weeks and intervals sorted, names in their order."""
     keys = list(dict.fromkeys(key for group in groups for key in group))
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
 
@@ -81,52 +81,49 @@ def _plain_panel(mesh: TriangleMesh | None, colour: str, view: View) -> Panel | 
 def _side_by_side(
     keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | None]]]
 ) -> tuple[list[str], list[Row]]:
-    """Return the headings and rows of a grid: a row per group, its views beside each other where they fit.
-
-    Where they do not, the rows of all groups stand below each other, view by view.
-    """
+    """Return the headings and rows of a grid: a row per group with all views, or per view and group if too wide."""
     views, heads = list(next(iter(panels.values()))), [column_label(key) for key in keys]
-    if len(views) * len(keys) > MOST_COLUMNS:
-        return heads, [Row(f"{name}\n{v.name} view".strip(), shown[v]) for v in views for name, shown in panels.items()]
-    rows = [Row(name, [panel for view in views for panel in shown[view]]) for name, shown in panels.items()]
+    if len(views) * len(keys) > MAX_COLUMNS:
+        return heads, [Row(f"{name}\n{v.name} view".strip(), group[v]) for v in views for name, group in panels.items()]
+    rows = [Row(name, [panel for view in views for panel in group[view]]) for name, group in panels.items()]
     return [f"{head}\n{view.name} view" for view in views for head in heads], rows
 
 
 @styled
 def runs_by_week(
     runs: Mapping[str, Mapping[float, TriangleMesh]],
-    real: Mapping[float, TriangleMesh],
+    observed: Mapping[float, TriangleMesh],
     *,
     deviations: Mapping[float, SurfaceMaps] | None = None,
     views: Sequence[str] = SIDE_VIEWS,
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
     predicted: str = "",
 ) -> Figure:
-    """Draw the brains of several runs (blue) above measured ones (beige), a column per week, their rows by view.
+    """Draw the brains of several runs (blue) above observed ones (beige), a column per week, rows by view.
 
     Parameters
     ----------
     runs : {run: {week: surface in RAS+ mm}}
     real : {week, or another heading: surface in RAS+ mm}
-        A week that one of them lacks leaves its place empty.
+        A missing week leaves its panel empty.
     deviations : {week: (surface, maps)}
-        Of which `distance_mm` is shown below.
-    predicted : the heading of a predicted brain (blue) among the real ones
+        The map `distance_mm` is shown below.
+    predicted : heading of a predicted brain (blue) in `observed`
     """
     groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
-    if real:
-        groups[measured] = (real, REAL_SURFACE_COLOUR)
+    if observed:
+        groups[observed_name] = (observed, OBSERVED_SURFACE_COLOUR)
     keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), [VIEWS[name] for name in views]
-    other = {predicted: SIMULATED_SURFACE_COLOUR}
+    special = {predicted: SIMULATED_SURFACE_COLOUR}
     panels = {
-        name: {view: [_plain_panel(meshes.get(key), other.get(key, colour), view) for key in keys] for view in seen}
+        name: {view: [_plain_panel(meshes.get(key), special.get(key, colour), view) for key in keys] for view in seen}
         for name, (meshes, colour) in groups.items()
     }
     bar = None
     if deviations:
-        away = {week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()}
-        scale = scale_of("distance_mm", np.concatenate([values for _, values in away.values()]))
-        panels["distance"] = {view: [_map_panel(away.get(key), scale, view) for key in keys] for view in seen}
+        distance_maps = {week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()}
+        scale = scale_of("distance_mm", np.concatenate([values for _, values in distance_maps.values()]))
+        panels["distance"] = {view: [_map_panel(distance_maps.get(key), scale, view) for key in keys] for view in seen}
         bar = scale, map_title("distance_mm")
     return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
 
@@ -144,45 +141,43 @@ def displacements(frames: Mapping[float, SurfaceMaps]) -> dict[tuple[float, floa
 def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
-    The scale ends where one vertex in two hundred is above, so that a single maximum does not set it. The maximum is
-    ringed, dotted where it lies on the side turned away; below each interval stand its size, its place in RAS+ mm, and
-    the mean over the vertices.
+    One vertex in two hundred is above the scale, so that a single maximum does not determine it. The maximum has a
+    ring, dotted on the far side; the caption of each interval has its size, its position in RAS+ mm, and the mean over
+    the vertices.
 
     Parameters
     ----------
     frames : {run: {week: (surface in RAS+ mm, fields)}}
     """
-    of_runs = {run: displacements(weeks) for run, weeks in frames.items()}
-    keys, seen = _ordered(*of_runs.values()), [VIEWS[name] for name in SIDE_VIEWS]
-    every = np.concatenate([norms for maps in of_runs.values() for _, norms in maps.values()])
+    moved = {run: displacements(weeks) for run, weeks in frames.items()}
+    keys, seen = _ordered(*moved.values()), [VIEWS[name] for name in SIDE_VIEWS]
+    every = np.concatenate([norms for maps in moved.values() for _, norms in maps.values()])
     scale = scale_of("displacement_mm", every)
 
-    def panel(shown: SurfaceMap | None, view: View) -> Panel | None:
-        if shown is None:
+    def panel(surface_map: SurfaceMap | None, view: View) -> Panel | None:
+        if surface_map is None:
             return None
-        mesh, norms = shown
+        mesh, norms = surface_map
         place = mesh.vertices[int(np.nanargmax(norms))]
         where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
         words = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
         return Panel(mesh, paint(norms, scale), view, words if view == seen[0] else "", MAP, place)
 
-    panels = {
-        run: {view: [panel(maps.get(key), view) for key in keys] for view in seen} for run, maps in of_runs.items()
-    }
+    panels = {run: {view: [panel(maps.get(key), view) for key in keys] for view in seen} for run, maps in moved.items()}
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
 
 
 def round_up(value: float) -> float:
-    """Return a positive value rounded up to two digits, so that a colour bar ends at a number one can say."""
+    """Return a positive value rounded up to two digits, as the end of a colour bar."""
     step = 10.0 ** (np.floor(np.log10(value)) - 1)
     return float(np.ceil(value / step - 1e-9) * step)
 
 
 def scale_of(quantity: str, values: Floats) -> ScalarMappable:
-    """Return the colour scale of a map of `VERTEX_MAPS`: its own limits, or one that few vertices pass.
+    """Return the colour scale of a map of `VERTEX_MAPS`, with its own limits or from a quantile of the values.
 
-    It begins at zero. Of signed maps, and where values are below zero, it is as wide on both sides, pale at zero.
-    The end is a round value, so that no outlier sets it.
+    The scale begins at zero. For signed maps, or if any value is negative, it is symmetric and pale at zero. It ends at
+    a round value above the map's quantile, so that outliers do not determine it.
     """
     record = VERTEX_MAPS[quantity]
     if record.limits is not None:
@@ -202,7 +197,7 @@ def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMap
 
     Parameters
     ----------
-    names : the maps that are wanted; a hemisphere that lacks one has NaN
+    names : the maps to return, NaN on a hemisphere that lacks one
     """
     if names is None:
         names = [name for name in halves[0][1] if all(name in maps for _, maps in halves)]
@@ -221,7 +216,7 @@ def _map_of(halves: Halves, quantity: str) -> SurfaceMap:
 def shape_maps(
     brains: Mapping[str, Mapping[float, Halves]], *, quantity: str, views: Sequence[str] = SIDE_VIEWS
 ) -> Figure:
-    """Draw `scalar_maps` of a measure of the hemispheres, {group: {week: hemispheres}}, without groups of no brain."""
+    """Draw `scalar_maps` of a quantity of hemispheres, {group: {week: hemispheres}}, without empty groups."""
     maps = {
         group: {week: _map_of(halves, quantity) for week, halves in weeks.items()}
         for group, weeks in brains.items()
@@ -243,20 +238,20 @@ def scalar_maps(
     Parameters
     ----------
     maps : {group: {week or run: (surface, values)}}
-        For example {"simulated": {28.0: …}, "real brain": {28.0: …}}.
+        For example {"simulated": {28.0: …}, "observed brain": {28.0: …}}.
     quantity : a name of `VERTEX_MAPS`
     directions : {week or run: (n, 3) vectors at the vertices}
-        Drawn as lines in proportion to these, but for the longest tenth, which are alike.
+        Drawn as lines of proportional length; the longest tenth have the same length.
     """
     every = np.concatenate([values for group in maps.values() for _, values in group.values()])
     scale, keys, seen = scale_of(quantity, every), _ordered(*maps.values()), [VIEWS[name] for name in views]
     shares: dict[Any, Floats] = {}
     if directions:
         lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
-        shares = {key: vectors / np.quantile(lengths, LONG) for key, vectors in directions.items()}
+        shares = {key: vectors / np.quantile(lengths, DIRECTION_QUANTILE) for key, vectors in directions.items()}
     panels = {
-        group: {view: [_map_panel(shown.get(key), scale, view, shares.get(key)) for key in keys] for view in seen}
-        for group, shown in maps.items()
+        group: {view: [_map_panel(values.get(key), scale, view, shares.get(key)) for key in keys] for view in seen}
+        for group, values in maps.items()
     }
     legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, map_title(quantity)), legend=legend)
@@ -274,7 +269,7 @@ def growth_of_area(frames: Mapping[float, SurfaceMaps], step_s: float) -> dict[t
 def growth_maps(
     frames: Mapping[float, SurfaceMaps], params: FoldingParameters, *, views: Sequence[str] = SIDE_VIEWS
 ) -> Figure:
-    """Draw the growth of area that a run towards shapes has found, with lines along the largest growth.
+    """Draw the growth of area found by a run towards target shapes, with lines along the largest growth.
 
     Parameters
     ----------
@@ -288,78 +283,80 @@ def growth_maps(
 
 
 def _map_panel(
-    shown: SurfaceMap | None, scale: ScalarMappable, view: View, directions: Floats | None = None
+    surface_map: SurfaceMap | None, scale: ScalarMappable, view: View, directions: Floats | None = None
 ) -> Panel | None:
-    if shown is None:
+    if surface_map is None:
         return None
-    mesh, values = shown
+    mesh, values = surface_map
     lines = None if directions is None else direction_lines(mesh, directions, view)
     return Panel(mesh, paint(values, scale), view, light=MAP, lines=lines)
 
 
 def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
-    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one in each cube of `LINES_MM` of what faces a view.
+    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of `LINES_MM` that faces a view.
 
-    A vector of length 1 or more gives a line as long as a cube.
+    Vectors of length 1 or more give lines as long as a cube.
     """
     normals = vertex_normals(mesh)
-    chosen = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
-    chosen = chosen[normals[chosen] @ view.towards > SEEN_FLAT]
-    half = directions[chosen] * (LINES_MM / 2) / np.linalg.norm(directions[chosen], axis=1, keepdims=True).clip(1)
-    # a little above the surface, which else would hide parts of them
-    at = mesh.vertices[chosen] + LINES_MM / 8 * normals[chosen]
+    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
+    vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
+    half = directions[vertices] * (LINES_MM / 2) / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+    # slightly above the surface, which would otherwise hide parts of them
+    at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
     return np.stack([at - half, at + half], axis=1)
 
 
 @styled
 def influence_picture(
     members: Mapping[str, Halves | None],
-    real: Halves | None,
+    observed: Halves | None,
     *,
     values: Mapping[str, Mapping[str, Any]],
-    measured: str = REAL_BRAIN,
+    observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw the surfaces of the members of a study at one week above their maps of the shape index on one scale.
+    """Draw the surfaces of the runs of a sweep at one week, and below their shape index on one scale.
 
     Parameters
     ----------
     members : {run: hemispheres with their maps}
-        In the order of the study; None for a member that has not come to the week.
+        In the order of the sweep; None for a run that ended before the week.
     real
-        The hemispheres of the measured brain of the week with their maps, shown last under the name `measured`.
+        The hemispheres of the observed brain of the week with their maps, shown last under `observed_name`.
     values : {run: {parameter: value}}
-        What is varied, for the headings.
+        The varied parameters, for the headings.
     """
     quantity = "shape_index"
     headings = dict(zip(values, value_labels(list(values.values())), strict=True))
-    brains = {headings[run]: halves for run, halves in members.items()} | ({measured: real} if real else {})
-    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR) | {measured: REAL_SURFACE_COLOUR}
+    brains = {headings[run]: halves for run, halves in members.items()} | (
+        {observed_name: observed} if observed else {}
+    )
+    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR) | {observed_name: OBSERVED_SURFACE_COLOUR}
     maps = {name: _map_of(halves, quantity) if halves else None for name, halves in brains.items()}
     scale, seen = scale_of(quantity, np.empty(0)), [VIEWS[name] for name in SIDE_VIEWS]
     rows = []
     for view in seen:
-        panels = [_plain_panel(shown and shown[0], colours[name], view) for name, shown in maps.items()]
+        panels = [_plain_panel(item and item[0], colours[name], view) for name, item in maps.items()]
         rows.append(Row(f"{view.name} view", panels, ABSENT))
     for view in seen:
-        panels = [_map_panel(shown, scale, view) for shown in maps.values()]
+        panels = [_map_panel(item, scale, view) for item in maps.values()]
         rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
     return panel_grid(list(brains), rows, colour_bar=(scale, map_title(quantity)))
 
 
 @styled
 def small_pictures(halves: Halves, *, side: str) -> Figure:
-    """Draw a brain small and without words: shape index from a side, and depth from above, 0 to `SMALL_DEEP_MM`.
+    """Draw a small picture without text: shape index from a side, and depth from above, 0 to `SMALL_DEEP_MM`.
 
     All brains have one scale.
     """
     mesh, maps = whole_maps(halves, ("shape_index", "sulcal_depth_mm"))
     depth = colour_scale(VERTEX_MAPS["sulcal_depth_mm"].colours, 0.0, SMALL_DEEP_MM)
-    shown = {side: ("shape_index", scale_of("shape_index", np.empty(0))), "top": ("sulcal_depth_mm", depth)}
-    extents = {view: half_extents(mesh, VIEWS[view]) for view in shown}
+    views = {side: ("shape_index", scale_of("shape_index", np.empty(0))), "top": ("sulcal_depth_mm", depth)}
+    extents = {view: half_extents(mesh, VIEWS[view]) for view in views}
     tall = 1.05 * max(height for _, height in extents.values())
     images = [
         render(mesh, paint(maps[name], scale), VIEWS[view], (1.05 * extents[view][0], tall), SMALL_PER_MM, light=MAP)
-        for view, (name, scale) in shown.items()
+        for view, (name, scale) in views.items()
     ]
     image = np.hstack(images)
     figure = Figure(figsize=(image.shape[1] / SMALL_PER_INCH, image.shape[0] / SMALL_PER_INCH))
@@ -370,10 +367,10 @@ def small_pictures(halves: Halves, *, side: str) -> Figure:
 
 
 def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]]:
-    """Return a colour for each region in the order given: those of runs, then their tints.
+    """Return a colour for each region in the given order: those of runs, then their tints.
 
-    No scale from dark to pale, which would make neighbours alike, and dark ones like shade. From the 22nd region on the
-    colours come again.
+    On a scale from dark to pale, neighbours would look similar, and dark regions like shade. Colours repeat from the
+    22nd region on.
     """
     shades = [
         (part[0] + tint * (1 - part[0]), part[1] + tint * (1 - part[1]), part[2] + tint * (1 - part[2]))
@@ -392,21 +389,21 @@ def regions_picture(
     Parameters
     ----------
     brains : {heading of the column: hemispheres, each with the numbers of its vertices' regions and their names}
-        A number without a name is no region.
+        Numbers without a name mean no region.
     """
     colours = region_colours(name for halves in brains.values() for _, (_, table) in halves for name in table.values())
     legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
-    painted, nameless = {}, False
+    painted, has_unnamed = {}, False
     for heading, halves in brains.items():
         shades = []
         for mesh, (numbers, table) in halves:
-            of_side = np.tile(np.array(to_rgb(NEUTRAL_COLOUR)), (len(mesh.vertices), 1))
+            side_colours = np.tile(np.array(to_rgb(NEUTRAL_COLOUR)), (len(mesh.vertices), 1))
             for number, name in table.items():
-                of_side[numbers == number] = colours[name]
-            shades.append(of_side)
-            nameless |= not np.isin(numbers, list(table)).all()
+                side_colours[numbers == number] = colours[name]
+            shades.append(side_colours)
+            has_unnamed |= not np.isin(numbers, list(table)).all()
         painted[heading] = merged(*(mesh for mesh, _ in halves)), np.concatenate(shades)
-    if nameless:
+    if has_unnamed:
         legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     rows = [
         Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
@@ -421,15 +418,15 @@ def zones_picture(regions: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]
 
     Parameters
     ----------
-    regions : the boundary in RAS+ mm, and tags (m,) of its faces, of which `zone` is a place in `ZONE_NAMES`
-    params : `fissure_x_mm` is where the medial views part the hemispheres
+    regions : the boundary in RAS+ mm, and tags (m,) of its faces, where `zone` is an index into `ZONE_NAMES`
+    params : `fissure_x_mm` separates the hemispheres in medial views
     """
     (mesh, tags), fissure_x_mm = regions, params.fissure_x_mm
     zones = tags["zone"]
     colours = [ZONE_COLOURS[name] for name in ZONE_NAMES]
     areas = np.bincount(zones, weights=face_areas(mesh), minlength=len(colours)) * CM2_PER_MM2
-    shown = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]
-    legend = [Patch(color=colour, label=f"{name} {area:.1f} cm²") for name, colour, area in shown]
+    present = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]
+    legend = [Patch(color=colour, label=f"{name} {area:.1f} cm²") for name, colour, area in present]
     panels = [
         Panel(*restricted(mesh, to_rgba_array(colours)[zones, :3], view.hemisphere, fissure_x_mm), view, light=MAP)
         for view in map(VIEWS.__getitem__, MEDIAL_VIEWS)

@@ -21,12 +21,12 @@ from ..quantities import VERTEX_MAPS
 from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, REAL_SURFACE_COLOUR, new_figure, styled, wrap
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, new_figure, styled, wrap
 
-VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "look": ("Warnings:", "#E69F00")}
-"""What stands above the warnings of a page, and the colour of the verdict."""
+VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "needs review": ("Warnings:", "#E69F00")}
+"""Heading above the warnings of a page, and colour of the verdict."""
 TISSUE_GROUPS = {1: "cortex", 2: "inside the cortex", 3: "ventricles", 4: "other labels"}
-"""Groups of labels as they are coloured, in place of an image."""
+"""Groups of labels that share a colour, shown if there is no image."""
 TISSUE_COLOURS = ("#FFFFFF", "#B7A58B", "#E9E4DA", "#9CC3E0", "#E6E6E6")
 PIAL_COLOUR, INNER_COLOUR = "#D55E00", "#0072B2"
 # the same for all brains, so that their pages can be compared
@@ -39,20 +39,20 @@ LINE_LETTERS = 138
 ROWS_IN, HEAD_IN, LINE_IN = (2.4, 1.42, 1.42), 0.9, 0.13
 PIXELS_PER_INCH = 200
 MARGIN_MM, PIXEL_MM = 8.0, 0.25
-"""Of planes, beyond the surface and between the dots."""
-# grey values up to this quantile of those above zero are told apart
+"""Margin around the surface and pixel size of the planes."""
+# quantile of the positive grey values that is shown as white
 _BRIGHTEST = 0.995
 
 
 @dataclass(frozen=True, eq=False)
-class Brain:
-    """What a page shows of a brain.
+class QualityBrain:
+    """The surfaces, thickness and volumes on a brain's page.
 
     Attributes
     ----------
     pial : the whole surface, in RAS+ mm
-    fissure_x_mm : where the medial views part the hemispheres
-    thickness_mm : (n,) at the vertices of the surface, NaN where it was not measured
+    fissure_x_mm : plane that separates the hemispheres in medial views
+    thickness_mm : (n,) at the vertices of the surface, NaN if not measured
     white : the white surface, in the same coordinates
     image, tissues
         The (i, j, k) grey values and groups of labels (`TISSUE_GROUPS`), each with the (4, 4) affine from voxel index
@@ -77,20 +77,20 @@ def tissue_groups(labels: NDArray[np.integer], scheme: LabelScheme) -> NDArray[n
 
 
 @styled
-def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) -> Figure:
+def quality_page(brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence[str]) -> Figure:
     """Draw the page of a brain: three planes, the surface in four views, thickness in four views, and its warnings.
 
-    The image lies behind the outlines where there is one, else the labels. A page ends below its last warning.
+    The outlines are drawn on the image, or on the labels if there is no image. The page ends below its last warning.
 
     Parameters
     ----------
-    row : what `quality_row` returns
+    row : the output of `quality_row`
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
     figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
-    # a line ends between facts, not within one
+    # lines break between facts only
     facts = [f"{name}: {value}".replace(" ", "\N{NO-BREAK SPACE}") for name, value in _facts(row).items()]
     words = wrap("   ".join(facts), LINE_LETTERS)
     title = f"{row['subject']}, {row['week']:g} GW"
@@ -103,7 +103,7 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     planes, views, thickness = rows
     planes.suptitle(words, **left)
     _draw_planes(planes, brain)
-    uniform = uniform_colours(brain.pial, REAL_SURFACE_COLOUR)
+    uniform = uniform_colours(brain.pial, OBSERVED_SURFACE_COLOUR)
     _draw_views(views, brain, uniform, SHAPE_VIEWS)
     if brain.thickness_mm is None:
         _draw_views(thickness, brain, uniform, OTHER_VIEWS)
@@ -117,35 +117,35 @@ def quality_page(brain: Brain, row: Mapping[str, Any], warnings: Sequence[str]) 
     return figure
 
 
-def _draw_planes(figure: SubFigure, brain: Brain) -> None:
+def _draw_planes(figure: SubFigure, brain: QualityBrain) -> None:
     """Draw three planes through the middle, the sagittal one through the middle of a hemisphere."""
     low, high = brain.pial.vertices.min(axis=0), brain.pial.vertices.max(axis=0)
     middle, fissure = (low + high) / 2, float(np.clip(brain.fissure_x_mm, low[0], high[0]))
     # the larger hemisphere, of equal ones the right one
     outer = high[0] if high[0] - fissure > 0.8 * (fissure - low[0]) else low[0]
     at = {"coronal": middle[1], "axial": middle[2], "sagittal": (fissure + outer) / 2}
-    # the coordinates of the dots along each axis, and the ends of pictures
+    # pixel coordinates by axis, and the edges of the pictures
     dots = [np.arange(begin - MARGIN_MM, end + MARGIN_MM, PIXEL_MM) for begin, end in zip(low, high, strict=True)]
-    ends = [(along[0], along[-1] + PIXEL_MM) for along in dots]
+    ends = [(dots_of_axis[0], dots_of_axis[-1] + PIXEL_MM) for dots_of_axis in dots]
     tallest = max(np.ptp(ends[up]) for *_, up in PLANES.values())
     colour = "black" if brain.image is None else "white"
     panels = figure.subplots(1, 3, width_ratios=[np.ptp(ends[right]) for _, right, _ in PLANES.values()])
-    for axes, (plane, (across, right, up)) in zip(panels, PLANES.items(), strict=True):
+    for axes, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         points = np.empty((len(dots[up]), len(dots[right]), 3))
-        points[..., across], points[..., right], points[..., up] = at[plane], dots[right], dots[up][:, None]
-        look: dict[str, Any] = {"origin": "lower", "extent": (*ends[right], *ends[up]), "interpolation": "none"}
+        points[..., normal], points[..., right], points[..., up] = at[plane], dots[right], dots[up][:, None]
+        style: dict[str, Any] = {"origin": "lower", "extent": (*ends[right], *ends[up]), "interpolation": "none"}
         if brain.image:
             values, affine = brain.image
             lit = values[np.isfinite(values) & (values > 0)]
             brightest = float(np.quantile(lit, _BRIGHTEST)) if lit.size else 1.0
             grey = map_coordinates(np.nan_to_num(values), voxel_index(points, affine), order=1)
-            axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **look)
+            axes.imshow(grey, cmap="gray", vmin=0, vmax=brightest, **style)
         if brain.tissues:
             groups, affine = brain.tissues
             index = voxel_index(points, affine)
             if not brain.image:
-                shown = map_coordinates(groups, index, order=0, mode="constant")
-                axes.imshow(shown, cmap=ListedColormap(TISSUE_COLOURS), vmin=-0.5, vmax=4.5, **look)
+                tissues = map_coordinates(groups, index, order=0, mode="constant")
+                axes.imshow(tissues, cmap=ListedColormap(TISSUE_COLOURS), vmin=-0.5, vmax=4.5, **style)
             inside = map_coordinates(np.isin(groups, (2, 3)).astype(np.float32), index, order=1)
             if (groups == 1).any() and inside.min() < 0.5 < inside.max():
                 grid = [np.linspace(*ends[axis], len(dots[axis])) for axis in (right, up)]
@@ -156,7 +156,7 @@ def _draw_planes(figure: SubFigure, brain: Brain) -> None:
         # all at one scale
         axes.set(xlim=ends[right], ylim=(sum(ends[up]) / 2 + np.array([-0.5, 0.5]) * tallest), aspect="equal")
         axes.set_axis_off()
-        axes.set_title(f"{plane}, {'xyz'[across]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2)
+        axes.set_title(f"{plane}, {'xyz'[normal]} = {at[plane]:.0f} mm", fontsize=6.5, pad=2)
         for x, end in zip((0.03, 0.97), "PA" if plane == "sagittal" else "LR", strict=True):
             axes.text(x, 0.5, end, transform=axes.transAxes, ha="center", va="center", fontsize=6.5, color=colour)
     coronal, left, bottom = panels[0], ends[0][0] + 1, ends[2][0] + 2
@@ -166,13 +166,13 @@ def _draw_planes(figure: SubFigure, brain: Brain) -> None:
     if brain.white is not None or brain.tissues:
         keys.append(Patch(color=INNER_COLOUR, label="inner border of the cortex"))
     if brain.tissues and not brain.image:
-        there = np.unique(brain.tissues[0])
-        keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUE_GROUPS.items() if code in there]
+        codes = np.unique(brain.tissues[0])
+        keys += [Patch(color=TISSUE_COLOURS[code], label=name) for code, name in TISSUE_GROUPS.items() if code in codes]
     figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=6, handlelength=1.0)
 
 
-def _draw_views(figure: SubFigure, brain: Brain, colours: Floats, names: Sequence[str]) -> list[Axes]:
-    """Draw a row of views at one scale; those of a hemisphere that is not there stay away."""
+def _draw_views(figure: SubFigure, brain: QualityBrain, colours: Floats, names: Sequence[str]) -> list[Axes]:
+    """Draw a row of views at one scale, without views of a missing hemisphere."""
     every = [half_extents(brain.pial, VIEWS[name]) for name in (*SHAPE_VIEWS, *OTHER_VIEWS)]
     wide, tall = 1.04 * np.max(every, axis=0)
     panels = list(figure.subplots(1, len(names)))
@@ -190,7 +190,7 @@ def _draw_views(figure: SubFigure, brain: Brain, colours: Floats, names: Sequenc
 
 
 def _facts(row: Mapping[str, Any]) -> dict[str, str]:
-    """Return what stands in the head of a brain's page, by name."""
+    """Return the facts at the top of a brain's page, by name."""
     sides = str(row["sides"]).split()
     both = " + ".join(f"{row[f'area_{side}_cm2']:.1f}" for side in sides)
     turned, thickness = row["rotation_deg"], row["mean_thickness_mm"]
@@ -217,19 +217,19 @@ def quality_row(
     warnings: Sequence[str],
     expected_ml: float,
 ) -> dict[str, Any]:
-    """Return the row of a brain whose surface was made; its verdict is "fine", or "look" where there are warnings.
+    """Return the row of a brain with a surface; its verdict is "needs review" if there are warnings, else "fine".
 
     Parameters
     ----------
     labels : subject, week, population, source, sides and page
-    report, thickness : what the surface stage and the thickness say, as in `surface.json` and `thickness.json`
-    expected_ml : the coarse volume of a cerebrum of the week; of one side alone half of it is expected
+    report, thickness : contents of `surface.json` and `thickness.json`
+    expected_ml : approximate volume of a cerebrum of the week; half of it is expected of a single hemisphere
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
     pose = pose_from(report["pose"])
     return {
         **labels,
-        "verdict": "look" if warnings else "fine",
+        "verdict": "needs review" if warnings else "fine",
         "cause": "",
         "warning_count": len(warnings),
         "warnings": " | ".join(warnings),
@@ -255,10 +255,10 @@ def quality_table(
 
     Parameters
     ----------
-    rows : what `quality_row` returns
-    refused : labels and cause of the brains that were refused
+    rows : outputs of `quality_row`
+    refused : labels and cause of refused brains
     """
     every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
     table = pd.DataFrame(every).set_index("subject", drop=False)
-    shown = [name for name in order if name in table.index]
-    return table.loc[shown, [*table.columns.drop("page"), "page"]].reset_index(drop=True)
+    ids = [name for name in order if name in table.index]
+    return table.loc[ids, [*table.columns.drop("page"), "page"]].reset_index(drop=True)

@@ -15,7 +15,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from ..geometry.triangles import Floats, TriangleMesh, corners, submesh, vertex_normals
 from .style import NEUTRAL_COLOUR
 
-# without a display VTK warns about X before it turns to its off-screen way
+# without a display VTK warns about X before it renders off-screen
 vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
 
 Vector = tuple[float, float, float]
@@ -24,15 +24,15 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class View:
-    """A side from which a brain in RAS+ mm is seen.
+    """A view of a brain in RAS+ mm.
 
     Attributes
     ----------
-    name : shown beside the picture
+    name : label of the picture
     towards : unit vector from the brain to the camera
     up : unit vector that points up in the picture
     ends : letters of the picture's left and right ends (A anterior, P posterior, L left, R right)
-    hemisphere : "left" or "right" where only that hemisphere is seen, else ""
+    hemisphere : "left" or "right" if only that hemisphere is shown, else ""
     """
 
     name: str
@@ -58,20 +58,20 @@ VIEWS = {
 """The views by name. In the top view the brain's left is on the picture's left."""
 
 PIXELS_PER_INCH = 600
-"""Resolution of pictures of surfaces: that of the PDF files, and three times that of PNG files."""
+"""Resolution of pictures of surfaces: as in PDF files, three times that of PNG files."""
 
 PARTS = {"YlGnBu": (0.0, 0.85), "YlOrRd": (0.08, 0.85), "RdBu_r": (0.06, 0.94)}
-"""Parts of colour maps that are used: their darkest ends could be taken for shade."""
+"""Used parts of colour maps: their darkest ends could be mistaken for shade."""
 UNKNOWN_COLOUR = "#B8B8B8"
 SAME_PLACE_MM = 0.5
-"""How near to a point what is seen first has to be, to be that point."""
+"""Maximum distance of the first hit of a ray from a visible point."""
 TISSUE = {"ambient": 0.16, "diffuse": 0.84, "specular": 0.1}
-"""The light on surfaces of one colour, whose shape is read from their shade: of any side, of the lamps, as gloss."""
+"""Light on surfaces of one colour, whose shading shows the shape."""
 MAP = {"ambient": 0.58, "diffuse": 0.42, "specular": 0.0}
-"""The light on maps, whose colours are read as values: shade may only hint at the shape."""
+"""Light on maps, whose colours show values: shading only hints at the shape."""
 
-# lamps fixed to the camera, as strong from the left as from the right: shade makes no difference between hemispheres.
-# The strongest stands above, so that shallow sulci of young brains are seen
+# lamps fixed to the camera, symmetric so that both hemispheres are shaded equally. The strongest is above, so that
+# shallow sulci of young brains are visible
 _LAMPS = (((0.0, 1.0, 0.8), 0.45), ((-1.0, 0.2, 0.5), 0.22), ((1.0, 0.2, 0.5), 0.22), ((0.0, 0.0, 1.0), 0.36))
 
 
@@ -82,7 +82,7 @@ def picture_axes(view: View) -> tuple[Floats, Floats]:
 
 
 def half_extents(mesh: TriangleMesh, view: View) -> tuple[float, float]:
-    """Return half the width and half the height in mm of the surface as seen."""
+    """Return half the width and half the height in mm of the surface in a view."""
     right, up = (np.ptp(mesh.vertices @ axis) / 2 for axis in picture_axes(view))
     return float(right), float(up)
 
@@ -108,7 +108,7 @@ def uniform_colours(mesh: TriangleMesh, colour: str) -> Floats:
 
 
 def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -> ScalarMappable:
-    """Return a colour scale; `cut` marks its upper end as passed by some values."""
+    """Return a colour scale; `cut` marks values above its upper end."""
     start, end = PARTS.get(colormap, (0.0, 1.0))
     shades = mpl.colormaps[colormap](np.linspace(start, end, 256))
     colours = LinearSegmentedColormap.from_list(colormap, [tuple(shade) for shade in shades])
@@ -117,22 +117,22 @@ def colour_scale(colormap: str, low: float, high: float, *, cut: bool = False) -
 
 
 def paint(values: Floats, scale: ScalarMappable) -> Floats:
-    """Return the (n, 3) colours of values, grey where they are not finite."""
+    """Return the (n, 3) colours of values, grey if not finite."""
     values = np.asarray(values, dtype=float)
     colours = np.asarray(scale.to_rgba(values))[:, :3]
     colours[~np.isfinite(values)] = to_rgb(UNKNOWN_COLOUR)
     return colours
 
 
-def sees(mesh: TriangleMesh, point: Floats, view: View) -> bool:
-    """Return whether a point of the surface is in front, seen from a side."""
-    away = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+def is_visible(mesh: TriangleMesh, point: Floats, view: View) -> bool:
+    """Return whether a point of the surface is visible in a view."""
+    far = 4 * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     towards = np.array(view.towards)
     right, up = picture_axes(view)
-    # a little aside, since rays through vertices may slip between the triangles around them
+    # slightly shifted: rays through vertices may pass between triangles
     point = point + 0.013 * right + 0.007 * up
-    hits, _ = body.ray_trace(origin=point + away * towards, end_point=point - 1e-3 * towards)
+    hits, _ = body.ray_trace(origin=point + far * towards, end_point=point - 1e-3 * towards)
     return bool(len(hits) == 0 or ((hits - point) @ towards).max() < SAME_PLACE_MM)
 
 
@@ -152,7 +152,7 @@ def render(
     ----------
     colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
     half_extents_mm : half the width and half the height of the picture
-    lines : (k, 2, 3) ends of lines that are drawn where the surface does not hide them
+    lines : (k, 2, 3) ends of lines, drawn unless the surface hides them
 
     Returns
     -------
@@ -176,7 +176,7 @@ def render(
             culling="back",
             **light,
         )
-        # the inside of a surface that is open where a connected brain is parted
+        # the inside of a surface that is open where the hemispheres were separated
         plotter.add_mesh(surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front")
         if lines is not None:
             ends = pv.line_segments_from_points(lines.reshape(-1, 3))
@@ -189,7 +189,7 @@ def render(
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = half_extents_mm[1]
         plotter.renderer.ResetCameraClippingRange()
-        # twice as fine as most print: smoother edges would cost more than they show
+        # at twice the resolution of print, smoother edges would not be visible
         plotter.disable_anti_aliasing()
         return np.array(plotter.screenshot(return_img=True))[..., :3]
     finally:

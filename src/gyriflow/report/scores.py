@@ -1,4 +1,4 @@
-"""Charts of what simulations are worth beside real brains: gain, horizon, onset of sulci, studies, calibrations."""
+"""Charts of simulations compared with observed brains: gain, horizon, onset of sulci, sweeps, calibrations."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -15,11 +15,11 @@ from matplotlib.ticker import MaxNLocator
 from ..errors import InputError
 from ..quantities import COMPARED_MAPS, VERTEX_MAPS
 from ..settings.terms import MEASURED, SIDES
-from .labels import SIMPLER_WAYS, parameter_label, plain, with_unit
+from .labels import SIMPLER_PREDICTIONS, parameter_label, plain, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
-    REAL_COLOUR,
+    OBSERVED_COLOUR,
     RUN_COLOURS,
     from_zero,
     new_figure,
@@ -33,10 +33,10 @@ from .style import (
 )
 
 ONE_WEEK = np.array([-0.25, 0.25])
-"""Ends in weeks of a line that stands for a single week."""
+"""Ends in weeks of a line for a single week."""
 ROW_IN = 0.22
 """Height of a sulcus's row."""
-SIDE_LOOKS = {"whole": ("o", RUN_COLOURS[0]), "left": ("<", RUN_COLOURS[0]), "right": (">", RUN_COLOURS[1])}
+SIDE_STYLES = {"whole": ("o", RUN_COLOURS[0]), "left": ("<", RUN_COLOURS[0]), "right": (">", RUN_COLOURS[1])}
 SIDE_NAMES = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
 _SIZES = ("area", "volume", "gyrification_index")
 
@@ -45,10 +45,10 @@ _SIZES = ("area", "volume", "gyrification_index")
 def validation_chart(
     validation: pd.DataFrame, ceiling: pd.DataFrame | None = None, *, runs: Sequence[str] = ()
 ) -> Figure:
-    """Draw by week how much better a run's curvature correlates with the real brain's than the scaled start's does.
+    """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
 
-    Bars are 95 % intervals of the bootstrap; filled marks explain the week, open ones predict it. The adjacent real
-    week, which skill is measured against, and the start carried by registration alone are drawn beside.
+    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Also drawn are the
+    observed brain of the adjacent week, the reference of skill, and the start carried by registration alone.
 
     Parameters
     ----------
@@ -66,18 +66,18 @@ def validation_chart(
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
         for _, rows in validation.groupby("start_week"):
             adjacent = (rows[f"r_adjacent_{measure}"] - rows[f"r_start_{measure}"]).groupby(rows["week"]).first()
-            axes.plot(adjacent.index, adjacent, "*", color=REAL_COLOUR, markersize=6)
+            axes.plot(adjacent.index, adjacent, "*", color=OBSERVED_COLOUR, markersize=6)
         for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
             gain = rows[f"gain_{measure}"]
             axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)
-            if len(rows) == 1:  # a line through one point cannot be seen
+            if len(rows) == 1:  # a line through one point is invisible
                 begin, end = rows["week"].iloc[0] + ONE_WEEK
                 axes.hlines(gain, begin, end, colors=MUTED_COLOUR, linestyles=":")
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
-    extra: list[Artist] = [star("real brain of the week before", markersize=6)]
+    extra: list[Artist] = [star("observed brain of the week before", markersize=6)]
     if ceiling is not None and len(ceiling):
         extra.append(Line2D([], [], color=MUTED_COLOUR, linestyle=":", label="registration alone"))
     run_legend(figure, colours, extra=extra)
@@ -85,31 +85,31 @@ def validation_chart(
 
 
 def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
-    """Draw a gain with its interval; full marks explain a week, open ones predict it."""
+    """Draw a gain with its interval; filled marks are explained weeks, open ones predicted."""
     gain = rows[f"gain_{measure}"]
-    away = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
-    axes.errorbar(x, gain, yerr=away.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
+    bars = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
+    axes.errorbar(x, gain, yerr=bars.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
     for kind, face in (("explained", colour), ("predicted", "white")):
-        if (chosen := rows["kind"] == kind).any():
-            axes.plot(x[chosen], gain[chosen], "o", color=colour, markerfacecolor=face)
+        if (selected := rows["kind"] == kind).any():
+            axes.plot(x[selected], gain[selected], "o", color=colour, markerfacecolor=face)
 
 
 @styled
 def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw correlation with and distance from the real brain by weeks after the start: a row of panels per start.
+    """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
 
-    Runs are full lines, simpler ways to predict the brain dashed ones.
+    Runs are solid lines, simpler predictions dashed.
 
     Parameters
     ----------
-    prediction : columns run, start, horizon, model (`run` or a simpler way), r_shape_index and distance_mm
+    prediction : columns run, start, horizon, model (`run` or a simpler prediction), r_shape_index and distance_mm
     """
-    columns = {"r_shape_index": "shape index, r with the real brain", "distance_mm": "distance from it (mm)"}
+    columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
     places = list(product(dict.fromkeys(prediction["start"]), columns))
     layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
     figure, panels = panel_figure(len(places), **layout)
     colours = run_colours(prediction["run"], runs)
-    # what is simpler is the same for all runs
+    # simpler predictions are the same for all runs
     lines = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
     shades = run_colours([*colours, *lines["line"]])
     ways = dict(zip([name for name in shades if name not in colours], reversed(shades.values()), strict=False))
@@ -123,7 +123,7 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
         axes.margins(x=0.1)
     from_zero(panels[1])
     extra = [
-        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_WAYS.get(way, plain(way)))
+        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_PREDICTIONS.get(way, plain(way)))
         for way, colour in ways.items()
     ]
     run_legend(figure, colours, extra=extra)
@@ -132,14 +132,13 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
 
 @styled
 def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw a row for each sulcus that the real brains do not have at the start, with the weeks in which it begins.
+    """Draw a row for each sulcus that observed brains do not have at the start, with the weeks in which it begins.
 
-    A cross at the right edge says that it never begins. Sulci are those of a start brain; where there are several,
-    their names have its name behind.
+    A cross at the right edge means never. If there are several start brains, their names follow those of the sulci.
 
     Parameters
     ----------
-    onset : columns run ("real" for the real brains), subject, region, there_at_start, onset_week
+    onset : columns run ("real" for observed brains), subject, region, there_at_start, onset_week
     """
     several = len(onset["subject"].unique()) > 1
     table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
@@ -156,9 +155,9 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     axes = figure.subplots()
     colours = run_colours(onset["run"], runs)
     beyond = np.ceil(weeks.max() + 0.5)
-    for number, (run, colour) in enumerate({MEASURED: REAL_COLOUR, **colours}.items()):
+    for number, (run, colour) in enumerate({MEASURED: OBSERVED_COLOUR, **colours}.items()):
         rows = drawn[drawn["run"] == run].drop_duplicates("row")
-        # runs beside each other, the real brains in the middle
+        # runs side by side, the observed brains in the middle
         shift = 0 if run == MEASURED else 0.5 * ((number - 0.5) / len(colours) - 0.5)
         heights = rows["row"].map(places) + shift
         begins = rows["onset_week"].notna()
@@ -171,7 +170,7 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     whole = np.arange(np.ceil(weeks.min()), beyond)
     axes.set_xticks([*whole, beyond], [*(f"{week:g}" for week in whole), "never"])
     axes.grid(visible=True, axis="both")
-    run_legend(figure, colours, measured="real brains")
+    run_legend(figure, colours, observed_name="observed brains")
     return figure
 
 
@@ -181,33 +180,33 @@ def nearest_chart(
     *,
     varied: str,
     subject: str,
-    real: Sequence[str],
+    observed: Sequence[str],
     week: float,
     published: Mapping[str, Any] | None = None,
 ) -> Figure:
-    """Draw by each measure how far the members of a study are from the measured brain, over the varied parameter.
+    """Draw the distance of the runs of a sweep from the observed brain, over the varied parameter: a panel per measure.
 
-    Each measure has its panel, with the whole brain or both hemispheres; the nearest member is filled and named.
+    Panels show the whole brain or both hemispheres; the nearest run has a ring and its value.
 
     Parameters
     ----------
     comparison
         Columns subject, real, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
-        parameter. Where the flag or the resolution is not "ok", a distance is not to be trusted: its mark is open.
+        parameter. If the flag or the resolution is not "ok", a distance is not reliable and its mark is open.
     varied : name of the column with the parameter's values
-    subject, real : the start brain, and the measured brains that it is compared with
+    subject, observed : the start brain, and the observed brains that it is compared with
     week : of the comparison
     published
-        Its rows `nearest` have parameter, week, measure, and the value found nearest, which is drawn as a dashed line.
+        Rows `nearest` have parameter, week, measure, and the nearest value, drawn as a dashed line.
 
     Raises
     ------
     InputError
-        If no distance is known.
+        If there is no distance.
     """
-    rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(real)].dropna(subset="distance")
+    rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(observed)].dropna(subset="distance")
     if rows.empty:
-        raise InputError("no distance to a measured brain is known", found=f"{len(comparison)} rows")
+        raise InputError("no distance to an observed brain", found=f"{len(comparison)} rows")
     rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))
     lines = {
         row["measure"]: row["value"]
@@ -222,20 +221,20 @@ def nearest_chart(
         sides = ["whole"] if (here["hemisphere"] == "whole").any() else list(SIDES)
         drawn |= set(sides)
         for side in sides:
-            _nearest_line(axes, here[here["hemisphere"] == side].sort_values("at"), *SIDE_LOOKS[side])
+            _nearest_line(axes, here[here["hemisphere"] == side].sort_values("at"), *SIDE_STYLES[side])
         axes.margins(y=0.25)
-        # bands cut at Weyl's number are the same measure
+        # a band cut at Weyl's number is the same measure
         if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
             axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
-        # distances of sizes are parts of the real brain's
-        unit = "share of the real" if measure in _SIZES else here["unit"].iloc[0]
+        # distances of sizes are relative to the observed brain
+        unit = "share of the observed" if measure in _SIZES else here["unit"].iloc[0]
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:
-            axes.set_ylabel("distance from the real brain")
+            axes.set_ylabel("distance from the observed brain")
     handles: list[Artist] = [
         Line2D([], [], color=colour, marker=marker, markersize=4.5, label=SIDE_NAMES[side])
-        for side, (marker, colour) in SIDE_LOOKS.items()
+        for side, (marker, colour) in SIDE_STYLES.items()
         if side in drawn
     ]
     ring: dict[str, Any] = {"color": MUTED_COLOUR, "linestyle": "none", "marker": "o"}
@@ -254,8 +253,8 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
         return
     axes.plot(rows["at"], rows["distance"], color=colour, linewidth=1.0)
     for trusted, part in rows.groupby("trusted"):
-        look: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": 4.5}
-        axes.plot(part["at"], part["distance"], marker, color=colour, **look)
+        style: dict[str, Any] = {"markerfacecolor": colour if trusted else "white", "markersize": 4.5}
+        axes.plot(part["at"], part["distance"], marker, color=colour, **style)
     sound = rows[rows["trusted"]]
     best = (sound if len(sound) else rows).sort_values("distance").iloc[0]
     place = best["at"], best["distance"]
@@ -272,7 +271,7 @@ def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Seque
     ----------
     runs : columns of the parameters, round, score (NaN: diverged)
     optimum : columns parameter, value
-    score : what the score is the sum of
+    score : terms of the score
     """
     figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]
@@ -282,8 +281,8 @@ def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Seque
         axes.axvline(value, color=RUN_COLOURS[1], linestyle="--", label="optimum")
         for number, shade in shades.items():
             rows = finished[finished["round"] == number]
-            look: dict[str, Any] = {"color": str(shade), "markeredgecolor": "black", "markeredgewidth": 0.4}
-            axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **look)
+            style: dict[str, Any] = {"color": str(shade), "markeredgecolor": "black", "markeredgewidth": 0.4}
+            axes.plot(rows[name], rows["score"], "o", label=f"round {number}", **style)
         if len(diverged):
             top = np.full(len(diverged), float(finished["score"].max()))
             axes.plot(diverged[name], top, "x", color=MUTED_COLOUR, label="diverged")

@@ -1,4 +1,4 @@
-"""The look that all figures share: sizes for print, fonts, colour-blind-safe colours, headings."""
+"""The style of all figures: sizes for print, fonts, colour-blind-safe colours, headings."""
 
 import math
 import textwrap
@@ -22,16 +22,16 @@ FULL_WIDTH_IN = 7.2
 """Width of a journal page, in inches."""
 
 RUN_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
-"""Okabe and Ito's colour-blind-safe colours, without black (measured brains) and yellow (too pale on white)."""
-REAL_COLOUR = "#000000"
+"""Okabe and Ito's colour-blind-safe colours, without black (observed brains) and yellow (too pale on white)."""
+OBSERVED_COLOUR = "#000000"
 MUTED_COLOUR = "#767676"
 RIGHT_COLOUR = "#E0B400"
-"""The right hemisphere and what it touches: the paper's yellow, dark enough for lines on white."""
+"""The right hemisphere and its contact: the paper's yellow, dark enough for lines on white."""
 SIMULATED_SURFACE_COLOUR = "#8FB4DC"
-REAL_SURFACE_COLOUR = "#EBD6B4"
+OBSERVED_SURFACE_COLOUR = "#EBD6B4"
 
 NEUTRAL_COLOUR = "#D9D9D9"
-"""Tissue without a value: outside, not measured, or exactly zero where only what is above counts."""
+"""Tissue without a value."""
 
 MATPLOTLIB_SETTINGS: dict[Any, Any] = {
     "font.size": 8.0,
@@ -53,7 +53,7 @@ MATPLOTLIB_SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.linewidth": 1.3,
     "lines.markersize": 4.0,
-    # pale lines behind the data
+    # pale grid
     "axes.grid": True,
     "axes.grid.axis": "y",
     "grid.color": "#E2E2E2",
@@ -62,24 +62,24 @@ MATPLOTLIB_SETTINGS: dict[Any, Any] = {
 
 
 styled = mpl.rc_context(MATPLOTLIB_SETTINGS)
-"""Makes a function draw its figure in the project's style; the settings outside stay as they are."""
+"""Decorator: draw a figure in the project's style, without changing global settings."""
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure, whose parts are laid out so that they do not overlap."""
+    """Return an empty figure with constrained layout."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def panel_figure(
     count: int, *, per_row: int = 3, panel_in: float = 1.9, foot_in: float = 0.7, **grid: Any
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with so many panels, row after row, and the panels, with their letters.
+    """Return a figure and its panels, row by row, with letters.
 
     Parameters
     ----------
     per_row : panels of a full row, which is as wide as a page
-    panel_in, foot_in : height of a row, and what is left for the legend, in inches
-    grid : what else `Figure.subplots` takes
+    panel_in, foot_in : height of a row and of the legend, in inches
+    grid : further arguments of `Figure.subplots`
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
@@ -92,22 +92,22 @@ def panel_figure(
 
 
 def add_letters(panels: Iterable[Axes]) -> None:
-    """Write a, b, c … at the upper left of panels, by which a caption calls them; nothing for a single panel."""
+    """Write a, b, c … at the upper left of panels, for the caption; nothing for a single panel."""
     panels = list(panels)
     if len(panels) > 1:
         for axes, letter in zip(panels, ascii_lowercase, strict=False):
-            # beside the title, which may be as wide as the panel
+            # left of the title, which may be as wide as the panel
             place: dict[str, Any] = {"xytext": (-12, 4), "xycoords": "axes fraction", "textcoords": "offset points"}
             axes.annotate(letter, (0.0, 1.0), ha="right", va="bottom", fontweight="bold", fontsize=9, **place)
 
 
 def wrap(text: str, letters: int) -> str:
-    """Return text with each of its lines broken between words so that it has about so many letters at most."""
+    """Return text with lines broken between words to at most about so many letters."""
     return "\n".join(textwrap.fill(line, letters, break_long_words=False) for line in text.split("\n"))
 
 
 def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table with columns run and subject in which simulated brains go by the names of `run_names`."""
+    """Return a table with columns run and subject, with simulations named by `run_names`."""
     pairs = list(zip(table["run"], table["subject"], strict=True))
     simulated = [pair for pair in dict.fromkeys(pairs) if pair[0] != MEASURED]
     names = dict(zip(simulated, run_names(simulated), strict=True))
@@ -115,17 +115,17 @@ def runs_by_name(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def run_colours(present: Iterable[str], runs: Sequence[str] = ()) -> dict[str, Any]:
-    """Return a colour for each simulated run that is present: distinct ones, or a sequential scale for a long list.
+    """Return a colour for each simulated run that is present: distinct ones, or a sequential scale for many runs.
 
-    Figures of a study give all of its `runs`, in the same order: so a run keeps its colour from figure to figure.
+    Figures of a study pass all of its `runs` in the same order, so that a run has the same colour in all figures.
     """
-    shown = set(present := list(present))
+    drawn = set(present := list(present))
     names = [name for name in dict.fromkeys([*runs, *present]) if name != MEASURED]
     colours: dict[str, Any] = dict(zip(names, RUN_COLOURS, strict=False))
     if len(names) > len(RUN_COLOURS):
         scale = mpl.colormaps["viridis"]
         colours = {name: scale(0.92 * i / (len(names) - 1)) for i, name in enumerate(names)}
-    return {run: colour for run, colour in colours.items() if run in shown}
+    return {run: colour for run, colour in colours.items() if run in drawn}
 
 
 def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
@@ -133,38 +133,38 @@ def week_axis(axes: Axes, weeks: Iterable[float]) -> None:
     values = list(weeks)
     axes.set_xlabel("gestational age (GW)")
     axes.xaxis.set_major_locator(mpl.ticker.MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10], min_n_ticks=1))
-    # a single week stands in the middle of one
+    # a single week is in the middle of the axis
     margin = max(0.04 * (max(values) - min(values)), (1.08 - max(values) + min(values)) / 2)
     axes.set_xlim(min(values) - margin, max(values) + margin)
 
 
 def from_zero(axes: Axes) -> None:
-    """Make the vertical axis begin at zero and end a little above the data of all panels that share it."""
+    """Start the vertical axis at zero and end it slightly above the data of all panels that share it."""
     tops = [panel.dataLim.ymax for panel in axes.get_shared_y_axes().get_siblings(axes)]
     # panels without data have an infinite top
     top = max((top for top in tops if math.isfinite(top)), default=0.0)
     axes.set_ylim(0, 1.07 * top if top > 0 else 1.0)
 
 
-def star(label: str, colour: str = REAL_COLOUR, **look: Any) -> Line2D:
-    """Return the entry of a legend for measured brains."""
+def star(label: str, colour: str = OBSERVED_COLOUR, **style: Any) -> Line2D:
+    """Return the legend entry of observed brains."""
     usual: dict[str, Any] = {"marker": "*", "markersize": 7, "linestyle": "none"}
-    return Line2D([], [], color=colour, label=label, **{**usual, **look})
+    return Line2D([], [], color=colour, label=label, **{**usual, **style})
 
 
 def run_legend(
     figure: Figure,
     colours: Mapping[str, Any],
     *,
-    measured: str = "",
+    observed_name: str = "",
     bars: bool = False,
     markers: Mapping[str, str] | None = None,
     extra: Sequence[Artist] = (),
 ) -> None:
-    """Draw below the panels a legend of runs, of measured brains where they have a name, of subjects, and what else.
+    """Draw a legend below the panels: runs, observed brains if named, subjects, and `extra` entries.
 
-    Runs are keyed as they are drawn, as lines or as `bars`. The legend has as many columns as its longest label allows,
-    and the figure grows by its lines.
+    Runs have lines or `bars`. The legend has as many columns as its longest label allows, and the figure grows by its
+    rows.
 
     Parameters
     ----------
@@ -175,8 +175,8 @@ def run_legend(
         Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)
         for run, colour in colours.items()
     ]
-    if measured:
-        handles.append(star(measured))
+    if observed_name:
+        handles.append(star(observed_name))
     handles += [star(subject, marker=marker, markersize=5) for subject, marker in (markers or {}).items()]
     handles.extend(extra)
     # a letter of the legend is about 0.065 in wide, the line before it and the gap behind 0.5 in

@@ -15,13 +15,13 @@ from ..geometry.triangles import Floats, TriangleMesh
 from ..quantities import VERTEX_MAPS
 from .labels import map_title
 from .pictures import Halves, scale_of, whole_maps
-from .style import REAL_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
+from .style import OBSERVED_SURFACE_COLOUR, SIMULATED_SURFACE_COLOUR
 
 BUDGET_BYTES = 12_000_000
-"""What the surfaces may take in the page."""
-MOST_VERTICES = 8000
-"""Vertices of a surface in the view; more would not be seen."""
-FEWEST_VERTICES = 500
+"""Maximum size of the surfaces in the page."""
+MAX_VERTICES = 8000
+"""Vertices of a surface in the view; more would not be visible."""
+MIN_VERTICES = 500
 
 _POSITION_LEVELS, _VALUE_LEVELS, _UNKNOWN = 65535, 254, 255
 _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
@@ -29,34 +29,34 @@ _DRAWN = [name for name, record in VERTEX_MAPS.items() if record.colours]
 _LETTERS_PER_BYTE, _BYTES_PER_FRAME, _BYTES_PER_TRIANGULATION = 4 / 3, 6 + len(_DRAWN), 12
 
 Timed = tuple[float, TriangleMesh, dict[str, Floats]]
-"""A week, a surface in RAS+ mm and its maps by name; NaN where a value is not known."""
+"""A week, a surface in RAS+ mm and its maps by name; NaN for unknown values."""
 
 
 def surfaces_view(
     runs: Mapping[str, Sequence[tuple[float, Halves]]],
-    real: Sequence[tuple[float, Halves]],
+    observed: Sequence[tuple[float, Halves]],
     *,
-    measured: str,
+    observed_name: str,
 ) -> dict[str, Any]:
-    """Return the surfaces, thinned out to fit the budget, with their maps and colour scales, ready for JSON.
+    """Return the surfaces, decimated to fit the budget, with their maps and colour scales, for JSON.
 
-    A run's surfaces share their triangles, so that the view can move smoothly from week to week, and have the map of
-    the distance that each vertex has moved since the first one; measured brains have their own triangles each week.
-    Positions are in steps of 1/65535 of the box around all surfaces, values of maps in 254 steps of their scale.
+    A run's surfaces share their triangles, so that the view can interpolate between weeks, and have a map of the
+    displacement since the first week. Observed brains have their own triangles each week. Positions are in steps of
+    1/65535 of the box around all surfaces, values of maps in 254 steps of their scale.
 
     Parameters
     ----------
     runs : {run: (week, hemispheres) by week, with the same vertices}
-        InputError where their vertices differ in number.
-    real : (week, hemispheres) of the measured brains by week
+        InputError if their numbers of vertices differ.
+    observed : (week, hemispheres) of the observed brains by week
     """
     simulated = {name: _with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
-    others = [_timed(*frame) for frame in real]
-    everything = [frame for frames in simulated.values() for frame in frames] + others
+    observed_frames = [_timed(*frame) for frame in observed]
+    everything = [frame for frames in simulated.values() for frame in frames] + observed_frames
     if not everything:
         return {"groups": [], "maps": []}
-    bytes_per_vertex = len(everything) * _BYTES_PER_FRAME + (len(runs) + len(real)) * _BYTES_PER_TRIANGULATION
-    vertices = int(np.clip(BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex, FEWEST_VERTICES, MOST_VERTICES))
+    bytes_per_vertex = len(everything) * _BYTES_PER_FRAME + (len(runs) + len(observed)) * _BYTES_PER_TRIANGULATION
+    vertices = int(np.clip(BUDGET_BYTES / _LETTERS_PER_BYTE / bytes_per_vertex, MIN_VERTICES, MAX_VERTICES))
     low = np.min([mesh.vertices.min(axis=0) for _, mesh, _ in everything], axis=0)
     high = np.max([mesh.vertices.max(axis=0) for _, mesh, _ in everything], axis=0)
     box = low, float((high - low).max())
@@ -67,15 +67,15 @@ def surfaces_view(
             scales[name] = scale_of(name, every[np.isfinite(every)])
     groups: list[dict[str, Any]] = []
     for run, frames in simulated.items():
-        kept, faces = thin_out(frames[-1][1], vertices)
-        look = {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _text(faces, "<u2")}
-        groups.append(look | {"frames": [_frame(frame, kept, box, scales) for frame in frames]})
-    if others:
-        shown = []
-        for frame in others:
-            kept, faces = thin_out(frame[1], vertices)
-            shown.append(_frame(frame, kept, box, scales) | {"faces": _text(faces, "<u2")})
-        groups.append({"name": measured, "kind": "real", "colour": REAL_SURFACE_COLOUR, "frames": shown})
+        vertices_kept, faces = thin_out(frames[-1][1], vertices)
+        style = {"name": run, "kind": "simulated", "colour": SIMULATED_SURFACE_COLOUR, "faces": _text(faces, "<u2")}
+        groups.append(style | {"frames": [_frame(frame, vertices_kept, box, scales) for frame in frames]})
+    if observed_frames:
+        drawn = []
+        for frame in observed_frames:
+            vertices_kept, faces = thin_out(frame[1], vertices)
+            drawn.append(_frame(frame, vertices_kept, box, scales) | {"faces": _text(faces, "<u2")})
+        groups.append({"name": observed_name, "kind": "real", "colour": OBSERVED_SURFACE_COLOUR, "frames": drawn})
     maps = []
     for name, scale in scales.items():
         bottom, top = scale.get_clim()
@@ -96,36 +96,36 @@ def _with_displacement(frames: Sequence[Timed]) -> list[Timed]:
     for week, mesh, maps in frames:
         if mesh.vertices.shape != start.shape:
             count = f"{len(mesh.vertices)} vertices at {week:g} GW"
-            raise InputError("a run's surfaces differ in their vertices", found=count, expected=f"{len(start)}")
+            raise InputError("the surfaces of a run differ in size", found=count, expected=f"{len(start)} vertices")
         maps["displacement_mm"] = np.linalg.norm(mesh.vertices - start, axis=1)
     return list(frames)
 
 
 def thin_out(mesh: TriangleMesh, vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return which vertices are kept, about so many, and the (m, 3) triangles between them, as places among these.
+    """Return the indices of about so many vertices to keep, and the (m, 3) triangles between them.
 
-    Edges are collapsed onto vertices that there are (Schroeder, Zarge & Lorensen 1992), so that maps and the positions
-    of other weeks are those of the kept vertices.
+    Edges are collapsed onto existing vertices (Schroeder, Zarge & Lorensen 1992), so that maps and positions of other
+    weeks can be indexed by the kept vertices.
     """
     if len(mesh.vertices) <= vertices:
         return np.arange(len(mesh.vertices)), np.asarray(mesh.faces, dtype=np.int64)
     body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
     coarse = body.decimate_pro(1 - vertices / len(mesh.vertices), preserve_topology=True)
-    _, kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
-    return kept, np.asarray(coarse.regular_faces, dtype=np.int64)
+    _, vertices_kept = cKDTree(mesh.vertices).query(np.asarray(coarse.points, dtype=float))
+    return vertices_kept, np.asarray(coarse.regular_faces, dtype=np.int64)
 
 
 def _frame(
-    frame: Timed, kept: NDArray[np.int64], box: tuple[Floats, float], scales: Mapping[str, ScalarMappable]
+    frame: Timed, vertices_kept: NDArray[np.int64], box: tuple[Floats, float], scales: Mapping[str, ScalarMappable]
 ) -> dict[str, Any]:
     (week, mesh, maps), (low, size) = frame, box
     values = {}
-    for name, of_vertices in maps.items():
+    for name, vertex_values in maps.items():
         bottom, top = scales[name].get_clim()
-        shares = (np.asarray(of_vertices, dtype=float)[kept] - bottom) / (top - bottom)
+        shares = (np.asarray(vertex_values, dtype=float)[vertices_kept] - bottom) / (top - bottom)
         levels = np.clip(np.round(shares * _VALUE_LEVELS), 0, _VALUE_LEVELS)
         values[name] = _text(np.where(np.isfinite(shares), levels, _UNKNOWN), "u1")
-    places = np.round((mesh.vertices[kept] - low) / size * _POSITION_LEVELS)
+    places = np.round((mesh.vertices[vertices_kept] - low) / size * _POSITION_LEVELS)
     return {"week": week, "positions": _text(places, "<u2"), "values": values}
 
 

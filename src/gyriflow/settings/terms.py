@@ -58,9 +58,9 @@ MAX_NAME_LENGTH = 100
 """Longest name of a brain, run or study; file names are limited to 255 bytes."""
 
 MEASURED = "real"
-"""The run of measured brains in tables."""
-REAL_BRAIN = "real brain"
-"""What a measured brain is called in figures where its population is not named."""
+"""The run of observed brains in tables."""
+OBSERVED_BRAIN = "observed brain"
+"""Name of an observed brain of unknown population in figures."""
 
 NO_REGION = 0
 """The label of vertices without a region."""

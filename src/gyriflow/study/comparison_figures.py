@@ -5,7 +5,7 @@ from typing import Any
 
 from .paths import CALIBRATION, DEVIATION, PUBLISHED, RUN, STUDY
 from .records import Brain, Measurement, Simulation, Sweep
-from .registry import AROUND, Figure, Kind, halves_of, measured_by_week, measured_name, surfaces_by_week
+from .registry import AROUND, Figure, Kind, halves_of, observed_by_week, observed_name, surfaces_by_week
 from .study import Study
 
 RUN_FIGURES, STUDY_FIGURES, SWEEP_FIGURES = f"{RUN}/figures", f"{STUDY}/figures", f"{STUDY}/{{study}}/figures"
@@ -112,16 +112,16 @@ def _deviations(simulation: Simulation) -> dict[float, list[str]]:
 
 
 def expected_figure(simulation: Simulation) -> Figure:
-    surfaces, real, deviations = surfaces_by_week(simulation), measured_by_week(simulation), _deviations(simulation)
+    surfaces, observed, deviations = surfaces_by_week(simulation), observed_by_week(simulation), _deviations(simulation)
     # the last week, and others at equal steps
     weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
     shown = {min(surfaces), *weeks}
     inputs: Given = {
         "runs": {"expected": {week: surface for week, surface in surfaces.items() if week in shown}},
-        "real": {week: brain.pial for week, brain in real.items() if week in shown},
+        "observed": {week: brain.pial for week, brain in observed.items() if week in shown},
         "deviations": {week: deviations[week] for week in weeks},
     }
-    return Figure(EXPECTED, inputs, {"measured": measured_name(real.values())}, simulation.names)
+    return Figure(EXPECTED, inputs, {"observed_name": observed_name(observed.values())}, simulation.names)
 
 
 DEVIATION_MAPS = Kind(
@@ -190,7 +190,7 @@ def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Given, **options: Any) -> Fi
     start = _start(sweep)
     values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
     may_end = tuple((run, start.id, sweep.week) for run in inputs["members"])
-    shown = {"values": values, "measured": measured_name(sweep.observed[start.id][:1]), **options}
+    shown = {"values": values, "observed_name": observed_name(sweep.observed[start.id][:1]), **options}
     return Figure(kind, inputs, shown, _sweep_names(sweep), may_end)
 
 
@@ -214,10 +214,10 @@ INFLUENCE = Kind(
 
 
 def influence_figure(sweep: Sweep) -> Figure:
-    real = sweep.observed[_start(sweep).id]
+    observed = sweep.observed[_start(sweep).id]
     inputs: Given = {
         "members": {run: halves_of(row) for run, row in _members(sweep).items()},
-        "real": halves_of(real[0].measurement) if real else None,
+        "observed": halves_of(observed[0].measurement) if observed else None,
     }
     return _sweep_figure(INFLUENCE, sweep, inputs)
 
@@ -241,7 +241,7 @@ INFLUENCE_SPECTRA = Kind(
 def influence_spectra(sweep: Sweep) -> Figure:
     inputs: Given = {
         "members": {run: f"{row.folder}/spectra.csv" for run, row in _members(sweep).items()},
-        "real": [f"{brain.measurement.folder}/spectra.csv" for brain in sweep.observed[_start(sweep).id][:1]],
+        "observed": [f"{brain.measurement.folder}/spectra.csv" for brain in sweep.observed[_start(sweep).id][:1]],
     }
     return _sweep_figure(INFLUENCE_SPECTRA, sweep, inputs, week=sweep.week)
 
@@ -266,7 +266,7 @@ PAPER_NEAREST = Kind(
 
 def nearest_figure(kind: Kind, sweep: Sweep, **inputs: str) -> Figure:
     start, (varied,) = _start(sweep), sweep.members[0][1]
-    real = [brain.id for brain in sweep.observed[start.id][:1]]
-    options = {"varied": varied, "subject": start.id, "real": real, "week": sweep.week}
+    observed = [brain.id for brain in sweep.observed[start.id][:1]]
+    options = {"varied": varied, "subject": start.id, "observed": observed, "week": sweep.week}
     inputs["comparison"] = f"{STUDY}/{sweep.name}/comparison.csv"
     return Figure(kind, inputs, options, _sweep_names(sweep))

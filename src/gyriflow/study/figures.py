@@ -12,8 +12,8 @@ from .registry import (
     Figure,
     Kind,
     halves_of,
-    measured_by_week,
-    measured_name,
+    observed_by_week,
+    observed_name,
     regions_of,
     surfaces_by_week,
 )
@@ -95,8 +95,8 @@ INPUTS = Kind("inputs_figure", f"{STUDY_FIGURES}/inputs.png", "pictures:runs_by_
 def inputs_figure(study: Study) -> Figure:
     """Return the picture of the first and the last brain of a study."""
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
-    inputs: Given = {"runs": {}, "real": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
-    return Figure(INPUTS, inputs, {"views": THREE_SIDES, "measured": ""})
+    inputs: Given = {"runs": {}, "observed": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
+    return Figure(INPUTS, inputs, {"views": THREE_SIDES, "observed_name": ""})
 
 
 MESH_QUALITY = Kind(
@@ -156,7 +156,7 @@ def growth_figure(study: Study) -> Figure:
         rate = None
     elif grown and not isinstance(rate, float):
         rate = dict(rate.weeks or {}) if rate.map is None else None
-    options = {"measured": measured_name(brain for _, brain in study.growth_brains), "folding_rate_per_s": rate}
+    options = {"observed_name": observed_name(brain for _, brain in study.growth_brains), "folding_rate_per_s": rate}
     return Figure(GROWTH_RATES, GROWTH, options)
 
 
@@ -204,8 +204,8 @@ def predicted_figure(simulation: Simulation, atlas_brain: Brain) -> Figure:
     start, predicted = simulation.start, f"predicted\n{simulation.weeks[-1]:g} GW"
     brains = {f"start\n{start.week:g} GW": start.pial, predicted: simulation.measurements[-1].parts["whole"]}
     brains[f"atlas' own brain\n{atlas_brain.week:g} GW"] = atlas_brain.pial
-    options: Given = {"views": THREE_SIDES, "measured": "", "predicted": predicted}
-    return Figure(PREDICTED, {"runs": {}, "real": brains}, options, simulation.names)
+    options: Given = {"views": THREE_SIDES, "observed_name": "", "predicted": predicted}
+    return Figure(PREDICTED, {"runs": {}, "observed": brains}, options, simulation.names)
 
 
 WEEKLY = Kind(
@@ -225,12 +225,12 @@ WEEKLY = Kind(
 
 
 def weekly_figure(start: Brain, simulations: list[Simulation]) -> Figure:
-    real = measured_by_week(*simulations)
+    observed = observed_by_week(*simulations)
     inputs: Given = {
         "runs": {simulation.run: surfaces_by_week(simulation) for simulation in simulations},
-        "real": {week: brain.pial for week, brain in real.items()},
+        "observed": {week: brain.pial for week, brain in observed.items()},
     }
-    return Figure(WEEKLY, inputs, {"measured": measured_name(real.values())}, {"brain": start.id})
+    return Figure(WEEKLY, inputs, {"observed_name": observed_name(observed.values())}, {"brain": start.id})
 
 
 OUTLINES = Kind(
@@ -249,12 +249,12 @@ OUTLINES = Kind(
 
 
 def outlines_figure(start: Brain, simulations: list[Simulation]) -> Figure:
-    real = measured_by_week(*simulations)
-    inputs: Given = {"real": {week: brain.pial for week, brain in real.items()}, "runs": {}}
+    observed = observed_by_week(*simulations)
+    inputs: Given = {"observed": {week: brain.pial for week, brain in observed.items()}, "runs": {}}
     for simulation in simulations:
         surfaces = surfaces_by_week(simulation)
-        inputs["runs"][simulation.run] = {week: surfaces[week] for week in measured_by_week(simulation)}
-    return Figure(OUTLINES, inputs, {"measured": measured_name(real.values())}, {"brain": start.id})
+        inputs["runs"][simulation.run] = {week: surfaces[week] for week in observed_by_week(simulation)}
+    return Figure(OUTLINES, inputs, {"observed_name": observed_name(observed.values())}, {"brain": start.id})
 
 
 DISPLACEMENT_MAPS = Kind(
@@ -292,11 +292,11 @@ SHAPE_MAPS = Kind(
 
 
 def shape_maps(start: Brain, simulations: list[Simulation]) -> Figure:
-    real = measured_by_week(*simulations)
+    observed = observed_by_week(*simulations)
     brains = {
         simulation.run: {row.week: halves_of(row) for row in simulation.measurements} for simulation in simulations
     }
-    brains[measured_name(real.values())] = {week: halves_of(brain.measurement) for week, brain in real.items()}
+    brains[observed_name(observed.values())] = {week: halves_of(brain.measurement) for week, brain in observed.items()}
     return Figure(SHAPE_MAPS, {"brains": brains}, {"quantity": "shape_index"}, {"brain": start.id})
 
 
@@ -356,7 +356,7 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
     options = _chart_options(study)
     yield Figure(METRICS, metrics, options)
     if study.run_simulations:
-        yield Figure(METRICS_TABLE, metrics, {"measured": measured_name(study.brains.values())})
+        yield Figure(METRICS_TABLE, metrics, {"observed_name": observed_name(study.brains.values())})
     yield Figure(SPECTRA, spectra, options)
     reference = study.norm_reference
     if len({study.brains[brain].subject for brain in reference}) >= MIN_NORM_SUBJECTS:
@@ -368,7 +368,7 @@ def _chart_options(study: Study) -> Given:
     brains, groups = study.brains.values(), _groups(study)
     return {
         "runs": run_names(study.pairs),
-        "measured": measured_name([brain for brain in brains if brain.id not in groups] or brains),
+        "observed_name": observed_name([brain for brain in brains if brain.id not in groups] or brains),
         "subjects": {brain.id: brain.subject for brain in brains if brain.config.subject is not None},
         "groups": groups,
     }
@@ -446,7 +446,7 @@ def norms_figure(study: Study, options: Given) -> Figure:
     reference = [study.brains[brain] for brain in study.norm_reference]
     tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
     comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]
-    shown = {"measured": measured_name(reference), "reference": study.norm_reference, "brains": comparable}
+    shown = {"observed_name": observed_name(reference), "reference": study.norm_reference, "brains": comparable}
     return Figure(NORMS, tables, options | shown)
 
 
@@ -455,7 +455,7 @@ def _region_figures(study: Study) -> Iterator[Figure]:
     if not brains:
         return
     tables = {"regions": f"{STUDY}/regions.csv", "asymmetry": f"{STUDY}/asymmetry.csv"}
-    yield Figure(REGIONS_CHART, tables, {"measured": measured_name(brains)})
+    yield Figure(REGIONS_CHART, tables, {"observed_name": observed_name(brains)})
     simulated = {
         f"{name}, {simulation.weeks[-1]:g} GW": simulation.measurements[-1]
         for simulation, name in zip(study.run_simulations, run_names(study.pairs), strict=True)

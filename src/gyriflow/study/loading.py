@@ -19,7 +19,7 @@ from .checks import problems_between
 from .participants import participants_brains
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
-OF_FOLDING = ("start", "folding", "runs", "studies", "calibrate")
+FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
 """Sections of which a study has none that only measures."""
 
 
@@ -44,7 +44,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     """
     folder = Path(base_dir)
     plain = _plain(raw)
-    if any(plain.get(section) is not None for section in OF_FOLDING):
+    if any(plain.get(section) is not None for section in FOLDING_SECTIONS):
         plain = _with_presets({"folding": {}} | plain)
     atlases, problems = _atlases(plain.get("atlas"), folder)
     # None tells the checks that not all ids of brains are known

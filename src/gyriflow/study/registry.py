@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..settings.terms import REAL_BRAIN
+from ..settings.terms import OBSERVED_BRAIN
 from .records import Brain, Measurement, Simulation
 
 AROUND = ["left", "right", "top", "bottom"]
@@ -109,7 +109,7 @@ def files_in(inputs: Any) -> list[str]:
     return list(dict.fromkeys(file for item in items for file in files_in(item)))
 
 
-def asked_for(figures: Iterable[Figure], *targets: str) -> list[str]:
+def target_files(figures: Iterable[Figure], *targets: str) -> list[str]:
     """Return the files that targets include."""
     return [
         file
@@ -129,7 +129,7 @@ def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
     return {rule: list(jobs.values()) for rule, jobs in rules.items()}
 
 
-def measured_name(brains: Iterable[Brain]) -> str:
+def observed_name(brains: Iterable[Brain]) -> str:
     """Return the name of measured brains in figures and tables, their populations if known.
 
     Several populations are listed with their weeks. Real brains of unknown population are called "real brain"; shapes
@@ -141,14 +141,14 @@ def measured_name(brains: Iterable[Brain]) -> str:
         if brain.config.shape is not None:
             kinds.add(brain.config.shape.kind)
         else:
-            populations.setdefault(brain.config.population or REAL_BRAIN, set()).add(brain.week)
+            populations.setdefault(brain.config.population or OBSERVED_BRAIN, set()).add(brain.week)
     names = list(populations)
     if len(names) > 1:
         spans = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
         names = [f"{name} ({span} GW)" for name, span in zip(names, spans, strict=True)]
     if kinds:
         names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
-    return " or ".join(names) or REAL_BRAIN
+    return " or ".join(names) or OBSERVED_BRAIN
 
 
 def halves_of(row: Measurement) -> list[list[str]]:
@@ -166,6 +166,6 @@ def surfaces_by_week(simulation: Simulation) -> dict[float, str]:
     return {row.week: row.parts["whole"] for row in simulation.measurements}
 
 
-def measured_by_week(*simulations: Simulation) -> dict[float, Brain]:
+def observed_by_week(*simulations: Simulation) -> dict[float, Brain]:
     """Return the measured brains that are shown with simulations, by week."""
     return {week: brain for simulation in simulations for week, brain in simulation.observed_with_start.items()}

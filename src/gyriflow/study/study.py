@@ -307,7 +307,7 @@ class Study:
         atlas = self.atlases.get(atlas_brain.id)
         return {
             **{**simulation.names, "start_week": simulation.start.week, "week": last.week},
-            **{"beside": atlas_brain.id, "beside_week": atlas_brain.week},
+            **{"atlas_brain": atlas_brain.id, "atlas_week": atlas_brain.week},
             # the population whose growth was used
             "population": atlas_brain.population,
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),

@@ -8,7 +8,7 @@ from shapes import rigid, sphere
 from gyriflow.compare.placement import number_patches
 from gyriflow.compare.prediction import add_skill, prediction_row, prediction_table, roughness_mm, simple_predictions
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
-from gyriflow.report.labels import SIMPLER_WAYS
+from gyriflow.report.labels import SIMPLER_PREDICTIONS
 
 from .bumpy import RADIUS, bumpy, shaped
 
@@ -46,7 +46,7 @@ def test_an_exact_prediction_has_no_error():
 
 
 def test_skill_is_against_the_best_baseline_of_the_week():
-    names = ["run", *SIMPLER_WAYS]
+    names = ["run", *SIMPLER_PREDICTIONS]
     away = {22: [0.3, 0.6, 0.8, 0.9, 1.2, 0.1], 23: [0.9, 0.9, 0.8, 0.45, 1.2, 0.2]}
     rows = pd.DataFrame(
         [(week, name, value) for week, values in away.items() for name, value in zip(names, values, strict=True)],

@@ -16,7 +16,7 @@ from gyriflow.errors import InputError
 from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
 from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
 from gyriflow.report.growth import displacement_chart, growth_chart
-from gyriflow.report.labels import SIMPLER_WAYS
+from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
 from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, prediction_chart, validation_chart
 from gyriflow.report.tables import brain_table
@@ -74,12 +74,12 @@ def test_scans_of_a_subject_are_joined_and_subjects_told_apart():
     assert ("None", "-", [22, 26]) in drawn
     assert sum(linestyle == "-" for _, linestyle, _ in drawn) == 1
     assert {marker: weeks for marker, _, weeks in drawn if marker != "None"} == {"s": [22, 26], "^": [24], "*": [23]}
-    assert {"sub-a", "sub-b", "real brain"} <= words(figure)
+    assert {"sub-a", "sub-b", "observed brain"} <= words(figure)
     # a covariate has colours beside the markers
     figure = metrics_chart(pd.concat(parts), subjects=subjects, groups={"a1": "sex: F", "a2": "sex: F", "b1": "sex: M"})
     colours = {line.get_marker(): line.get_color() for line in figure.axes[0].lines if line.get_linestyle() != "-"}
     assert len(set(colours.values())) == 3
-    assert {"sex: F", "sex: M", "sub-a", "real brain"} <= words(figure)
+    assert {"sex: F", "sex: M", "sub-a", "observed brain"} <= words(figure)
     # more than a legend holds share the star
     many = pd.concat([parts[0].assign(subject=f"s{number}") for number in range(9)])
     figure = metrics_chart(many, subjects={f"s{number}": f"sub-{number}" for number in range(9)})
@@ -102,7 +102,7 @@ def test_metrics_of_runs_are_lines_and_measured_ones_stars():
     drawn = {line.get_marker(): line.get_xydata().tolist() for line in area.lines}
     assert drawn == {"o": [[21, 100], [22, 110]], "*": [[21, 99], [22, 120]]}
     assert [line.get_ydata().tolist() for line in curvedness.lines] == [[0.1, 0.2]]
-    assert {"thin", "real brain"} <= words(figure)
+    assert {"thin", "observed brain"} <= words(figure)
 
 
 def test_a_table_without_metrics_is_refused():
@@ -113,7 +113,7 @@ def test_a_table_without_metrics_is_refused():
 def test_spectra_bars_are_the_relative_powers_of_each_side():
     thin = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("thin", 27.0, {4: 0.9})]
     figure = study_of(thin, spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15}))
-    assert {"1.5 mm", "real brain"} <= words(figure)
+    assert {"1.5 mm", "observed brain"} <= words(figure)
     left, right = figure.axes
     assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
     assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
@@ -303,7 +303,7 @@ def test_displacement_is_that_of_all_nodes_per_week_at_the_middle_of_the_interva
     assert {"thin", "a paper"} <= words(figure)
 
 
-OF_THE_STUDY = {"varied": "thickness_mm", "subject": "s", "real": ["r"], "week": 28.0}
+OF_THE_STUDY = {"varied": "thickness_mm", "subject": "s", "observed": ["r"], "week": 28.0}
 TRIED = {"thickness_mm": [1.0, 2.0, 3.0, 2.2], "growth_rate_per_s": [1e-7, 2e-7, 3e-7, 2.2e-7]}
 RUNS = pd.DataFrame(TRIED | {"round": [0, 0, 0, 1], "score": [0.5, 0.2, np.nan, 0.1]})
 OPTIMUM = pd.DataFrame({"parameter": ["thickness_mm", "growth_rate_per_s"], "value": [2.1, 2.1e-7]})
@@ -363,7 +363,7 @@ def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
     assert all(list(line.get_ydata()) == pytest.approx([0.1, 0.2]) for line in away.lines)
     assert len({line.get_color() for line in first.lines}) == 4
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["expected", "stiff", SIMPLER_WAYS["scaled"], "new"]
+    assert labels == ["expected", "stiff", SIMPLER_PREDICTIONS["scaled"], "new"]
 
 
 def onsets(**weeks):

@@ -15,20 +15,20 @@ from gyriflow.report.page import (
     NOT_COMPARED,
     Origin,
     Tables,
+    accuracy_sentence,
     brain_page,
     brains_table,
     caption_html,
     hide_paths,
-    made,
     methods_text,
+    page_figures,
+    provenance_line,
     report_page,
     run_verdict,
     scores_table,
     sections,
-    shown_figures,
     study_page,
     verdict,
-    worth_told,
 )
 from gyriflow.report.tables import html_table, resolution_over_steps
 from gyriflow.settings.terms import SPREAD_UNKNOWN
@@ -63,7 +63,7 @@ VALIDATION = pd.DataFrame(
 NO_WARNINGS = pd.DataFrame({"subject": [], "level": [], "message": []})
 QUALITY = pd.DataFrame(
     {
-        "subject": ["young", "old"], "verdict": ["look", "refused"], "cause": [np.nan, "cropped"],
+        "subject": ["young", "old"], "verdict": ["needs review", "refused"], "cause": [np.nan, "cropped"],
         "warnings": ["a bridge was cut", np.nan],
     }
 )  # fmt: skip
@@ -94,7 +94,7 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
         | {"path": f"{rule}{number}.png", "names": {"brain": "a"}}
         for number, rule in enumerate(rules)
     ]
-    return shown_figures(figures, {figure["path"]: content for figure in figures})
+    return page_figures(figures, {figure["path"]: content for figure in figures})
 
 
 TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
@@ -130,7 +130,7 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert Facts(2, 21, "23 GW", "healthy", "young", 1) in elements(text, "p")
     assert "12ab" in text
     assert Facts("2026-01-01 12:30 UTC", "0.1", "abc") in elements(text, "p")
-    assert made(PROVENANCE) != made(PROVENANCE | {"commit": "abc"})
+    assert provenance_line(PROVENANCE) != provenance_line(PROVENANCE | {"commit": "abc"})
     assert "numpy" in text
     assert "absent" not in text
 
@@ -169,7 +169,7 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
 
 
-WORTH = read_yaml(SHIPPED / "norms" / "predictions.yaml")
+ACCURACY = read_yaml(SHIPPED / "norms" / "predictions.yaml")
 
 
 def foretold(weeks: float) -> dict:
@@ -177,8 +177,8 @@ def foretold(weeks: float) -> dict:
     atlas = {"name": "crl", "title": "An atlas", "reference": {"citation": "A. et al.", "doi": "10.1/x", "url": None}}
     atlas["licence"] = {"name": "CRL licence", "url": None, "terms": "Research only.", "accept": True}
     return {
-        "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks, "beside": "crl-30", "beside_week": 30,
-        "population": "well", "atlas": atlas, "worth": WORTH,
+        "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks,
+        "atlas_brain": "crl-30", "atlas_week": 30, "population": "well", "atlas": atlas, "accuracy": ACCURACY,
         "surfaces": ["results/a.surf.gii"], "labels": "results/a_dseg.nii.gz",
     }  # fmt: skip
 
@@ -190,7 +190,8 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
     assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
     parts = (
-        *("</h1>", str(escape(worth_told(foretold(7.5)))), "210.5", "norms/predictions.yaml", "results/a.surf.gii"),
+        *("</h1>", str(escape(accuracy_sentence(foretold(7.5)))), "210.5"),
+        *("norms/predictions.yaml", "results/a.surf.gii"),
         *("results/a_dseg.nii.gz", "A. et al., doi 10.1/x.", "CRL licence", "Research only.", '<section id="brains"'),
     )
     order = [text.index(part) for part in parts]
@@ -202,13 +203,13 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
 
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
-    last = max(row["horizon"] for row in WORTH["rows"])
-    assert worth_told(foretold(last)).count(f"{last:g} weeks") == 1
-    assert worth_told(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
+    last = max(row["horizon"] for row in ACCURACY["rows"])
+    assert accuracy_sentence(foretold(last)).count(f"{last:g} weeks") == 1
+    assert accuracy_sentence(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
 
 
 def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_beside_simpler_ways():
-    rows = pd.DataFrame(WORTH["rows"])
+    rows = pd.DataFrame(ACCURACY["rows"])
     assert (rows.groupby("horizon")["start"].nunique() == 2).all()
     assert not rows.duplicated(["start", "horizon", "model"]).any()
     by_way = rows.pivot_table("distance_mm", ["start", "horizon"], "model")
@@ -228,7 +229,7 @@ def test_paths_are_hidden():
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
     young, old = brains_table(BRAINS, **MEASURES, pictures=PICTURES).to_dict("records")
-    assert young["verdict"] == Facts("look", "a bridge was cut")
+    assert young["verdict"] == Facts("needs review", "a bridge was cut")
     assert old["verdict"] == Facts("refused", "cropped")
     assert young["brain"] == Facts("young", "21 GW", "healthy", "sex: F", "CC0 1.0") != Facts("labels")
     assert old["brain"] == Facts("old", "23 GW", "healthy", "labels")
@@ -264,13 +265,13 @@ def test_a_brain_has_a_page_of_its_own():
 def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     (row,) = scores_table(RUNS, VALIDATION).to_dict("records")
     assert row["verdict"] == Facts("22 GW", 23, 1.2, 2)
-    assert row["real brain"] == Facts("23 GW", "predicted")
+    assert row["observed brain"] == Facts("23 GW", "predicted")
     assert row["area (%)"] == "−7.9"
     assert (row["gain"], row["95 % interval"]) == ("−0.00", "−0.04 to +0.04")
     assert row["distance (mm)"] == "0.42"
     (alone,) = scores_table(RUNS).to_dict("records")
     assert [alone[name] for name in ("gain", "95 % interval")] == ["–", "–"]
-    assert "GW" not in alone["real brain"]
+    assert "GW" not in alone["observed brain"]
 
 
 @pytest.mark.parametrize(

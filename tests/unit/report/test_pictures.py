@@ -51,7 +51,7 @@ def test_up_is_superior_and_in_the_top_view_anterior():
 
 def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
     real = {"start": BRAIN, "then": box((24, 34, 24)), "atlas": BRAIN}
-    figure = runs_by_week({}, real, views=("left", "top"), measured="", predicted="then")
+    figure = runs_by_week({}, real, views=("left", "top"), observed_name="", predicted="then")
     tones = [tone(picture(figure, number)) for number in range(6)]
     assert [blue > red for red, _, blue in tones] == 2 * [False, True, False]
 
@@ -59,7 +59,7 @@ def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
 def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
     figure = runs_by_week({"long": dict.fromkeys(np.arange(21.0, 31.0), BRAIN)}, {21.0: BRAIN}, views=("left",))
     written = [text.get_text() for text in figure.texts]
-    assert [sum(name in text for text in written) for name in ("long", "real brain")] == [2, 1]
+    assert [sum(name in text for text in written) for name in ("long", "observed brain")] == [2, 1]
 
 
 def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
@@ -67,8 +67,8 @@ def test_runs_by_week_have_a_panel_per_brain_and_leave_gaps_and_one_scale():
     figure = runs_by_week({"simulated": {22.0: small, 23.5: large}}, {22.0: small}, views=("left", "top"))
     panels = [axes.get_label() for axes in pictures(figure)]
     assert len(panels) == 6
-    assert "real brain, column 0" in panels
-    assert "real brain, column 1" not in panels
+    assert "observed brain, column 0" in panels
+    assert "observed brain, column 1" not in panels
     assert {"22 GW\nleft view", "23.5 GW\ntop view", "a", "b", "simulated", "A", "P", "L", "R"} <= words(figure)
     assert covered(picture(figure, 0)).sum() < covered(picture(figure, 1)).sum()
     scales = [np.ptp(axes.get_xlim()) / axes.get_window_extent().width for axes in pictures(figure)]
@@ -111,7 +111,7 @@ def test_one_sharp_vertex_does_not_set_the_scale_of_a_displacement_and_is_ringed
 
 
 def test_shape_index_goes_from_minus_one_to_one_and_gyri_are_red():
-    maps = {"simulated": {28.0: (BRAIN, np.full(8, 0.7))}, "real brain": {28.0: (BRAIN, np.full(8, -0.7))}}
+    maps = {"simulated": {28.0: (BRAIN, np.full(8, 0.7))}, "observed brain": {28.0: (BRAIN, np.full(8, -0.7))}}
     figure = scalar_maps(maps, quantity="shape_index", views=("left",))
     bar = colour_bar(figure, "shape index")
     assert bar.get_xlim() == (-1.0, 1.0)
@@ -152,7 +152,7 @@ def test_lines_on_a_map_run_along_directions_where_these_are_seen():
 
 def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     halves = [(box((8, 30, 20), (x, 0, 0)), maps) for x, maps in ((-6, {"curvedness": np.ones(8)}), (6, {}))]
-    figure = shape_maps({"simulated": {21.0: halves}, "real brain": {}}, quantity="curvedness", views=("top",))
+    figure = shape_maps({"simulated": {21.0: halves}, "observed brain": {}}, quantity="curvedness", views=("top",))
     assert {"simulated", "not measured"} <= words(figure)
     image = picture(figure).astype(float)
     left, right = tone(image[:, : image.shape[1] // 2]), tone(image[:, image.shape[1] // 2 :])
@@ -188,4 +188,4 @@ def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
     assert np.ptp(real[:, 0]) == pytest.approx(44.0, rel=0.01)
     assert np.ptp(simulated[:, 0]) == pytest.approx(40.0, rel=0.01)
     assert simulated.mean(axis=0) == pytest.approx(real.mean(axis=0), abs=0.5)
-    assert {"thin", "real brain", "21 GW", "22 GW"} <= words(figure)
+    assert {"thin", "observed brain", "21 GW", "22 GW"} <= words(figure)

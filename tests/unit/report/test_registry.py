@@ -19,7 +19,7 @@ from gyriflow.shipped import DEMO, SHIPPED
 from gyriflow.study import comparison_figures, figures, resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
-from gyriflow.study.registry import Kind, asked_for, by_rule, files_in
+from gyriflow.study.registry import Kind, by_rule, files_in, target_files
 from gyriflow.units import SECONDS_PER_GW
 
 KINDS = [kind for module in (figures, comparison_figures) for kind in vars(module).values() if isinstance(kind, Kind)]
@@ -97,16 +97,16 @@ def test_all_files_are_drawn_once_and_jobs_of_a_rule_alike():
 def test_the_paper_stands_in_its_own_figures_alone():
     published = {figure.path for figure in registry() if any("published" in file for file in files_in(figure.inputs))}
     assert published == {"results/study/figures/displacement_paper.png", "results/study/rate/figures/nearest_paper.png"}
-    asked = asked_for(registry(), "figures", "growth", "validate", "influence_figures", "report", "brain", "quality")
-    assert not published & set(asked)
-    assert published < set(asked_for(registry(), "paper"))
+    targets = ("figures", "growth", "validate", "influence_figures", "report", "brain", "quality")
+    assert not published & set(target_files(registry(), *targets))
+    assert published < set(target_files(registry(), "paper"))
 
 
 def test_runs_that_start_alike_have_one_figure_of_their_zones_which_the_paper_alone_asks_for():
     figures = registry()
     zones = ["results/runs/thin/a/figures/zones.png", "results/runs/thin/a/figures/zones.pdf"]
-    assert [file for file in asked_for(figures, "paper") if "/zones." in file] == zones
-    assert not any("/zones." in file for file in asked_for(figures, "figures"))
+    assert [file for file in target_files(figures, "paper") if "/zones." in file] == zones
+    assert not any("/zones." in file for file in target_files(figures, "figures"))
 
 
 def test_simulated_and_measured_brains_are_not_exchanged():
@@ -116,7 +116,7 @@ def test_simulated_and_measured_brains_are_not_exchanged():
     }
     for row in rows:
         real = {21.0: "results/brains/a/surface", 22.0: "results/brains/b/surface"}
-        assert row.inputs["real"] == {week: f"{folder}/pial.surf.gii" for week, folder in real.items()}
+        assert row.inputs["observed"] == {week: f"{folder}/pial.surf.gii" for week, folder in real.items()}
         for run, surfaces in row.inputs["runs"].items():
             assert surfaces == {w: f"results/runs/{run}/a/surfaces/week-{w:.2f}/pial.surf.gii" for w in (21.0, 22.0)}
     ((row,),) = jobs_of("shape_maps")

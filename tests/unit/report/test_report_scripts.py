@@ -95,7 +95,7 @@ def pages(folder):
     write_surface("ball.surf.gii", ball)
     write_vertex_maps("ball.shape.gii", {"shape_index": ball.vertices[:, 2] / 10})
     frames = [[week, [["ball.surf.gii", "ball.shape.gii"]]] for week in (21.0, 22.0)]
-    params |= {"surfaces": {"runs": {"thin": frames}, "real": frames[:1]}, "measured": "healthy"}
+    params |= {"surfaces": {"runs": {"thin": frames}, "observed": frames[:1]}, "observed_name": "healthy"}
     outputs = {"report": "report.html", "brains": [f"{name}.html" for name in NAMES], "view": "surfaces.json"}
     run_script("html_report.py", folder, inputs | {"small": [f"{name}.png" for name in NAMES]}, outputs, params)
     return [read_text(path) for path in ("report.html", "young.html", "old.html")]

@@ -7,15 +7,15 @@ import pandas as pd
 import pytest
 from facts import Facts
 
-from gyriflow.report.labels import SIMPLER_WAYS
+from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.tables import (
+    accuracy_table,
     html_table,
     mesh_quality_table,
     metrics_table,
     predicted_table,
     resources,
     runs_table,
-    worth_table,
 )
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
@@ -41,7 +41,7 @@ def test_metrics_of_the_last_common_week_stand_with_the_difference_from_the_meas
             ("thin", 22.0, "mean_curvature_q05", -0.01),
             ("thin", 22.0, "crossing_faces", 0.0),
         ),
-        measured="ellipsoid",
+        observed_name="ellipsoid",
     )
     assert table.index.name == Facts("22 GW")
     assert list(table) == ["ellipsoid", "thin", Facts("thin", "%")]
@@ -64,7 +64,7 @@ def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nea
     ]
     units = {"area": "cm2", "volume": "mL"}
     table = [(brain, run, week, "whole", name, value, units.get(name, "1")) for brain, run, week, name, value in rows]
-    of = {"run": "a", "brain": "s", "start_week": 22.4, "week": 29.9, "beside": "atlas30", "beside_week": 30}
+    of = {"run": "a", "brain": "s", "start_week": 22.4, "week": 29.9, "atlas_brain": "atlas30", "atlas_week": 30}
     found = predicted_table(pd.DataFrame(table, columns=COLUMNS), of)
     assert list(found) == [Facts("22.4 GW"), Facts("29.9 GW"), Facts("30 GW"), Facts("%")]
     assert found.loc["pial area (cm²)"].tolist() == [100.0, 210.0, 200.0, "+5.0"]
@@ -79,11 +79,11 @@ def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span
         ("crl", 2.0, "run", 0.2, 0.8, -0.02, np.nan), ("wu", 2.0, "run", 0.3, 0.9, 0.01, np.nan),
         ("crl", 2.0, "atlas", 0.5, 0.4, 0, 0), ("wu", 2.0, "atlas", 0.7, 0.4, 0, 0),
     ]  # fmt: skip
-    (row,) = worth_table({"rows": [dict(zip(names, row, strict=True)) for row in rows]}).to_dict("records")
+    (row,) = accuracy_table({"rows": [dict(zip(names, row, strict=True)) for row in rows]}).to_dict("records")
     assert list(row.items()) == [
         *((Facts("mm"), Facts("0.20", "0.30")), ("r", Facts("0.80", "0.90"))),
         *(("area (%)", Facts("−2.0", "+1.0")), ("volume (%)", "–")),
-        (SIMPLER_WAYS["atlas"], Facts("0.50", "0.70 mm", "r", "0.40")),
+        (SIMPLER_PREDICTIONS["atlas"], Facts("0.50", "0.70 mm", "r", "0.40")),
     ]
 
 
@@ -117,11 +117,11 @@ def test_the_quality_of_a_mesh_stands_beside_its_limits():
 
 
 def test_html_is_escaped_and_marks_numbers_and_verdicts():
-    table = pd.DataFrame({"verdict": ["look"], "run <b>": ["a & b"], "value": [1 / 3], "none": [np.nan], "count": [7]})
+    table = pd.DataFrame({"verdict": ["fine"], "run <b>": ["a & b"], "value": [1 / 3], "none": [np.nan], "count": [7]})
     html = html_table(table)
     assert "<th>run &lt;b&gt;</th>" in html
     assert re.findall('<td class="(.*?)">(.*?)</td>', html) == [
-        ("verdict look", "look"), ("whole", "a &amp; b"), ("number", "0.3333"), ("number", "–"), ("number", "7")
+        ("verdict fine", "fine"), ("whole", "a &amp; b"), ("number", "0.3333"), ("number", "–"), ("number", "7")
     ]  # fmt: skip
     assert "<th>brain</th>" in html_table(table.rename_axis("brain"))
 

@@ -41,7 +41,7 @@ def test_thinning_keeps_vertices_and_the_shape():
 
 
 def test_a_run_has_one_triangulation_and_its_positions_each_week():
-    data = surfaces_view({"thin": growing()}, [], measured="real brain")
+    data = surfaces_view({"thin": growing()}, [], observed_name="observed brain")
     (group,) = data["groups"]
     places = [positions(data, frame) for frame in group["frames"]]
     assert [frame["week"] for frame in group["frames"]] == [21.0, 22.0]
@@ -53,7 +53,7 @@ def test_a_run_has_one_triangulation_and_its_positions_each_week():
 def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
     values = np.linspace(0.0, 0.2, len(BALL.vertices))
     values[0] = np.nan
-    data = surfaces_view({"thin": growing(values)}, [], measured="real brain")
+    data = surfaces_view({"thin": growing(values)}, [], observed_name="observed brain")
     described, _ = data["maps"]
     levels = np.frombuffer(b64decode(data["groups"][0]["frames"][0]["values"]["curvedness"]), dtype=np.uint8)
     assert levels[0] == 255
@@ -62,17 +62,17 @@ def test_values_of_a_map_are_levels_of_its_scale_and_unknown_ones_are_told():
 
 
 def test_displacement_is_measured_from_the_first_week():
-    data = surfaces_view({"thin": growing()}, growing(), measured="real brain")
+    data = surfaces_view({"thin": growing()}, growing(), observed_name="observed brain")
     assert [described["name"] for described in data["maps"]] == ["displacement_mm"]
     simulated, real = data["groups"]
     start, later = (b64decode(frame["values"]["displacement_mm"]) for frame in simulated["frames"])
     assert set(start) == {0}
     assert np.frombuffer(later, dtype=np.uint8) / 254 * data["maps"][0]["high"] == pytest.approx(4.0, abs=0.02)
     # what was measured has not moved
-    assert real["name"] == "real brain"
+    assert real["name"] == "observed brain"
     assert not any(frame["values"] for frame in real["frames"])
 
 
 def test_surfaces_of_a_run_with_other_vertices_are_refused():
     with pytest.raises(InputError, check=Facts("22 GW", 642, 2562)):
-        surfaces_view({"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]}, [], measured="real brain")
+        surfaces_view({"thin": [growing()[0], (22.0, [(sphere(20.0, 3), {})])]}, [], observed_name="observed brain")

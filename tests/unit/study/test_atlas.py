@@ -13,7 +13,7 @@ from gyriflow.settings.atlas import ATLASES, Atlas, shipped_atlases
 from gyriflow.study import resolve
 from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
 from gyriflow.study.loading import load
-from gyriflow.study.registry import measured_name
+from gyriflow.study.registry import observed_name
 
 UNOPERATED, OPERATED = "spina bifida aperta, unoperated", "spina bifida aperta, operated"
 HERE = {"folder": "."}
@@ -65,9 +65,9 @@ def test_populations_are_named_and_never_share_a_curve(tmp_path):
     found = resolve(load(study("spina-bifida", "spina-bifida-unoperated-21"), tmp_path))
     unoperated = [f"spina-bifida-unoperated-{week}" for week in range(21, 26)]
     operated = [f"spina-bifida-operated-{week}" for week in range(25, 35)]
-    assert measured_name(found.brains[brain] for brain in unoperated) == UNOPERATED
-    assert measured_name([found.brains[operated[0]]]) == OPERATED
-    both = measured_name(found.brains[brain] for brain in [*unoperated, operated[0]])
+    assert observed_name(found.brains[brain] for brain in unoperated) == UNOPERATED
+    assert observed_name([found.brains[operated[0]]]) == OPERATED
+    both = observed_name(found.brains[brain] for brain in [*unoperated, operated[0]])
     assert both == Facts(f"{UNOPERATED} (21-25 GW)", f"{OPERATED} (25 GW)")
     assert series_of(found) == {UNOPERATED: unoperated, OPERATED: operated}
     assert series_for(found, "spina-bifida-unoperated-21") == UNOPERATED
