@@ -19,9 +19,9 @@ HEIGHT_MM, SIDE_MM, GAP_MM = 4.0, 6.0, 0.2
 MU, NU = 1000.0, MATERIAL.poisson_ratio
 
 
-def two_blocks(cells=(5, 5, 3), other=(5, 5, 3), gap=GAP_MM):
-    """Return two boxes, one above the other, a gap apart."""
-    low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, other))
+def two_blocks(cells=(5, 5, 3), upper=(5, 5, 3), gap=GAP_MM):
+    """Return a box above another with a gap between them."""
+    low, high = (box_mesh(n, (SIDE_MM, SIDE_MM, HEIGHT_MM)) for n in (cells, upper))
     shift = np.array([0.0, 0.0, (HEIGHT_MM + gap) / 2])
     vertices = np.concatenate([low.vertices - shift, high.vertices + shift])
     return TetrahedralMesh(vertices, np.concatenate([low.tets, high.tets + len(low.vertices)]))

@@ -27,7 +27,7 @@ from gyriflow.units import M_PER_MM, MM_PER_M
 
 def test_forces_fit_the_energy_and_stiffness_the_forces():
     # grids that do not match: where edges are parallel, which parts are nearest changes at once
-    mesh = two_blocks(other=(4, 3, 3))
+    mesh = two_blocks(upper=(4, 3, 3))
     problem, contact = problem_with_contact(mesh, in_a_tube(mesh), distance=0.15)
     domain, u = problem.domain, approach(problem.domain)
     v = smooth_displacement(domain, 4e-7)[:, [2, 0, 1]].copy()
@@ -61,10 +61,10 @@ def test_forces_have_no_sum_and_no_moment():
     assert np.abs(np.cross(places, forces).sum(axis=0)).max() <= 1e-12 * size * np.abs(places).max()
 
 
-@pytest.mark.parametrize("other", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)])
-def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(other):
+@pytest.mark.parametrize("upper", [pytest.param((5, 5, 3), marks=pytest.mark.one_rank), (4, 3, 3)])
+def test_pressed_blocks_have_the_pressure_of_the_closed_answer_and_their_gap_closes_with_the_distance(upper):
     growth, gaps = 0.2, []
-    mesh = two_blocks(other=other)
+    mesh = two_blocks(upper=upper)
     zones = in_a_tube(mesh)
     for distance in (0.2, 0.1, 0.05):
         problem, contact = problem_with_contact(mesh, zones, distance, growth_along_z=growth)
@@ -119,9 +119,9 @@ def test_no_pair_is_missed_where_the_distance_has_grown():
     few = contact.pair_count(problem.rest())
     contact._given_mm = 0.5
     contact.begin_step()
-    problem, other = problem_with_contact(mesh, zones, distance=0.5)
-    assert contact.pair_count(problem.rest()) == other.pair_count(problem.rest()) > few
-    assert contact.forces(problem.rest()) == pytest.approx(other.forces(problem.rest()), rel=1e-12)
+    problem, wider = problem_with_contact(mesh, zones, distance=0.5)
+    assert contact.pair_count(problem.rest()) == wider.pair_count(problem.rest()) > few
+    assert contact.forces(problem.rest()) == pytest.approx(wider.forces(problem.rest()), rel=1e-12)
 
 
 @pytest.mark.slow

@@ -128,7 +128,7 @@ def test_each_guess_is_swept_for_crossings_from_rest(support, monkeypatch):
 
 def pressed(step_s, days=4, **changes):
     """Return what has folded two blocks that grow evenly against each other in a tube, and the last state."""
-    mesh = two_blocks(other=(4, 3, 3))
+    mesh = two_blocks(upper=(4, 3, 3))
     values = {"start_week": 21.0, "end_week": 30.0, "output_weeks": [21.0, 30.0], "fissure_x_mm": 0.0}
     values |= {"no_growth": {"kind": "none"}, "support": "box", "step_s": step_s, "fields": ["stress", "strain"]}
     folding = Folding(COMM, mesh, in_a_tube(mesh), parameters_from(values | changes))
@@ -150,7 +150,7 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
         folding, state = pressed(step_s)
         fields = folding.fields.elements(["stress", "strain"], folding.solved)
         fields |= folding.fields.contact_pressure(["contact_pressure"], folding.solved)
-        at = two_blocks(other=(4, 3, 3)).vertices
+        at = two_blocks(upper=(4, 3, 3)).vertices
         inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
         contact = fields["contact_pressure_pa_per_gw"][inside].mean()
         inner = [np.median(fields[name]) for name in ("pressure_pa_per_gw", "elastic_volume_strain_per_gw")]

@@ -1,4 +1,4 @@
-"""Contact shared out between ranks: together they find what one finds alone, and each of them does its part."""
+"""Contact on several ranks: together they find the same as a single one, and each of them does its part."""
 
 import numpy as np
 import pytest
@@ -19,10 +19,10 @@ def contact_in(comm, mesh, distance=0.15):
 
 
 def blocks(order):
-    """Return two blocks whose meshes do not match, and what brings them near each other, shaken, in mm."""
-    mesh = two_blocks(other=(4, 3, 3))
+    """Return two blocks whose meshes do not match, and a shaken displacement in mm that brings them near each other."""
+    mesh = two_blocks(upper=(4, 3, 3))
     if order == 2:
-        mesh = quadratic(two_blocks(cells=(3, 3, 1), other=(2, 2, 1)))
+        mesh = quadratic(two_blocks(cells=(3, 3, 1), upper=(2, 2, 1)))
     shaken = np.random.default_rng(7).uniform(-0.03, 0.03, mesh.vertices.shape)
     # no face may cross one that adjoins it
     shaken[:, 2] *= 0.3
@@ -31,14 +31,14 @@ def blocks(order):
 
 
 def what_is_found(comm, mesh, moved_mm, further_mm):
-    """Return what contact says of a displaced body: numbers, fields on all vertices, and a product's."""
+    """Return numbers and fields of contact for a displaced body, and the pairs of this rank."""
     domain, contact = contact_in(comm, mesh)
     u = domain.local(moved_mm) * M_PER_MM
     x = np.random.default_rng(8).standard_normal(mesh.vertices.shape)
     stiffness = contact.stiffness(u)
-    product, other = stiffness.createVecs()
-    product.array[:] = domain.local(x)[: domain.n_owned].ravel()
-    stiffness.mult(product, other)
+    factor, product = stiffness.createVecs()
+    factor.array[:] = domain.local(x)[: domain.n_owned].ravel()
+    stiffness.mult(factor, product)
     forces = np.zeros(3 * domain.n_owned)
     contact.add_forces(u, forces)
     return {
@@ -48,7 +48,7 @@ def what_is_found(comm, mesh, moved_mm, further_mm):
         "step": contact.max_step(u, domain.local(further_mm) * M_PER_MM),
         "forces": contact.forces(u),
         "residual": domain.gather(forces.reshape(-1, 3)),
-        "product": domain.gather(other.array_r.reshape(-1, 3)),
+        "product": domain.gather(product.array_r.reshape(-1, 3)),
         "pressure": contact.pressure(u),
     }, contact.near_pairs(u).pairs
 

@@ -52,7 +52,7 @@ def test_each_model_has_a_sentence_of_its_own_in_the_methods():
     found = {name: methods_text(template, run=run_of(name), number="{:g}".format) for name in GROWTH_MODELS}
     assert len(set(found.values())) == len(found)
     assert all(text[0].isupper() and text.endswith(".") for text in found.values())
-    # rates are told of no model that does not use them, such as the paper's of another one
+    # no sentence names rates that the model does not use
     assert [name for name, text in found.items() if "3e-07" in text] == ["rates"]
     for name, model in GROWTH_MODELS.items():
         text = methods_text(template, run=run_of(name, "population cohort"), number="{:g}".format)
