@@ -99,8 +99,9 @@ def test_a_tangent_that_is_not_positive_definite_is_shifted():
 
 @pytest.mark.one_rank
 def test_a_solve_that_takes_too_many_iterations_raises_an_error():
-    with pytest.raises(NotConvergedError, match="found no descent"):
-        solved(clamped_box(), newton_tolerance=1e-9, krylov_tolerance=1e-8, max_krylov=2)
+    problem = clamped_box()
+    with pytest.raises(NotConvergedError):
+        solved(problem, newton_tolerance=1e-9, krylov_tolerance=1e-8, max_krylov=2)
 
 
 TIGHT = {"solver": {"newton_tolerance": 1e-9}}

@@ -73,8 +73,8 @@ def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, 
 @pytest.mark.fault(30, 38)
 def test_memory_and_a_shortened_step_are_reported_before_the_solve(default_run):
     before, _, _ = default_run[1].partition("step    1")
-    assert "3072 elements, 2187 unknowns, 2 ranks, about 556 MiB" in before
-    assert "step_s 43200 does not divide the time from GW 21 to 21.25: the last step there is shortened" in before
+    assert Facts(3072, 2187, 2, "556 MiB") in before.splitlines()
+    assert Facts("step_s", 43200, 21, 21.25) in before.splitlines()
 
 
 @pytest.mark.fault(29)
@@ -90,7 +90,7 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_p
     hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_newton": 1}}
     done = fold(mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "trying" in done.stdout
+    assert done.stdout == Facts("43200 s")
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
     assert steps["dt_s"].min() <= 43200
     assert (steps["min_J"] > 0).all()
@@ -102,8 +102,8 @@ def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
     # no step is halved: a whole one fails, or what is left before the first output
-    assert re.search(r"fails even with (86400|64800) s", done.stderr)
-    assert re.search(r"smallest det F \S+ in element \d+ at \[.*\] mm, largest residual .* at vertex \d+", done.stderr)
+    assert re.search(r"\b(86400|64800) s", done.stderr)
+    assert re.search(r"element \d+ at \[.*\] mm.* vertex \d+", done.stderr)
     assert not (tmp_path / "out" / "frames.h5").exists()
 
 
@@ -128,7 +128,8 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
     call[-1] = str(tmp_path / "short.h5")
     done = ran(*call)
     assert done.returncode == 2
-    assert done.stderr.count("the map thickness_mm does not fit the mesh") == 1
+    assert done.stderr == Facts("thickness_mm", 7, len(y))
+    assert done.stderr.count("thickness_mm") == 1
 
 
 @pytest.mark.fault(37)
@@ -139,8 +140,7 @@ def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
         next(line for line in first.stdout if "step" in line)
         second = fold(mesh, out)
         kill(first)
-    assert second.returncode == 5
-    assert second.stderr == Facts(out)
+    assert (second.returncode, second.stderr) == (5, Facts(out))
 
 
 # the limit stands for the disk's end, set after MPI has made its own files
@@ -161,8 +161,7 @@ def test_a_disk_that_fills_ends_in_code_five_and_earlier_files_stay(mesh, defaul
     program = [sys.executable, "-c", FULL_DISK, *command(mesh, out)[6:]]
     done = ran(*program)
     assert done.returncode == 5, done.stdout + done.stderr
-    assert "cannot be written" in done.stderr
-    assert "Free disk space" in done.stderr
+    assert done.stderr == Facts(out, "--directory")
     assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
     assert not [path for path in out.rglob("*") if path.is_file() and path.parent != out]
 
@@ -173,15 +172,13 @@ def test_a_disk_without_room_is_refused_before_the_solve(tmp_path, monkeypatch):
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=10**9))
     require_space(tmp_path, brain, parameters)
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=1000))
-    with pytest.raises(StorageError, check=Facts(tmp_path, "disk", "MiB")):
+    with pytest.raises(StorageError, check=Facts(tmp_path, "0 MiB")):
         require_space(tmp_path, brain, parameters)
 
 
 @pytest.mark.fault(28)
 def test_bad_parameters_end_in_code_two(mesh, tmp_path):
     done = fold(mesh, tmp_path / "out", 2, thicknes_mm=1.0)
-    assert done.returncode == 2
-    assert "thicknes_mm" in done.stderr
+    assert (done.returncode, done.stderr) == (2, Facts("thicknes_mm", "thickness_mm"))
     missing = fold(tmp_path / "none.xdmf", tmp_path / "out")
-    assert missing.returncode == 2
-    assert "none." in missing.stderr
+    assert (missing.returncode, missing.stderr) == (2, Facts(tmp_path / "none.h5"))

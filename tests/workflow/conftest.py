@@ -10,12 +10,14 @@ from pathlib import Path
 
 import pytest
 import yaml
+from facts import Facts
 from processes import ran
 from shapes import ellipsoid_mesh, hemisphere, phantom, save_labels
 
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
+from gyriflow.running.jobs import cause
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -55,11 +57,11 @@ class Surfaces:
         (log,) = (self.results / brain / "logs").glob(f"{rule}.log")
         return log.read_text()
 
-    def require_refused(self, brain: str, *said: str) -> None:
-        """Check that a brain was refused with messages, in its log and on the terminal, and that nothing is left."""
-        for text in said:
-            assert text in self.log(brain)
-            assert text in self.outcome.stderr
+    def require_refused(self, brain: str, *facts: object) -> None:
+        """Check that a brain was refused with facts, in its log and on the terminal, and that nothing is left."""
+        message = cause(self.log(brain))
+        assert message == Facts(*facts)
+        assert message in self.outcome.stderr
         assert not [path for path in (self.results / brain / "surface").rglob("*") if path.is_file()]
 
     def require_exit_code(self, code: int) -> None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from facts import Facts
 from processes import ran
 
 from gyriflow.running.launch import clear_stale_lock
@@ -46,7 +47,7 @@ def test_a_stale_lock_is_cleared(tmp_path, capsys):
     lock = stale(tmp_path)
     clear_stale_lock(tmp_path)
     assert not lock.exists()
-    assert "resum" in capsys.readouterr().err
+    assert capsys.readouterr().err == Facts("gyriflow:", "lock")
 
 
 @pytest.mark.fault(37)
@@ -62,7 +63,7 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
         assert holder.stdout.readline() == "held\n"
         refused = workflow.run("--cores", "1", "surface")
         assert refused.returncode == 5
-        assert "another gyriflow run" in message(refused)
+        assert message(refused) == Facts(workflow.directory, "--directory")
         assert lock.exists()
         assert workflow.jobs("surface")
     finally:
@@ -74,7 +75,7 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     (workflow.directory / "file").touch()
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
     assert outcome.returncode == 5
-    assert "file/below: the working directory cannot be written" in message(outcome)
+    assert message(outcome) == Facts("file/below:", "Not a directory")
 
 
 def gyriflow(workflow, *arguments):
@@ -87,15 +88,14 @@ def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflo
     name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5}})
     outcome = gyriflow(workflow, "check", name)
     assert outcome.returncode == 2
-    assert "the configuration has 2 problems" in outcome.stderr
-    assert "Traceback" not in outcome.stderr
+    assert message(outcome) == Facts(2, "folding.end_week:", "folding.poisson_ratio:")
 
 
 @pytest.mark.fault(27)
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
     outcome = gyriflow(workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs")
     assert outcome.returncode == 2
-    assert message(outcome).endswith("gyriflow: there is no stage or result metrcs; did you mean metrics?\n")
+    assert message(outcome).splitlines()[-1] == Facts("gyriflow:", "metrcs", "metrics")
 
 
 @pytest.mark.slow
@@ -106,8 +106,8 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     outcome = gyriflow(workflow, "check", name, "--stage", "studies", "--cores", "1000")
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     said = outcome.stdout
-    assert said.startswith("study.yaml: 2 brains, 1 simulation (reference), 50 of study fifty\n")
+    assert said.splitlines()[0] == Facts("study.yaml:", 2, 1, "reference", 50, "fifty")
     assert "simulate_member×50" in said
-    assert float(re.search(r"\nwork +about [\d.e+]+ core hours, ([\d.]+)% of them", said)[1]) > 50
+    assert float(re.search(r" [\d.e+]+ core hours, ([\d.]+)%", said)[1]) > 50
     # the memory of a cluster is not that of this machine
-    assert "available" not in re.search(r"\nmemory .*", said)[0]
+    assert len(re.findall(r"[MG]iB", re.search(r"\nmemory .*", said)[0])) == 1

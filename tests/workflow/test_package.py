@@ -60,7 +60,7 @@ def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory)
     assert gyriflow("--version").stdout.startswith("gyriflow 0.")
     target = "results/brains/spina-bifida-operated-25/surface/pial.surf.gii"
     # where there is no configuration, it is told where the demo's is
-    demo = re.search(r"The demo's is (\S+)\.$", gyriflow("run").stderr)[1]
+    demo = re.search(r"(\S+/config\.yaml)", gyriflow("run").stderr)[1]
     outcome = gyriflow("run", demo, "--cores", "1", target)
     assert outcome.returncode == 0, outcome.stdout + outcome.stderr
     assert (tmp_path / target).is_file()

@@ -7,6 +7,9 @@ import shutil
 from contextlib import contextmanager
 
 import pytest
+from facts import Facts
+
+from gyriflow.io.downloads import sha256_of
 
 from .conftest import SMALL_STUDY, Workflow, labelled
 
@@ -137,4 +140,4 @@ def test_inputs_are_known_by_their_content_not_their_date(workflow):
     # as `mv` and `rsync -a` do
     other.rename(labels)
     assert workflow.jobs(*arguments) == {"pial_from_labels": 1, "surface": 1}
-    assert "input with the content" in workflow.run("-n", *arguments).stdout
+    assert workflow.run("-n", *arguments).stdout == Facts(sha256_of(labels))

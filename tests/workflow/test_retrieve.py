@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from configurations import write_atlas
+from facts import Facts
 from local_server import Server, files_in, packed, serving, sha256
 
 pytestmark = pytest.mark.slow
@@ -36,8 +37,8 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     folder = workflow.directory / "resources" / "atlases" / "far"
     planned = workflow.run("-n", "growth", "--configfile", name)
     assert planned.returncode == 0, planned.stderr
-    assert f"gyriflow: far: 2 files to fetch into {folder} where a stage needs them" in planned.stderr
-    assert "licence: CC0. Do what you like." in planned.stderr
+    assert Facts("far:", 2, folder) in planned.stderr.splitlines()
+    assert planned.stderr == Facts("CC0", "Do what you like.")
     assert server.asked == []
 
     long = "w21/labels.nii.gz"
@@ -46,7 +47,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     target = f"{folder}/{long}"
     first = workflow.run(target, "--cores", "1", "--configfile", name)
     assert first.returncode == 0, first.stderr
-    assert first.stderr.count("licence: CC0") == 1
+    assert first.stderr.count("Do what you like.") == 1
     assert files_in(folder) == {long: FILES[long]}
     assert server.asked.count(long) == 2
 
@@ -58,7 +59,7 @@ def test_missing_files_are_planned_told_of_and_fetched_by_what_needs_them(workfl
     server.asked.clear()
     last = workflow.run("retrieve", "--cores", "1", "--configfile", name, "--forceall")
     assert last.returncode == 0, last.stderr
-    assert "licence" not in last.stderr
+    assert "Do what you like." not in last.stderr
     deleted = workflow.run("--delete-all-output", "--cores", "1", "--configfile", name)
     assert deleted.returncode == 0, deleted.stderr
     assert files_in(folder) == FILES
@@ -88,5 +89,5 @@ def test_copies_of_the_users_own_stay_as_they_are(workflow, server):
     surface = "results/brains/far-21/surface/pial.surf.gii"
     refused = workflow.run(surface, "--cores", "1", "--configfile", name)
     assert refused.returncode == 2
-    assert f"{own}: is not the file of far;" in refused.stderr
+    assert refused.stderr == Facts(f"{own}:", "far", sha256(FILES["w21/labels.nii.gz"]))
     assert own.read_bytes() == packed(1000)
