@@ -110,4 +110,4 @@ def test_a_study_of_fifty_runs_is_planned_with_its_core_hours(workflow):
     assert "simulate_member×50" in said
     assert float(re.search(r" [\d.e+]+ core hours, ([\d.]+)%", said)[1]) > 50
     # the memory of a cluster is not that of this machine
-    assert len(re.findall(r"[MG]iB", re.search(r"\nmemory .*", said)[0])) == 1
+    assert len(re.findall(r"\b[MG]i?B", re.search(r"\nmemory .*", said)[0])) == 1
