@@ -3,6 +3,7 @@
 import os
 import sys
 
+from facts import Facts
 from processes import ran
 
 from gyriflow.code_hash import code_hash
@@ -46,4 +47,4 @@ def test_jobs_run_again_after_a_change_of_code_or_where_an_older_file_takes_the_
     given.write_text("two")
     os.utime(given, ns=(0, 0))
     again = ran(*snakemake, "-n", cwd=tmp_path)
-    assert "input with the content two" in again.stdout + again.stderr
+    assert again.stdout + again.stderr == Facts("two")
