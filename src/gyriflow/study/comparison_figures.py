@@ -1,4 +1,4 @@
-"""The figures and tables of a study that compare runs with real brains and with each other."""
+"""Figures and tables of a study that compare runs with observed brains and with each other."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -55,11 +55,11 @@ VALIDATION = Kind(
     section="Validation",
     title="Gain over no folding, by week",
     caption=(
-        "Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the real brain, "
-        "less the r of the scaled start brain. Above 0, the simulation places folds better than the scaled start. "
-        "Bars: 95 % intervals of a bootstrap over patches of the surface. Filled marks: explained weeks, whose real "
-        "brains gave the growth; open marks: predicted weeks. Dotted: the start carried to the real brain by "
-        "registration."
+        "Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the observed "
+        "brain, less the r of the scaled start brain. Above 0, the simulation places folds better than the scaled "
+        "start. Bars: 95 % intervals of a bootstrap over patches of the surface. Filled marks: explained weeks, whose "
+        "observed brains gave the growth; open marks: predicted weeks. Dotted: the start carried to the observed brain "
+        "by registration."
     ),
     target="validate",
     job="validation_charts",
@@ -69,11 +69,11 @@ PREDICTION = Kind(
     f"{STUDY_FIGURES}/prediction.png",
     "scores:prediction_chart",
     section="Validation",
-    title="Predicted brains beside the real ones",
+    title="Predicted and observed brains",
     caption=(
         "Brains predicted with the growth of another population, by weeks after the start: correlation of their shape "
-        "index with that of the real brain, at one size, and mean distance between the surfaces, unscaled and rigidly "
-        "aligned. Dashed: simpler predictions, without mechanics, and the target shape of the run."
+        "index with that of the observed brain, at one size, and mean distance between the surfaces, unscaled and "
+        "rigidly aligned. Dashed: simpler predictions, without mechanics, and the target shape of the run."
     ),
     target="validate",
     job="validation_charts",
@@ -86,7 +86,8 @@ PREDICTION_TABLE = Kind(
     title="Predicted brains, table",
     caption=(
         "The same in numbers, unscaled except for r. Skill is 1 − distance / distance of the best simpler prediction "
-        "of the week; roughness is relative to the real surface. All columns are in ``results/study/prediction.csv``."
+        "of the week; roughness is relative to the observed surface. All columns are in "
+        "``results/study/prediction.csv``."
     ),
     target="validate",
 )
@@ -95,18 +96,17 @@ EXPECTED = Kind(
     f"{RUN_FIGURES}/expected.png",
     "pictures:runs_by_week",
     section="Validation",
-    title="Start, expected and real brains",
+    title="Start, expected and observed brains",
     caption=(
-        "The start and the expected brains (blue) beside the real ones (beige), from the left and from above, at one "
-        "scale. Below, on the expected surface: how far the real one lies outside (red) or inside it (blue) after "
-        "rigid alignment."
+        "The start and the expected brains (blue) and the observed brains (beige), from the left and from above, at "
+        "one scale. Below: how far the observed surface lies outside (red) or inside (blue) the expected one."
     ),
     target="validate",
 )
 
 
 def _deviations(simulation: Simulation) -> dict[float, list[str]]:
-    """Return the expected surface and the maps of the real brain's deviation from it, by week."""
+    """Return the expected surface and the maps of the observed brain's deviation from it, by week."""
     surfaces = surfaces_by_week(simulation)
     return {week: [surfaces[week], simulation.file(DEVIATION["maps"], week=week)] for week in simulation.observed}
 
@@ -115,10 +115,10 @@ def expected_figure(simulation: Simulation) -> Figure:
     surfaces, observed, deviations = surfaces_by_week(simulation), observed_by_week(simulation), _deviations(simulation)
     # the last week, and others at equal steps
     weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
-    shown = {min(surfaces), *weeks}
+    weeks_drawn = {min(surfaces), *weeks}
     inputs: Given = {
-        "runs": {"expected": {week: surface for week, surface in surfaces.items() if week in shown}},
-        "observed": {week: brain.pial for week, brain in observed.items() if week in shown},
+        "runs": {"expected": {week: surface for week, surface in surfaces.items() if week in weeks_drawn}},
+        "observed": {week: brain.pial for week, brain in observed.items() if week in weeks_drawn},
         "deviations": {week: deviations[week] for week in weeks},
     }
     return Figure(EXPECTED, inputs, {"observed_name": observed_name(observed.values())}, simulation.names)
@@ -131,9 +131,9 @@ DEVIATION_MAPS = Kind(
     section="Validation",
     title="Deviation from the expected: {quantity}",
     caption=(
-        "How real brains deviate from what run *{run}* expects, on the expected surface: logarithm of the real over "
-        "the expected area, or the real less the expected thickness. Values by region, with z among the study's other "
-        "brains, are in ``results/study/deviation_centiles.csv``."
+        "Deviation of observed brains from those that run *{run}* expects, on the expected surface: logarithm of "
+        "observed over expected area, or observed minus expected thickness. Values by region, with z among the study's "
+        "other brains, are in ``results/study/deviation_centiles.csv``."
     ),
     target="validate",
 )
@@ -142,7 +142,7 @@ DEVIATION_MAPS = Kind(
 def deviation_figure(simulation: Simulation, quantity: str) -> Figure:
     maps = {week: [files] for week, files in _deviations(simulation).items()}
     options: Given = {"quantity": quantity, "views": AROUND}
-    inputs: Given = {"brains": {"real less expected": maps}}
+    inputs: Given = {"brains": {"observed minus expected": maps}}
     return Figure(DEVIATION_MAPS, inputs, options, {**simulation.names, "quantity": quantity})
 
 
@@ -153,8 +153,8 @@ ONSET = Kind(
     section="Validation",
     title="Onset of sulci",
     caption=(
-        "Weeks in which the sulci of the last real brain that are absent at the start become 2 mm deep, from the "
-        "neighbouring crowns. Marks at the right edge: not within the simulated or measured weeks."
+        "Weeks in which the sulci of the last observed brain that are absent at the start become 2 mm deep, from the "
+        "neighbouring crowns. Marks at the right edge: not within the simulated or observed weeks."
     ),
     target="validate",
     job="validation_charts",
@@ -175,7 +175,7 @@ def _sweep_figures(study: Study, sweep: Sweep) -> Iterator[Figure]:
 
 
 def _start(sweep: Sweep) -> Brain:
-    """Return the start of the first run, whose runs figures show."""
+    """Return the start brain of the first run; figures show the runs from this brain."""
     return sweep.members[0][0].start
 
 
@@ -186,12 +186,12 @@ def _members(sweep: Sweep) -> dict[str, Measurement]:
 
 
 def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Given, **options: Any) -> Figure:
-    """Return a figure of the members of a sweep, some of which may have ended before the week of comparison."""
+    """Return a figure of the runs of a sweep; runs may have ended before the week of comparison."""
     start = _start(sweep)
     values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
     may_end = tuple((run, start.id, sweep.week) for run in inputs["members"])
-    shown = {"values": values, "observed_name": observed_name(sweep.observed[start.id][:1]), **options}
-    return Figure(kind, inputs, shown, _sweep_names(sweep), may_end)
+    arguments = {"values": values, "observed_name": observed_name(sweep.observed[start.id][:1]), **options}
+    return Figure(kind, inputs, arguments, _sweep_names(sweep), may_end)
 
 
 def _sweep_names(sweep: Sweep) -> dict[str, str]:
@@ -205,8 +205,8 @@ INFLUENCE = Kind(
     section="Studies",
     title="Influence on the folds",
     caption=(
-        "Runs of the study *{study}* at {week} GW, with the real brain last, from the left (a, c) and from above (b, "
-        "d): surfaces, and the shape index, about −½ in sulci (blue) and +½ on gyri (red)."
+        "Runs of the study *{study}* at {week} GW, with the observed brain last, from the left (a, c) and from above "
+        "(b, d): surfaces, and the shape index, about −½ in sulci (blue) and +½ on gyri (red)."
     ),
     target="influence_figures",
     paper=True,
@@ -230,8 +230,8 @@ INFLUENCE_SPECTRA = Kind(
     title="Influence on the spectrum of the folds",
     caption=(
         "Relative power in the bands B4 to B6 (primary to tertiary folds) of the left (a) and the right hemisphere (b) "
-        "in the study *{study}* at {week} GW: runs from pale to dark in their order, the real brain as stars. Hatched "
-        "bars and open stars: the band is cut off or finer than the surface."
+        "in the study *{study}* at {week} GW: runs from pale to dark in their order, the observed brain as stars. "
+        "Hatched bars and open stars: the band is cut off or finer than the surface."
     ),
     target="influence_figures",
     paper=True,
@@ -251,11 +251,11 @@ NEAREST = Kind(
     f"{SWEEP_FIGURES}/nearest.png",
     "scores:nearest_chart",
     section="Studies",
-    title="Distance from the real brain",
+    title="Distance from the observed brain",
     caption=(
-        "Distance of the runs of the study *{study}* from the real brain at {week} GW by each measure, over the varied "
-        "parameter. Ring and number: the nearest run whose mesh resolves the cortex. Open marks: the mesh does not "
-        "resolve the cortex, or the band is cut off."
+        "Distance of the runs of the study *{study}* from the observed brain at {week} GW by each measure, over the "
+        "varied parameter. Ring and number: the nearest run whose mesh resolves the cortex. Open marks: the mesh does "
+        "not resolve the cortex, or the band is cut off."
     ),
     target="influence_figures",
 )

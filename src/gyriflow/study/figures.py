@@ -1,4 +1,4 @@
-"""The figures and tables of a study: each kind with its function and its text, and the files it is drawn from."""
+"""Figures and tables of a study: each kind with its function and text, and its input files."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -126,7 +126,7 @@ def mesh_quality(study: Study) -> Figure:
 
 
 def _growth_figures(study: Study) -> Iterator[Figure]:
-    # of many subjects that are not folded, charts of metrics and change.csv tell growth; here each would have a panel
+    # for many subjects without simulations, charts of metrics and change.csv show growth; here each would need a panel
     if study.growth_brains and (len(study.series.brains) <= MAX_SERIES or study.run_simulations):
         yield growth_figure(study)
 
@@ -138,9 +138,9 @@ GROWTH_RATES = Kind(
     section="Growth",
     title="Cortical growth rates",
     caption=(
-        "Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the measured brains, "
+        "Pial area (a; both hemispheres, without the cut at the midline) and brain volume (b) of the observed brains, "
         "and the tangential growth rate between successive weeks of each series, α = (√θ − 1)/Δt, where θ is the ratio "
-        "of the areas. Dashed: the growth rate that was given to simulations."
+        "of the areas. Dashed: the growth rate of the simulations."
     ),
     target="growth",
     paper=True,
@@ -148,7 +148,7 @@ GROWTH_RATES = Kind(
 
 
 def growth_figure(study: Study) -> Figure:
-    # runs that follow sizes or shapes have no rate of their own
+    # runs that follow sizes or shapes have no given rate
     settings = [simulation.settings for simulation in study.simulations.values()]
     grown = [run for run in settings if "growth_rate_per_s" in run.growth.definition.rates]
     rate: Any = grown[0].growth_rate_per_s if grown else None
@@ -213,10 +213,10 @@ WEEKLY = Kind(
     f"{STUDY_FIGURES}/weekly.{{brain}}.png",
     "pictures:runs_by_week",
     section="Folding",
-    title="Simulated beside measured brains",
+    title="Simulated and observed brains",
     caption=(
-        "Runs from *{brain}* (blue) above the measured brains of the same weeks (beige), from the left and from above, "
-        "at one scale. The first week is the start brain as it was meshed. Differences between the runs are in "
+        "Runs from *{brain}* (blue) above the observed brains of the same weeks (beige), from the left and from above, "
+        "at one scale. The first week is the meshed start brain. Differences between the runs are in "
         "``results/study/runs.csv``."
     ),
     paper=True,
@@ -238,9 +238,9 @@ OUTLINES = Kind(
     f"{STUDY_FIGURES}/outlines.{{brain}}.png",
     "sections:outlines_chart",
     section="Folding",
-    title="Outlines of simulated and measured brains",
+    title="Outlines of simulated and observed brains",
     caption=(
-        "Outlines of the simulated brains and of the measured brain of the same week (black), rigidly aligned: coronal "
+        "Outlines of the simulated brains and of the observed brain of the same week (black), rigidly aligned: coronal "
         "(a) and axial sections (b) through the middle, sagittal sections (c) through the right hemisphere."
     ),
     paper=True,
@@ -285,7 +285,7 @@ SHAPE_MAPS = Kind(
     section="Metrics",
     title="Maps of the shape index",
     caption=(
-        "Shape index on the pial surfaces of the runs and of the measured brains of the same weeks: −½ is a valley "
+        "Shape index on the pial surfaces of the runs and of the observed brains of the same weeks: −½ is a valley "
         "(sulci, blue), +½ a ridge (gyri, red), −1 a cup, +1 a cap."
     ),
 )
@@ -326,7 +326,7 @@ RUNS = Kind(
     section="Folding",
     title="Parameters of the runs",
     caption=(
-        "Parameters that differ between the runs come first, then those that all share. All parameters are in "
+        "Parameters that differ between the runs come first, then shared ones. All parameters are in "
         "``results/study/runs.csv``."
     ),
     technical=True,
@@ -364,7 +364,7 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
 
 
 def _chart_options(study: Study) -> Given:
-    """Return names and groups of the brains in charts over the weeks; those of a group have its colour and name."""
+    """Return the names and groups of brains in charts over the weeks."""
     brains, groups = study.brains.values(), _groups(study)
     return {
         "runs": run_names(study.pairs),
@@ -375,12 +375,13 @@ def _chart_options(study: Study) -> Given:
 
 
 def _groups(study: Study) -> dict[str, str]:
-    """Return what each measured brain is in the covariate that colours them."""
-    brains, wanted = study.brains.values(), study.config.metrics.colour_by
-    for name in [wanted] if wanted else dict.fromkeys(name for brain in brains for name in brain.config.covariates):
+    """Return the group of each observed brain, its value of the covariate that colours show."""
+    brains, colour_by = study.brains.values(), study.config.metrics.colour_by
+    covariates = dict.fromkeys(name for brain in brains for name in brain.config.covariates)
+    for name in [colour_by] if colour_by else covariates:
         values = {brain.id: of[name] for brain in brains if name in (of := brain.config.covariates)}
         subjects = {study.brains[brain].subject for brain in values}
-        if 1 < len(set(values.values())) <= MAX_COLOURS and (wanted or len(set(values.values())) < len(subjects)):
+        if 1 < len(set(values.values())) <= MAX_COLOURS and (colour_by or len(set(values.values())) < len(subjects)):
             return {brain: f"{name}: {value}" for brain, value in values.items()}
     return {}
 
@@ -392,9 +393,9 @@ METRICS = Kind(
     section="Metrics",
     title="Metrics over the weeks",
     caption=(
-        "Lines are runs, marks are measured brains; scans of one subject are joined. The gyrification index is the "
+        "Lines are runs, marks are observed brains; scans of one subject are joined. The gyrification index is the "
         "pial area over that of the convex hulls of the hemispheres, or of tighter envelopes. The cut at the midline "
-        "is left out of both areas, so a smooth brain may have an index a few per cent below 1. Shape index: −1 is a "
+        "is excluded from both areas, so a smooth brain may have an index a few per cent below 1. Shape index: −1 is a "
         "cup, −½ a valley, +½ a ridge, +1 a cap."
     ),
     job="metrics_charts",
@@ -406,7 +407,7 @@ METRICS_TABLE = Kind(
     section="Metrics",
     title="Metrics, table",
     caption=(
-        "The measured brain, each run, and the run's difference from the measured brain. Curvature of folds shorter "
+        "The observed brain, each run, and the run's difference from the observed brain. Curvature of folds shorter "
         "than the curvature wavelength is flattened, and with it the mean curvature norm. All weeks, and the "
         "hemispheres, are in ``results/study/metrics.csv``."
     ),
@@ -432,11 +433,11 @@ NORMS = Kind(
     section="Metrics",
     title="Norms over the weeks",
     caption=(
-        "Metrics of whole brains over the weeks, and the norm: a quadratic of the week, a grey band that should hold "
-        "90 % of further brains (Student's distribution), and the 5, 50 and 95 % quantiles of weeks with at least five "
-        "brains (bars). If the norm has one average brain a week, the spread of individuals is unknown: there is no "
-        "band, and brains have a difference from the curve in % instead of a centile and z. Brains with other "
-        "hemispheres than the norm's are not compared with it, and not drawn."
+        "Metrics of whole brains over the weeks, and the norm: a quadratic in the week, a grey band that should "
+        "contain 90 % of further brains (Student's distribution), and the 5, 50 and 95 % quantiles of weeks with at "
+        "least five brains (bars). If the norm has one average brain a week, the spread of individuals is unknown: "
+        "there is no band, and brains have a difference from the curve in % instead of a centile and z. Brains with "
+        "other hemispheres than those of the norm are not compared and not drawn."
     ),
     job="metrics_charts",
 )
@@ -446,8 +447,8 @@ def norms_figure(study: Study, options: Given) -> Figure:
     reference = [study.brains[brain] for brain in study.norm_reference]
     tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
     comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]
-    shown = {"observed_name": observed_name(reference), "reference": study.norm_reference, "brains": comparable}
-    return Figure(NORMS, tables, options | shown)
+    arguments = {"observed_name": observed_name(reference), "reference": study.norm_reference, "brains": comparable}
+    return Figure(NORMS, tables, options | arguments)
 
 
 def _region_figures(study: Study) -> Iterator[Figure]:
@@ -468,7 +469,7 @@ def _region_figures(study: Study) -> Iterator[Figure]:
 
 REGIONS_CAPTION = (
     "Regions of the cortex, given on a brain (named sulci: on one of the spina bifida atlas), carried to other "
-    "measured brains by registration, and to simulated ones with the tissue. Metrics by region: areas are sums of both "
+    "observed brains by registration, and to simulated ones with the tissue. Metrics by region: areas are sums of both "
     r"sides, other values means by area; the asymmetry index is 2 (left − right)/(\|left\| + \|right\|)."
 )
 REGIONS_CHART = Kind(
@@ -496,7 +497,7 @@ RESOURCES = Kind(
     section="Resources",
     title="Time, memory, energy and emissions",
     caption=(
-        "What the jobs of this study needed. Energy is estimated as core hours × 12 W, emissions as energy × 475 "
+        "Resources of the jobs of this study. Energy is estimated as core hours × 12 W, emissions as energy × 475 "
         "g/kWh. The numbers are in ``results/study/resources.csv``."
     ),
     technical=True,

@@ -1,4 +1,4 @@
-"""Validates a configuration from plain dictionaries and reports its problems together."""
+"""Validation of a configuration from plain dictionaries, with all problems reported together."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ from .participants import participants_brains
 
 REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
 FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
-"""Sections of which a study has none that only measures."""
+"""Sections that are absent if a study only measures."""
 
 
 def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
@@ -33,21 +33,20 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     base_dir
         Folder of the configuration file, for relative paths.
     keep_going
-        Whether rows of `participants` that lack their age or data are left out, as `Config.left_out`; else they are
-        problems.
+        Whether rows of `participants` without age or data are left out, as `Config.left_out`; else they are problems.
 
     Raises
     ------
     InputError
-        Naming all problems of keys at once, or where each key is valid all problems between keys, each with its key,
-        what was found and what is allowed.
+        With all problems of single keys, or if there are none all problems between keys; each with its key, the value
+        found and the values allowed.
     """
     folder = Path(base_dir)
     plain = _plain(raw)
     if any(plain.get(section) is not None for section in FOLDING_SECTIONS):
         plain = _with_presets({"folding": {}} | plain)
     atlases, problems = _atlases(plain.get("atlas"), folder)
-    # None tells the checks that not all ids of brains are known
+    # None: the ids of brains are incomplete, so checks skip them
     plain["atlas"] = None if problems else [used.settings for used in atlases]
     entries, left_out = _participants(plain.get("participants"), folder, problems)
     if further := [*(entry for used in atlases for entry in atlas_brains(used)), *entries]:
@@ -55,7 +54,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     if not (keep_going and plain.get("brains")):
         problems += [row["cause"] for row in left_out.values()]
     awaited = [str(file.path) for used in atlases for file in used.files]
-    hints = ["config/README.md says where all keys are described"]
+    hints = ["config/README.md lists the descriptions of all keys"]
     try:
         config = Config.model_validate(plain, context={"folder": str(folder), "awaited": awaited})
     except ValidationError as error:
@@ -68,7 +67,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
         config.left_out.update(left_out)
         return config
     if left_out and not keep_going:
-        hints.append("with --keep-going, rows that can't be used are left out")
+        hints.append("use --keep-going to leave out rows that cannot be used")
     counted = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
     raise InputError("\n  ".join([f"the configuration has {counted}:", *problems]) + "\n" + "; ".join(hints))
 
@@ -81,7 +80,7 @@ def _participants(
     try:
         entries, left_out, wrong = participants_brains(ParticipantsSettings.model_validate(section), folder)
     except ValidationError:
-        # said with all other keys
+        # reported with all other keys
         return [], {}
     except InputError as error:
         problems.append(f"participants.file: {error}")
@@ -99,9 +98,9 @@ def _plain(value: Any) -> Any:
 
 
 def _with_presets(plain: dict[str, Any]) -> dict[str, Any]:
-    """Return the configuration with complete runs: what `folding` says, a run's preset over it, its own over both.
+    """Return the configuration with complete runs: `folding`, overridden by the run's preset, then by the run's keys.
 
-    A preset of `folding` lies under its other keys. What is no section is left for its refusal.
+    Keys of `folding` override its own preset. Values that are not sections are left for validation.
     """
     folding, runs = plain["folding"], plain.get("runs") or REFERENCE_RUNS
     if not isinstance(folding, dict):
@@ -131,7 +130,7 @@ def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
 
 
 def _merged_growth(base: Any, override: Any) -> Any:
-    old, new = ({"model": given} if isinstance(given, str) else given for given in (base, override))
+    old, new = ({"model": growth} if isinstance(growth, str) else growth for growth in (base, override))
     if not isinstance(old, dict) or not isinstance(new, dict):
         return new
     return new if new.get("model", old.get("model")) != old.get("model") else {**old, **new}
@@ -163,6 +162,6 @@ def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:
 
 
 def _lines(problems: list[tuple[Key, str]]) -> list[str]:
-    others = [(path, text) for path, text in dict.fromkeys(problems) if path[0] != "atlas"]
-    of_folding = {(path[1:], text) for path, text in others if path[0] == "folding"}
-    return [line(path, text) for path, text in others if path[0] != "runs" or (path[2:], text) not in of_folding]
+    unique = [(path, text) for path, text in dict.fromkeys(problems) if path[0] != "atlas"]
+    folding_problems = {(path[1:], text) for path, text in unique if path[0] == "folding"}
+    return [line(path, text) for path, text in unique if path[0] != "runs" or (path[2:], text) not in folding_problems]

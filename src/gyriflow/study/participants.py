@@ -1,4 +1,4 @@
-"""Tables of participants and their sessions, as BIDS has them."""
+"""Tables of participants and their sessions in the format of BIDS."""
 
 import difflib
 import re
@@ -17,17 +17,17 @@ from ..settings.participants import ParticipantsSettings
 from ..settings.varying import WEEK_RANGE
 
 IDS = ("participant_id", "id")
-"""Names of the column with the participants."""
+"""Possible names of the column of participants."""
 SESSION = "session_id"
 AGE = "age"
 UNIT_OF_AGE = {
     **dict.fromkeys(("gestational_age", "week", "gestational_age_weeks", "age_weeks"), "weeks"),
     **dict.fromkeys(("gestational_age_days", "age_days"), "days"),
 }
-"""Names of the column with the gestational age, and their units; `age` needs a unit in the table's sidecar."""
+"""Possible names of the column of gestational age, and units; `age` needs a unit in the table's sidecar."""
 UNITS = ("weeks", "days")
-NOTHING = frozenset(("", "n/a"))
-"""What stands for no value in BIDS."""
+MISSING_VALUES = frozenset(("", "n/a"))
+"""Missing values in BIDS."""
 SUBJECT_NAME = re.compile(r"sub-[A-Za-z0-9]{1,100}")
 WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d)")
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -61,9 +61,9 @@ class _Table:
 def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Scan]:
     """Return the scans of a participants.tsv, and of its participants' sessions, `sub-01/sub-01_sessions.tsv`.
 
-    A participant with sessions has a scan for each, whose id is `sub-01_ses-1`. `further` are values for all rows, in
-    which `{id}`, `{subject}` and `{session}` are the row's. InputError where a table cannot be read, or has no column
-    of ids or gestational ages.
+    A participant with sessions has a scan for each, whose id is `sub-01_ses-1`. `further` are values for all rows;
+    `{id}`, `{subject}` and `{session}` in them are replaced by the row's. InputError if a table cannot be read, or has
+    no column of ids or gestational ages.
     """
     table = _read(path)
     ids = next((name for name in IDS if name in table.rows[0]), None)
@@ -73,7 +73,7 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Sca
     for row in table.rows:
         name, place = row[ids], path.parent / row[ids]
         file = place / f"{name}_sessions.tsv"
-        # any other name leads elsewhere
+        # other names could be paths out of the folder
         sessions = _read(file) if SUBJECT_NAME.fullmatch(name) and file.is_file() else None
         # a table of sessions without ages does not help
         ages = sessions if sessions is not None and sessions.column else table
@@ -86,7 +86,7 @@ def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Sca
 
 def _scan(name: str, values: dict[str, str], table: _Table, further: Mapping[str, str]) -> Scan:
     label = values.get(SESSION, "n/a")
-    session = None if label in NOTHING else label if label.startswith("ses-") else f"ses-{label}"
+    session = None if label in MISSING_VALUES else label if label.startswith("ses-") else f"ses-{label}"
     own_id = f"{name}_{session}" if session else name
     for key, text in further.items():
         if values[key] == text:
@@ -128,17 +128,17 @@ def _lacks(table: _Table, what: str, names: Sequence[str]) -> InputError:
     return InputError(f"has no column of {what}", path=table.path, found=columns, expected=expected)
 
 
-# as brains of a configuration
+# brains of a configuration
 
 PATHS = ("labels", "image", "pial", "white", "hemispheres.left", "hemispheres.right", "hemisphere.file")
-"""The columns that are keys of brains with paths, inner keys with dots."""
+"""Columns that are keys of brains with paths, inner keys with dots."""
 BRAIN_KEYS = (*PATHS, "population", "subject", "scheme", "affine_from", "coordinates", "hemisphere.side")
-"""All columns that are keys of brains, besides those of who it is and of the age."""
+"""All columns that are keys of brains, except ids and age."""
 FILES, SIDE = "files", "side"
-"""Columns that stand for a source, whatever its key."""
-KNOWN = {*IDS, SESSION, *UNIT_OF_AGE, AGE, FILES, SIDE, *BRAIN_KEYS}
-ALMOST = 0.85
-"""How like a known name an unknown column has to be to be taken for a mistyped one."""
+"""Columns of files of any source, and of their hemisphere."""
+FIELDS = {*IDS, SESSION, *UNIT_OF_AGE, AGE, FILES, SIDE, *BRAIN_KEYS}
+MIN_SIMILARITY = 0.85
+"""Minimum similarity of an unknown column to a known one to be reported as mistyped."""
 
 
 def participants_brains(
@@ -153,8 +153,8 @@ def participants_brains(
     path = located(folder, settings.file)
     scans = read_scans(path, settings.columns)
     for column in scans[0].values:
-        if column not in KNOWN and (near := difflib.get_close_matches(column, KNOWN, n=1, cutoff=ALMOST)):
-            raise InputError("has a column that seems mistyped", path=path, found=column, expected=near[0])
+        if column not in FIELDS and (near := difflib.get_close_matches(column, FIELDS, n=1, cutoff=MIN_SIMILARITY)):
+            raise InputError("has a column whose name seems mistyped", path=path, found=column, expected=near[0])
     counts = Counter(scan.id for scan in scans)
     entries: list[dict[str, Any]] = []
     left_out: dict[str, dict[str, Any]] = {}
@@ -164,8 +164,8 @@ def participants_brains(
         text = f"{path}: {scan.id}: {scan.cause or problem}"
         if not (scan.cause or problem):
             entries.append(entry)
-        elif counts[scan.id] > 1 and scan.id not in NOTHING:
-            problems.append(f"{text} (the id is that of {counts[scan.id]} rows; ids are unique)")
+        elif counts[scan.id] > 1 and scan.id not in MISSING_VALUES:
+            problems.append(f"{text} ({counts[scan.id]} rows have this id; ids must be unique)")
         else:
             left_out[scan.id] = {"week": scan.week, "cause": text}
     return entries, left_out, problems
@@ -174,16 +174,16 @@ def participants_brains(
 def covariates(scan: Scan) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the columns of its table without another meaning."""
     keys = {*IDS, SESSION, FILES, SIDE, *BRAIN_KEYS, scan.age_column}
-    values = {key: value for key, value in scan.values.items() if key not in keys and value not in NOTHING}
+    values = {key: value for key, value in scan.values.items() if key not in keys and value not in MISSING_VALUES}
     return {"covariates": values} if values else {}
 
 
 def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
-    values = {key: value for key, value in scan.values.items() if value not in NOTHING}
+    values = {key: value for key, value in scan.values.items() if value not in MISSING_VALUES}
     entry: dict[str, Any] = {"id": scan.id, "week": scan.week, "subject": scan.subject} | covariates(scan)
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)
-        most, expected = (2, "a left and a right hemisphere at most") if side is None else (1, "the one of its side")
+        most, expected = (2, "at most a left and a right hemisphere") if side is None else (1, "the file of this side")
         if len(files) > most:
             return {}, f"files: found {len(files)}, {'; '.join(files)}; expected {expected}"
         values |= _file_keys(files, side)

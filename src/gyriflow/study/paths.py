@@ -17,21 +17,21 @@ WEEK = "week-{week}"
 PLACE = "results/{where}"
 """The metrics of a brain, measured or simulated."""
 PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
-"""What the paper reports."""
+"""Values reported by the paper."""
 
 
 def file_of(pattern: str, **names: str | float) -> str:
-    """Return the file of a pattern; its week, a number, has two decimals there, as "21.50"."""
+    """Return the file of a pattern; weeks have two decimals, such as "21.50"."""
     return pattern.format(**{key: name if isinstance(name, str) else week_tag(name) for key, name in names.items()})
 
 
 def surfaces_in(folder: str, sides: tuple[Side, ...] = SIDES) -> dict[str, str]:
-    """Return the surface files of a brain in a folder, by part: the whole and the hemispheres that it has."""
+    """Return the surface files of a brain in a folder, by part: the whole and its hemispheres."""
     return {"whole": f"{folder}/pial.surf.gii", **{side: f"{folder}/{side}.pial.surf.gii" for side in sides}}
 
 
 def pial_of(*sides: Side) -> dict[str, str]:
-    """Return the files that are made for every brain with some hemispheres, whatever its source."""
+    """Return the surface files of a brain with some hemispheres, for any source."""
     folder = f"{BRAIN}/surface"
     return {**surfaces_in(folder, sides), "stl": f"{folder}/pial.stl", "report": f"{folder}/surface.json"}
 
@@ -43,7 +43,7 @@ def folded_of(*sides: Side) -> dict[str, str]:
 
 
 def measures_in(folder: str, *sides: Side) -> dict[str, str]:
-    """Return the tables of a measured or simulated brain in a folder, and the maps on the hemispheres that it has."""
+    """Return the tables of a measured or simulated brain in a folder, and the maps on its hemispheres."""
     tables = {name: f"{folder}/{name}.csv" for name in ("metrics", "spectra", "coefficients")}
     return {**tables, **{f"{side}_maps": f"{folder}/{side}.shape.gii" for side in sides}}
 
@@ -68,7 +68,7 @@ SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
     "thickness": f"{BRAIN}/surface/thickness.shape.gii",
-    # not a number where it could not be measured
+    # NaN where it could not be measured
     "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
     "summary": f"{BRAIN}/surface/thickness.json",
 }
@@ -118,7 +118,7 @@ def one_of(names: Iterable[str]) -> str:
 
 
 def figure_log(rule: str, pattern: str) -> str:
-    """Return the log of a figure, called by its rule, and by those of its wildcards that the folder does not name."""
+    """Return the log of a figure, named by its rule and the wildcards that are not in the folder."""
     folder = next(place for place in (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT) if pattern.startswith(f"{place}/"))
-    others = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
-    return f"{folder}/logs/{'.'.join([rule, *others])}.log"
+    wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
+    return f"{folder}/logs/{'.'.join([rule, *wildcards])}.log"

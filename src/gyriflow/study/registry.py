@@ -1,4 +1,4 @@
-"""Records of the figures and tables of a study: the function that draws each, its files, and its text in the report."""
+"""Records of the figures and tables of a study: the drawing function, the files, and the text of the report."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -85,7 +85,7 @@ class Figure:
         return {key: name for key, name in self.names.items() if f"{{{key}}}" in self.kind.pattern}
 
     def inputs_without(self, runs: Iterable[str]) -> Mapping[str, Any]:
-        """Return the inputs, with None for members that have ended before."""
+        """Return the inputs, with None for runs that ended before."""
         if "members" not in self.inputs:
             return self.inputs
         ended = set(runs)
@@ -120,7 +120,7 @@ def target_files(figures: Iterable[Figure], *targets: str) -> list[str]:
 
 
 def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
-    """Return the figures by rule and job; those of one job have the same wildcards."""
+    """Return the figures by rule and job; figures of one job have the same wildcards."""
     rules: dict[str, dict[tuple[tuple[str, str], ...], list[Figure]]] = {}
     for figure in figures:
         if figure.kind.draw:
@@ -130,9 +130,9 @@ def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:
 
 
 def observed_name(brains: Iterable[Brain]) -> str:
-    """Return the name of measured brains in figures and tables, their populations if known.
+    """Return the name of observed brains in figures and tables: their populations if known.
 
-    Several populations are listed with their weeks. Real brains of unknown population are called "real brain"; shapes
+    Several populations are listed with their weeks. Brains of unknown population are called "observed brain"; shapes
     are called by their kind if they share one.
     """
     populations: dict[str, set[float]] = {}
@@ -144,20 +144,20 @@ def observed_name(brains: Iterable[Brain]) -> str:
             populations.setdefault(brain.config.population or OBSERVED_BRAIN, set()).add(brain.week)
     names = list(populations)
     if len(names) > 1:
-        spans = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
-        names = [f"{name} ({span} GW)" for name, span in zip(names, spans, strict=True)]
+        ranges = ("-".join(f"{week:g}" for week in sorted({min(ws), max(ws)})) for ws in populations.values())
+        names = [f"{name} ({weeks} GW)" for name, weeks in zip(names, ranges, strict=True)]
     if kinds:
         names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
     return " or ".join(names) or OBSERVED_BRAIN
 
 
 def halves_of(row: Measurement) -> list[list[str]]:
-    """Return the hemispheres of a measured brain, each with its maps."""
+    """Return the hemispheres of a brain, each with its maps."""
     return [list(pair) for pair in zip(row.hemispheres, row.maps, strict=True)]
 
 
 def regions_of(row: Measurement) -> list[list[str]]:
-    """Return the hemispheres of a measured brain, each with its regions."""
+    """Return the hemispheres of a brain, each with its regions."""
     return [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
 
 
@@ -167,5 +167,5 @@ def surfaces_by_week(simulation: Simulation) -> dict[float, str]:
 
 
 def observed_by_week(*simulations: Simulation) -> dict[float, Brain]:
-    """Return the measured brains that are shown with simulations, by week."""
+    """Return the observed brains that are shown with simulations, by week."""
     return {week: brain for simulation in simulations for week, brain in simulation.observed_with_start.items()}

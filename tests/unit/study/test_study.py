@@ -368,8 +368,8 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     }
     (drawn,) = (figure for figure in figures_of(found) if figure.kind.name == "predicted_figure")
     shown = {22.4: surface("own22.4"), 23.9: f"{at}/pial.surf.gii", 24: surface("b24")}
-    assert list(drawn.inputs["real"].items()) == [(Facts(week, "GW"), path) for week, path in shown.items()]
-    assert drawn.options["predicted"] == list(drawn.inputs["real"])[1]
+    assert list(drawn.inputs["observed"].items()) == [(Facts(week, "GW"), path) for week, path in shown.items()]
+    assert drawn.options["predicted"] == list(drawn.inputs["observed"])[1]
     # no prediction is one that its own later brains explain, or a study of several runs
     assert study(of_two(22, 23, 24), runs={"a": {"preset": "measured"}}).prediction_facts is None
     assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).prediction_facts is None
