@@ -15,8 +15,6 @@ class Facts:
     def __eq__(self, message: object) -> bool:
         return all(re.search(pattern(fact), str(message)) for fact in self.facts)
 
-    __hash__ = None
-
     def __call__(self, error: Exception) -> bool:
         if self != error:
             raise AssertionError(f"{self} are not all in: {error}")
@@ -28,12 +26,10 @@ class Facts:
 
 def pattern(fact: object) -> str:
     """Return what finds a fact in a text, and nothing longer."""
-    is_number = isinstance(fact, int | float) and not isinstance(fact, bool)
     text = f"{fact:.10g}" if isinstance(fact, float) else str(fact)
     starts = r"(?<!\w)(?<!\w\.)" if re.match(r"\w", text) else ""
     ends = r"(?!\w)(?!\.\w)(?!\[)" if re.search(r"\w$", text) else ""
-    if is_number:
+    if isinstance(fact, int | float) and not isinstance(fact, bool):
         # a minus is of the number; 21-24 is a range
-        starts += r"(?<!\W-)"
-        ends = ("0*" if "." in text else r"(?:\.0+)?") + ends
+        starts, ends = rf"{starts}(?<!\W-)", ("0*" if "." in text else r"(?:\.0+)?") + ends
     return starts + re.escape(text) + ends

@@ -98,9 +98,8 @@ def test_a_surface_that_crosses_itself_is_refused():
     mesh = two_balls()
     mesh = TetrahedralMesh(mesh.vertices - np.sign(mesh.vertices[:, :1]) * [0.6, 0.0, 0.0], mesh.tets)
     facets, _ = boundary_faces(mesh)
-    domain = Domain(COMM, mesh)
     with pytest.raises(MeshError, match=r"mesh\.envelope_mm"):
-        SelfContact(domain, facets, 1000.0, 0.2)
+        SelfContact(Domain(COMM, mesh), facets, 1000.0, 0.2)
 
 
 def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():

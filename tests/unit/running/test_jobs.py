@@ -100,8 +100,7 @@ def test_messages_are_gathered_by_brain_and_run(tmp_path):
 )  # fmt: skip
 def test_the_cause_is_gyriflows_own_message_or_else_the_exception_or_the_end(log, expected):
     assert cause(log) == expected
-    assert cause(log) != Facts("Traceback")
-    assert cause(log) != Facts("WorkflowError")
+    assert not any(word in cause(log) for word in ("Traceback", "WorkflowError"))
 
 
 def write(folder, name, *lines, head=HEAD):
