@@ -90,8 +90,8 @@ def page_of(tests):
     lines = [
         "# Reliability",
         "",
-        "What can go wrong, and the result for the user ([exit codes](questions.md)). Each row is tested; an outcome is",
-        "given if not all tests passed.",
+        "What can go wrong, and the result for the user ([exit codes](questions.md)). Each row is tested.",
+        "An outcome is given if not all tests passed.",
         "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
         "",
         f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
