@@ -50,7 +50,7 @@ BY_TESTS = {
     "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '("run", "target")', '("run",)')],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),
-        ("src/gyriflow/compare/deviation.py", " * expected_mm / first_mm", ""),
+        ("src/gyriflow/compare/deviation.py", " * expected_mm / start_mm", ""),
     ],
     "compare/test_validation.py": [
         ("src/gyriflow/compare/validation.py", 'row[f"real_{name}"] - 1', '-row[f"real_{name}"] + 1'),

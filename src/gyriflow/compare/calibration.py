@@ -1,4 +1,4 @@
-"""Calibration: parameters of the runs of a round, their scores, and a surrogate with its minimum."""
+"""Calibration: choose the parameters of the next runs, score the runs, and minimise a surrogate of the score."""
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -26,7 +26,7 @@ DIGITS = 6
 N_CANDIDATES = 1024
 """Points of a Sobol sequence at which the surrogate is evaluated."""
 MIN_SPACING = 0.02
-"""Distance in the unit box that a new run keeps from all others."""
+"""Smallest distance in the unit box between a new run and any other run."""
 
 
 def sobol_design(bounds: Mapping[str, Sequence[float]], count: int, seed: int) -> pd.DataFrame:
@@ -61,7 +61,8 @@ def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], 
     base
         Content of `params.yaml` of the base run.
     values
-        By parameter: a key, with dots for nested ones, `stiffness_ratio`, or `KEY.amplitude`, which scales a curve.
+        Value of each parameter. A parameter is a key of `params.yaml` (with dots for nested keys), `stiffness_ratio`,
+        or `KEY.amplitude`, a factor on the curve KEY.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
@@ -141,11 +142,11 @@ def run_score(
     Parameters
     ----------
     pairs
-        Simulated and observed surfaces that are compared. They are not looked at if the run has diverged.
+        Simulated and observed surfaces to compare. They are not read if the run has diverged.
     weights
-        Of each score.
+        Weight of each score.
     causes
-        Why simulations of the run have diverged; empty if all have finished.
+        Reasons why simulations of the run have diverged; empty if all have finished.
 
     Returns
     -------
@@ -163,10 +164,12 @@ def run_score(
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """A Gaussian process over the unit box of the bounds, which are the lowest and highest value by parameter.
+    """A Gaussian process that predicts the score of a run from its parameters.
 
-    It is fitted to n runs at points (n, d) with scores (n,), a diverged run with one worse than all others. The kernel
-    is Matérn's (ν = 5/2) with a length for each parameter, and noise. `seed` is that of the candidates.
+    `bounds` are the lowest and highest value of each parameter; they become 0 and 1 in the unit box. The process is
+    fitted to n runs at `points` (n, d) of the box, with `scores` (n,); a diverged run gets a score worse than all
+    others. The kernel is Matérn's (ν = 5/2), with a length for each parameter, plus noise. `seed` determines the
+    candidates for the next runs.
     """
 
     process: GaussianProcessRegressor
@@ -179,13 +182,13 @@ class Surrogate:
 def fit_surrogate(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
     """Fit the surrogate to the runs of a calibration: columns of the parameters, and score (NaN if diverged).
 
-    ValueError if less than two runs have a score.
+    ValueError if fewer than two runs have a score.
     """
     points, scores = to_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
     finished = scores[np.isfinite(scores)]
     if len(finished) < 2:
         raise ValueError(f"{len(finished)} runs have a score, but a surrogate needs two or more")
-    # diverged runs are as far above the worst score as that is above the best: a wall that the surrogate can follow
+    # a diverged run scores as far above the worst as the worst is above the best: not too steep for the surrogate
     scores = np.where(np.isfinite(scores), scores, 2 * finished.max() - finished.min())
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern([0.5] * len(bounds), (0.05, 20.0), nu=2.5)
     process = GaussianProcessRegressor(
@@ -218,7 +221,7 @@ def propose_runs(surrogate: Surrogate, count: int) -> pd.DataFrame:
 
 
 def expected_improvement(process: GaussianProcessRegressor, points: Floats, best: float) -> Floats:
-    """Return the expected improvement of (n, d) points over the best score, (n,) (Jones, Schonlau and Welch 1998)."""
+    """Return the (n,) expected improvements of (n, d) points over the best score (Jones, Schonlau and Welch 1998)."""
     mean, sd = process.predict(points, return_std=True)
     sd = np.maximum(sd, 1e-12)
     gain = best - mean
@@ -259,6 +262,6 @@ def _candidates(surrogate: Surrogate) -> Floats:
     dimension = len(surrogate.bounds)
     spread = qmc.Sobol(dimension, rng=rng).random(N_CANDIDATES)
     best = surrogate.points[surrogate.scores.argmin()]
-    # and half as many near the best run
+    # further candidates near the best run, half as many
     near = np.clip(best + 0.1 * rng.standard_normal((N_CANDIDATES // 2, dimension)), 0, 1)
     return np.vstack([spread, near])

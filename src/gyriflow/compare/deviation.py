@@ -1,4 +1,4 @@
-"""Deviation of an observed brain from the expected one: maps, means by region, and their place among other brains."""
+"""Deviation of an observed brain from the expected one: maps, means by region, and centiles among other brains."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -32,7 +32,8 @@ def deviation_maps(expected: TriangleMesh, fitted: TriangleMesh) -> dict[str, Fl
     Parameters
     ----------
     expected, fitted
-        The expected surface in mm, aligned with the observed one, and the same deformed to fit that.
+        The expected surface in mm, aligned with the observed one, and the same surface deformed to fit the observed
+        one.
     """
     ratio = vertex_areas(fitted) / vertex_areas(expected)
     return {
@@ -45,7 +46,7 @@ def thickness_difference(
     fitted: TriangleMesh,
     observed: SurfaceThickness,
     start: SurfaceThickness,
-    first: SurfaceThickness,
+    simulated_start: SurfaceThickness,
     expected_mm: Floats,
 ) -> Floats:
     """Return the observed minus the expected thickness in mm at the (n,) vertices of the expected surface.
@@ -58,11 +59,11 @@ def thickness_difference(
         The expected surface deformed to fit the observed one.
     observed, start
         The observed brain of the week, and the observed start brain.
-    first, expected_mm
-        The run at the start's week, and its thickness at the expected surface's vertices, which are the same.
+    simulated_start, expected_mm
+        The simulated brain at the week of the start, and its thickness at the week compared. Vertices are the same.
     """
-    first_surface, first_mm = first
-    grown = _values_on(first_surface, start) * expected_mm / first_mm
+    surface, start_mm = simulated_start
+    grown = _values_on(surface, start) * expected_mm / start_mm
     return _values_on(fitted, observed) - grown
 
 
@@ -89,7 +90,7 @@ def deviation_table(
     sides
         Its hemispheres, whose vertices are among those of the whole surface.
     regions
-        By side the labels of the hemisphere's vertices and their names; empty where there are none.
+        By side: the labels of the hemisphere's vertices, and the names of the labels. Empty without regions.
 
     Returns
     -------
@@ -102,7 +103,8 @@ def deviation_table(
     everywhere = {part: np.ones(len(place), dtype=np.int64) for part, place in places.items()}
     tables = [region_metrics(parts, part_maps, everywhere, {1: ""})]
     tables += [
-        region_metrics({side: sides[side]}, part_maps, {side: own}, names) for side, (own, names) in regions.items()
+        region_metrics({side: sides[side]}, part_maps, {side: vertex_labels}, names)
+        for side, (vertex_labels, names) in regions.items()
     ]
     table = pd.concat(tables, ignore_index=True)
     means = table[table["metric"].str.startswith("mean_")]
@@ -122,7 +124,7 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
     """
     tables = []
     for _, table in deviations.dropna(subset=["value"]).groupby("run", sort=False):
-        # scores are by hemisphere: here each region of one counts as a hemisphere of its own
+        # scores are computed by hemisphere, so each region is passed as a hemisphere of its own
         parts = table["hemisphere"] + " " + table["region"].fillna("")
         rows, subjects = table.assign(run=MEASURED, hemisphere=parts), list(table["subject"])
         scores = measured_scores(rows, subjects, individuals=individuals)

@@ -1,4 +1,4 @@
-"""Displacement of the pial surface from week to week: a run's compared with the one that registration measured."""
+"""Displacement of the pial surface from week to week: that of a run compared with that measured by registration."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Distances between two surfaces: over both of them, by side, and over patches drawn with replacement."""
+"""Distances between two surfaces: over both of them, by side, and in bootstrap samples of patches."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,8 +16,8 @@ def pairwise_distances(
 ) -> list[VertexDistances]:
     """Measure how far the vertices of each of two aligned surfaces are from the other one, in mm.
 
-    Where `even` is given, the observed brain's surface with even triangles, its vertices are measured instead of the
-    observed surface's own.
+    `even` is the observed surface with even triangles. If given, distances are measured at its vertices instead of
+    those of `observed`.
     """
     pairs = (surface, observed), (observed if even is None else even, surface)
     return [(mesh, nearest_on(mesh.vertices, target)[0]) for mesh, target in pairs]
@@ -45,11 +45,11 @@ def aligned_distances(surface: TriangleMesh, observed: TriangleMesh) -> dict[str
     return surface_distances(pairwise_distances(align(surface, observed), observed))
 
 
-def drawn_distances(pair: list[VertexDistances], points: Floats, patch: Ints, drawn: Ints) -> Floats:
-    """Return the (k,) mean distances in mm over k draws of patches.
+def bootstrap_distances(pair: list[VertexDistances], points: Floats, patch: Ints, drawn: Ints) -> Floats:
+    """Return the (k,) mean distances in mm in k bootstrap samples of patches.
 
-    `drawn` (k, p) counts how often each of p patches is drawn; `patch` (n,) is the patch of each of `points` (n, 3),
-    and every vertex belongs to the patch of the nearest point.
+    `drawn` (k, p) counts how often each of p patches is in a sample; `patch` (n,) is the patch of each of `points`
+    (n, 3). Every vertex belongs to the patch of the nearest point.
     """
     tree, means = cKDTree(points), []
     for mesh, distances in pair:

@@ -26,10 +26,10 @@ MIN_DEPTH_MM = 2.0
 """A sulcus is present if it is at least this deep below its neighbouring crowns."""
 
 CROWN_DISTANCE_MM = 10.0
-"""Distance from a sulcus within which its crowns are looked for."""
+"""Distance from a sulcus within which its neighbouring crowns are searched for."""
 
 MIN_AREA_MM2 = 40.0
-"""Valleys with less area are not counted as sulci."""
+"""Smallest area of a valley that counts as a sulcus."""
 
 BOTTOM_QUANTILE, CROWN_QUANTILE = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a sulcus and for the crowns around it."""
@@ -78,7 +78,7 @@ def name_sulci(
 ) -> tuple[Ints, dict[int, str]]:
     """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
 
-    Names are like "left central", with a number from the second part in a region on, by size. Parts outside of all
+    Names are like "left central", then "left central 2" for the second largest part in that region. Parts outside all
     regions are named by the number of their valley, like "left 4".
 
     Parameters
@@ -86,7 +86,8 @@ def name_sulci(
     sulci
         (n,) numbers of `find_sulci`.
     labels, names
-        (n,) labels of the vertices, and the names of those that are regions; without any, sulci are "left 1" and so on.
+        (n,) labels of the vertices, and names of the labels that are regions. Without names, sulci are "left 1" and so
+        on.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def _parts_by_region(
 ) -> list[tuple[int, NDArray[np.bool_]]]:
     """Divide a sulcus among the regions with `MIN_AREA_MM2` or more of it; the rest goes to the largest part.
 
-    What lies outside of all regions goes to the largest part too, unless it is more than half of the sulcus.
+    The area outside all regions goes to the largest part too, unless it is more than half of the sulcus.
     """
     sizes = np.bincount(labels[inside], areas[inside], minlength=int(labels.max()) + 1)
     large = [int(label) for label in np.flatnonzero(sizes >= MIN_AREA_MM2)]
@@ -166,8 +167,8 @@ def measure_relief(
 ) -> pd.DataFrame:
     """Measure how deep each sulcus is below its neighbouring crowns.
 
-    The (n,) depth of the vertices is below the hull or envelope. Columns region, bottom_mm, crown_mm, relief_mm
-    (bottom − crown), NaN for sulci without vertices.
+    `depth_mm` (n,) is the depth of the vertices below the hull or envelope. Columns: region, bottom_mm, crown_mm,
+    relief_mm (bottom − crown); NaN for sulci without vertices.
     """
     areas = vertex_areas(mesh)
     rows = []
@@ -189,9 +190,9 @@ def measure_relief(
 def find_onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
     """Find the week when each sulcus appears, from tables of `measure_relief` by week.
 
-    It is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly between weeks; if the relief of the week
-    before is unknown, the week itself. Columns region, there_at_start, onset_week (NaN if the sulcus was present at the
-    start or never appears), first_relief_mm, last_relief_mm.
+    That is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly from the week before (not interpolated
+    if the relief of the week before is NaN). Columns: region, there_at_start, onset_week (NaN if the sulcus was present
+    at the start or never appears), first_relief_mm, last_relief_mm.
     """
     weeks, rows = sorted(reliefs), []
     for name, table in pd.concat([reliefs[week] for week in weeks]).groupby("region", sort=False):

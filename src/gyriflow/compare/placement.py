@@ -11,16 +11,18 @@ from ..quantities import COMPARED_MAPS
 from .shapes import PreparedSurface
 
 PATCH_EDGE_MM = 20.0
-"""Edge of the patches that the bootstrap draws: wider than a gyrus with its sulcus."""
+"""Width of the patches that are resampled in the bootstrap: wider than a gyrus with its sulcus."""
 
 SYMMETRY_TOL_MM = 0.4
 """Mean distance to the mirror image below which both sides count as one observation: half a voxel of atlases."""
 
 MIN_SKILL_HORIZON_GW = 1.5
-"""Within shorter horizons the adjacent brain is the start itself, so skill has no baseline."""
+"""Longest horizon without skill: the observed brain of the week before is then the start brain itself."""
 
 N_DRAWS = 2000
+"""Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
+"""Quantiles of the bootstrap samples at the ends of a 95 % interval."""
 
 
 def correlation(x: Floats, y: Floats, weights: Floats) -> float:
@@ -33,8 +35,9 @@ def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
 
     NaN for horizons (GW) up to `MIN_SKILL_HORIZON_GW`, and where the adjacent week is not better than the start.
     """
-    room = r_adjacent - r_start
-    return float((r - r_start) / room) if horizon > MIN_SKILL_HORIZON_GW and room > 0 else float("nan")
+    baseline_gain = r_adjacent - r_start
+    has_baseline = horizon > MIN_SKILL_HORIZON_GW and baseline_gain > 0
+    return float((r - r_start) / baseline_gain) if has_baseline else float("nan")
 
 
 def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) -> tuple[dict[str, Floats], float]:
@@ -56,12 +59,12 @@ def score_placement(
     *,
     horizon: float,
 ) -> dict[str, float | bool]:
-    """Score how well the folds of a simulated brain lie where the observed brain has its own.
+    """Score how well the positions of a simulated brain's folds agree with those of the observed brain.
 
     Correlations r are weighted by area over the whole observed surface. For each of `COMPARED_MAPS`: r_…, r_start_…,
-    r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… from patches drawn with
-    replacement (Efron and Tibshirani 1993), and skill_…. Further matched_share, the share of the observed area with a
-    matching point on the simulated brain, and asymmetry_mm and mirrored_patches of `make_patches`.
+    r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… by a bootstrap over patches
+    (Efron and Tibshirani 1993), and skill_…. In addition matched_share, the share of the observed area with a matching
+    point on the simulated brain, and asymmetry_mm and mirrored_patches of `make_patches`.
 
     Parameters
     ----------
@@ -101,7 +104,7 @@ def make_patches(surface: PreparedSurface, *, mirrored: bool = False) -> tuple[I
     """Return the (n,) patch number of each vertex, and how symmetric the brain is.
 
     asymmetry_mm is the mean distance of the brain from its mirror image. mirrored_patches is true if a patch and its
-    mirror image are drawn together: below `SYMMETRY_TOL_MM`, or on request (`mirrored`).
+    mirror image count as one patch: if that distance is below `SYMMETRY_TOL_MM`, or on request (`mirrored`).
     """
     image, asymmetry_mm = mirror_image(surface.mesh, surface.areas)
     together = mirrored or asymmetry_mm < SYMMETRY_TOL_MM
@@ -122,7 +125,7 @@ def mirror_image(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
 def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
     """Divide (n, 3) points into patches about `edge_mm` wide and return the (n,) number of each point's patch.
 
-    Patches are the Voronoi cells of seeds chosen by farthest-point sampling, so every call gives the same. With
+    Patches are the Voronoi cells of seeds chosen by farthest-point sampling, which is deterministic. With
     `mirrored`, the (n, 3) mirror images of the points, a patch and its mirror image have the same number.
     """
     sides = 1
@@ -140,23 +143,23 @@ def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floa
 def gain_interval(
     truth: Floats, simulated: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer]
 ) -> tuple[float, float]:
-    """Return the 95 % interval of r(simulated) − r(start) when whole patches are drawn with replacement."""
+    """Return the 95 % interval of r(simulated) − r(start) by a bootstrap over patches."""
     drawn = draw_patches(patch)
-    r_simulated, r_start = (drawn_correlations(truth, values, areas, patch, drawn) for values in (simulated, start))
+    r_simulated, r_start = (bootstrap_correlations(truth, values, areas, patch, drawn) for values in (simulated, start))
     low, high = np.nanquantile(r_simulated - r_start, INTERVAL)
     return float(low), float(high)
 
 
 def draw_patches(patch: NDArray[np.integer]) -> Ints:
-    """Draw patches with replacement: how often each of p is drawn, (N_DRAWS, p)."""
+    """Draw bootstrap samples of patches: return how often each of p patches is in each sample, (N_DRAWS, p)."""
     count = int(patch.max()) + 1
     return np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
 
 
-def drawn_correlations(
+def bootstrap_correlations(
     truth: Floats, values: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
 ) -> Floats:
-    """Return the (N_DRAWS,) area-weighted correlations of (n,) values over the patches of each draw."""
+    """Return the (N_DRAWS,) area-weighted correlations of (n,) values in each bootstrap sample."""
     columns = _products(truth, values, areas).T
     sums: Floats = np.stack([np.bincount(patch, column) for column in columns], axis=1)
     return _correlations(np.asarray(drawn @ sums, dtype=float))

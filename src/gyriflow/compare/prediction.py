@@ -1,4 +1,4 @@
-"""Predictions of later weeks: how near a run and the simplest ways to predict come to the observed brain."""
+"""Predictions of later weeks: distance of a run, and of simple baselines, from the observed brain."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,12 +10,12 @@ from ..geometry.alignment import align
 from ..geometry.matching import crossing_faces
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, signed_volume, vertex_areas, vertex_normals
 from ..quantities import COMPARED_MAPS
-from .distances import drawn_distances, pairwise_distances, surface_distances
+from .distances import bootstrap_distances, pairwise_distances, surface_distances
 from .placement import (
     INTERVAL,
+    bootstrap_correlations,
     correlation,
     draw_patches,
-    drawn_correlations,
     interpolate_measures,
     make_patches,
 )
@@ -39,8 +39,8 @@ def simple_predictions(
     registered
         Further models on the boundary of the start's mesh, among them `atlas`, the atlas interpolated to this week.
     atlas
-        The atlas' own surface of this week, if there is one: then it is the model `atlas`. In either case it is scaled
-        to the volume of the target.
+        The atlas' own surface of this week, if there is one; it then replaces the registered model `atlas`. Either is
+        scaled to the volume of the target.
     """
     volume = signed_volume(target)
     atlas = registered["atlas"] if atlas is None else atlas
@@ -65,7 +65,7 @@ def prediction_table(
     models
         By week and model the predicted closed surface in mm, that of the run as `run`.
     observed, prepared
-        The observed pial surface of each week in mm, with its middle at x = 0, and the same prepared for comparison.
+        The observed pial surface of each week in mm, with its midline at x = 0, and the same prepared for comparison.
     radius_mm
         Radius of the fitted curvature.
 
@@ -80,8 +80,8 @@ def prediction_table(
         patch, _ = make_patches(prepared[week], mirrored=True)
         horizon = round(week - labels["start_week"], 6)
         for model, surface in surfaces.items():
-            own = prepare_for_comparison(surface, observed[week], radius_mm)
-            row = prediction_row(surface, own, observed[week], prepared[week], patch)
+            predicted = prepare_for_comparison(surface, observed[week], radius_mm)
+            row = prediction_row(surface, predicted, observed[week], prepared[week], patch)
             rows.append({**labels, "week": week, "horizon": horizon, "model": model, **row})
     return add_skill(pd.DataFrame(rows))
 
@@ -101,15 +101,15 @@ def prediction_row(
         `distances.surface_distances` and cortex_dice, aligned rigidly and not scaled; area_error and volume_error as
         fractions of the observed; r_… of each of `COMPARED_MAPS`; crossing_faces; roughness_ratio and
         curvature_rms_ratio to the observed surface; …_low and …_high, the 95 % intervals of distance_mm and
-        r_shape_index when patches are drawn with replacement; drawn_mm, the mean distance in each draw, for
+        r_shape_index by a bootstrap over patches; drawn_mm, the mean distance in each sample, for
         `add_skill`.
     """
     aligned = align(predicted, observed)
     pair, areas = pairwise_distances(aligned, observed, prepared.mesh), prepared.areas
     values, _ = interpolate_measures(predicted_prepared, prepared)
     drawn = draw_patches(patch)
-    drawn_mm = drawn_distances(pair, prepared.mesh.vertices, patch, drawn)
-    drawn_r = drawn_correlations(prepared.shape_index, values["shape_index"], areas, patch, drawn)
+    drawn_mm = bootstrap_distances(pair, prepared.mesh.vertices, patch, drawn)
+    drawn_r = bootstrap_correlations(prepared.shape_index, values["shape_index"], areas, patch, drawn)
     row: dict[str, Any] = surface_distances(pair) | {
         "cortex_dice": cortex_dice(aligned, observed),
         "area_error": area(predicted) / area(observed) - 1,
@@ -144,9 +144,9 @@ def add_skill(rows: pd.DataFrame) -> pd.DataFrame:
     Parameters
     ----------
     rows
-        Columns week, model, distance_mm, and drawn_mm from the same draws of patches in all rows of a week, which the
-        result leaves out. Baselines are all models but `NOT_BASELINES`; without any, skill, skill_low and skill_high
-        are NaN.
+        Columns week, model, distance_mm, and drawn_mm, which the result does not have. All rows of a week have the same
+        bootstrap samples. Baselines are all models except `NOT_BASELINES`; without baselines, skill, skill_low and
+        skill_high are NaN.
     """
     simple = rows[~rows["model"].isin(NOT_BASELINES)]
     best = simple.loc[simple.groupby("week")["distance_mm"].idxmin()].set_index("week")

@@ -11,7 +11,7 @@ from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, FOLD_BAND
 from .sweeps import WEYL_NUMBER
 
 AGREEMENT_TOL = 0.1
-"""Relative difference of displacements and numbers of modes up to which they agree."""
+"""Largest relative difference at which displacements, or numbers of modes, agree with those of the paper."""
 MAX_WEAK_SHARE = 0.05
 """Share of the spectrum's power below which a band counts as very weak."""
 NOT_RUN, AGREES, NOT_COMPARABLE = "not run", "as in the paper", "another machine and mesh"
@@ -22,7 +22,7 @@ REAL = "real "
 
 @dataclass(frozen=True, eq=False)
 class SweepTables:
-    """The varied keys of a sweep, its week, and the tables of the same names in its folder."""
+    """The varied keys and the week of a sweep, and its tables `members.csv`, `comparison.csv` and `nearest.csv`."""
 
     varied: Sequence[str]
     week: float
@@ -31,12 +31,12 @@ class SweepTables:
     nearest: pd.DataFrame
 
     def repeats(self, entry: Mapping[str, Any]) -> bool:
-        """Return whether this sweep varies the parameter of a published entry alone, and ends at its week."""
+        """Return whether this sweep varies only the parameter of a published entry, and is compared at its week."""
         return list(self.varied) == [entry["parameter"]] and self.week == entry["week"]
 
 
 def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str:
-    """Describe a comparison: its week, the observed brains, and whether they are of another population.
+    """Describe the observed brains that a sweep is compared with, and say whether they are of another population.
 
     The comparison has the columns real, real_population, same_population.
     """
@@ -52,9 +52,9 @@ def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str
 
 
 def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTables]) -> pd.DataFrame:
-    """Return the nearest runs of those measures for which the paper reports the nearest value.
+    """Return the nearest runs by each measure for which the paper reports a nearest value too.
 
-    The paper's brains are different ones (a normal atlas), and its spectra are cut at Weyl's number.
+    The paper compares with other brains (a normal atlas). Its spectra are cut at Weyl's number.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def replication_table(
     summary
         `summary.json` of the same run as the displacement.
 
-    Bands are cut at Weyl's number, here of each surface and in the paper the largest of all surfaces; whole bands are
-    given too.
+    Bands are cut at Weyl's number: here that of each surface, in the paper the largest one of all surfaces. Values of
+    whole bands are added.
     """
     modes = published["weyl_number"]
     rows = [*_displacements(published["displacement"], displacement), *_modes(modes, _sweep_of(modes, sweeps))]
@@ -135,7 +135,7 @@ def _costs(published: Mapping[str, Any], summary: Mapping[str, Any]) -> Iterator
     values = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * CARBON_INTENSITY_G_PER_KWH)
     size = f"{summary['tets']} elements, {summary['ranks']} ranks"
     for entry, value in zip(published["rows"], values, strict=True):
-        result = f"{entry['quantity']} a gestational week"
+        result = f"{entry['quantity']} per gestational week"
         paper = f"{entry['value']:g} ({published['machine']})"
         yield result, published["place"], paper, f"{value:.3g} ({size})", NOT_COMPARABLE
 
@@ -148,9 +148,9 @@ def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[
             numbers = sweep.comparison.loc[is_number, ["value", "real_value"]].to_numpy(dtype=float)
             if numbers.size:
                 error = numbers.max() / published[side] - 1
-                here = f"each its own, {numbers.min():.0f} to {numbers.max():.0f}"
+                here = f"{numbers.min():.0f} to {numbers.max():.0f}, by surface"
                 verdict = AGREES if abs(error) <= AGREEMENT_TOL else f"{error:+.0%}"
-        paper = f"{published[side]}, the largest of all"
+        paper = f"{published[side]}, the largest of all surfaces"
         yield f"modes of the spectra, {side}", published["place"], paper, here, verdict
 
 
@@ -186,12 +186,12 @@ def _finding(check: str, sweep: SweepTables) -> tuple[str, str]:
     whole = _shares(sweep.comparison, "")["B6"]
     if check == "little_B6" and whole.max() >= MAX_WEAK_SHARE:
         text = f"{text} when cut; in whole bands {whole.min():.2f} to {whole.max():.2f}"
-        return text, f"{verdict}, by the cut alone"
+        return text, f"{verdict}, but only with cut bands"
     return text, verdict
 
 
 def _shares(comparison: pd.DataFrame, suffix: str) -> pd.DataFrame:
-    """Return the shares of the bands, by brain and hemisphere, simulated and observed ones in rows of their own."""
+    """Return the share of each band in the power, with a row per brain (simulated or observed) and hemisphere."""
     bands = {f"relative_power_B{band}{suffix}": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands)]
     simulated, observed = (
@@ -206,4 +206,4 @@ def _shares(comparison: pd.DataFrame, suffix: str) -> pd.DataFrame:
 def _verdict(holds: pd.Series) -> str:
     if holds.empty:
         return NOT_RUN
-    return AGREES if holds.all() else "in part" if holds.any() else "otherwise"
+    return AGREES if holds.all() else "in part" if holds.any() else "not as in the paper"

@@ -19,7 +19,7 @@ EDGE_MM = 1.0
 """Edge length after remeshing."""
 
 MAX_CURVATURE_PER_MM = 1.0
-"""Mean curvature is clipped here: larger values are those of single sharp edges."""
+"""Limit of mean curvature, which is clipped: larger values come from single sharp edges."""
 
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
@@ -88,7 +88,7 @@ def scale_to_volume(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def curvature_differences(surface: PreparedSurface, observed: PreparedSurface) -> dict[str, float]:
-    """Compare how strongly two surfaces are folded, wherever the folds are.
+    """Compare how strongly two surfaces are folded, regardless of where.
 
     curvature_rms_ratio is the ratio to the observed one; curvature_distance_per_mm is the first Wasserstein distance
     between the distributions of mean curvature over the area.

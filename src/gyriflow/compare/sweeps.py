@@ -40,7 +40,7 @@ def comparison_table(
     run, subject
         Names of the run and of its start brain.
     populations
-        Of the start brain and of the observed brains, by id.
+        Populations of the start brain and of the observed brains, by id.
     metrics, spectra
         Rows of the simulated brain and of the observed ones, whose `run` is "real".
     simulated, observed
@@ -49,7 +49,7 @@ def comparison_table(
     Returns
     -------
     DataFrame
-        The columns `COMPARISON_COLUMNS`: those of `distances_to`, with the populations compared.
+        The columns `COMPARISON_COLUMNS`: those of `distances_to`, after subject, run, observed brain and population.
     """
     spectral = spectral_distances(spectra)
     spectral = spectral[spectral["run"] != MEASURED]
@@ -63,7 +63,7 @@ def comparison_table(
 
 
 def joined_comparisons(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """Join tables of comparisons; without any rows, return a table of the same columns without rows."""
+    """Join tables of comparisons. Without any rows, return an empty table with their columns."""
     tables = [table for table in tables if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COMPARISON_COLUMNS)
 
@@ -137,10 +137,10 @@ def _pairs(table: pd.DataFrame, observed: str, keys: list[str]) -> pd.DataFrame:
 def member_row(
     labels: Mapping[str, object], values: Mapping[str, object], params: Mapping, zones: Mapping, summary: Mapping
 ) -> dict[str, object]:
-    """Return the row of a run in `members.csv`: its values, how it ended, and what it cost.
+    """Return the row of a run in `members.csv`: its varied values, its outcome and its cost.
 
-    Labels are study, run, subject and compare_week; values are the varied ones by key; params, zones and summary are
-    the content of the run's files.
+    `labels` are study, run, subject and compare_week; `values` are the varied values by key; `params`, `zones` and
+    `summary` are the contents of the run's files.
     """
     elements = zones["elements_through_cortex"]
     is_resolved = elements is not None and elements >= ELEMENTS_NEEDED[zones["order"]]

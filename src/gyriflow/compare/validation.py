@@ -50,12 +50,12 @@ def validation_table(
     Parameters
     ----------
     labels
-        run; kind ("explained" if growth was measured on the observed brains, else "predicted"); start (its id) and
-        start_week.
+        run; kind ("explained" if growth was measured on the observed brains, else "predicted"); start (id of the start
+        brain) and start_week.
     simulated
         Closed surfaces in mm by week, in the pose of the start.
     sizes
-        By week the area_cm2 and volume_ml that the run was to have; empty if it followed no curve.
+        By week, area_cm2 and volume_ml of the curves that the run followed; empty if it followed none.
     radius_mm
         Radius of the fitted curvature.
     """
@@ -85,8 +85,8 @@ def validation_row(
     -------
     dict
         `distances.surface_distances` and cortex_dice of the surfaces as they are, aligned rigidly; area_cm2,
-        volume_ml and relative_area (A/V^⅔), the same of the observed brain (real_…), and the sizes that the run was to
-        have (curve_…, NaN if none); area_error and volume_error against the curve, area_difference and
+        volume_ml and relative_area (A/V^⅔), the same of the observed brain (real_…), and the sizes by the curves that
+        the run followed (curve_…, NaN if none); area_error and volume_error against the curve, area_difference and
         volume_difference from the observed brain, as fractions; `placement.score_placement` and
         `shapes.curvature_differences`.
     """

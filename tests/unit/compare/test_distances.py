@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import rigid, sphere
 
-from gyriflow.compare.distances import aligned_distances, drawn_distances, pairwise_distances, surface_distances
+from gyriflow.compare.distances import aligned_distances, bootstrap_distances, pairwise_distances, surface_distances
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 
 
@@ -75,7 +75,7 @@ def test_distances_of_drawn_patches_are_those_of_these_patches():
     pair = pairwise_distances(raised(ball), ball)
     # patch 1 is the upper cap, patch 0 the rest
     patch = (ball.vertices[:, 2] > 9.0).astype(np.int64)
-    both, upper, twice = drawn_distances(pair, ball.vertices, patch, np.array([[1, 1], [0, 2], [1, 2]]))
+    both, upper, twice = bootstrap_distances(pair, ball.vertices, patch, np.array([[1, 1], [0, 2], [1, 2]]))
     assert both == pytest.approx(surface_distances(pair)["distance_mm"])
     assert upper == pytest.approx(1.0, abs=0.1)
     assert both < twice < upper
