@@ -40,7 +40,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--may-diverge",
         action="store_true",
-        help="end without an error where the run diverges, with the weeks it has reached; the summary gives the reason",
+        help="if the run diverges, keep the weeks it reached and end without an error; the summary gives the reason",
     )
     return parser.parse_args(arguments)
 

@@ -20,8 +20,8 @@ from ..io.files import new_hdf5
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 
-ROOMS = ("folding", "mechanics", "geometry", "settings", "units")
-"""Rooms with the modules that decide the course of a run."""
+SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
+"""Subpackages and modules with the code that determines the results of a run."""
 ARRAYS = ("positions", "last", "before_last", "stretch", "log_growth")
 
 
@@ -34,7 +34,7 @@ class State:
     positions
         (n, 3), in m.
     time_s, step_s
-        Time since the start, and the present time step, which is smaller than the nominal one after a halving.
+        Time since the start, and the current time step, which is smaller than the nominal one after a halving.
     last, before_last, last_s, before_last_s
         Displacements (n, 3) in m and lengths of the last two steps; zero before them.
     successes
@@ -68,8 +68,8 @@ class State:
         """Return the state before the first step, free of stress."""
         return cls(positions, 0.0, step_s, np.zeros_like(positions), np.zeros_like(positions))
 
-    def first_guesses(self, step_s: float) -> list[Floats]:
-        """Return first guesses (n, 3) in m of the displacement of the next step.
+    def initial_guesses(self, step_s: float) -> list[Floats]:
+        """Return initial guesses (n, 3) in m of the displacement of the next step.
 
         The first one extrapolates the rates of the last two steps linearly; the second one repeats the last rate, which
         is better in the step after growth has changed.
@@ -91,9 +91,9 @@ class State:
         correction: Sequence[float] | None = None,
         log_growth: Floats | None = None,
     ) -> "State":
-        """Return the state after an accepted step with its displacement (n, 3) in m; others as the attributes.
+        """Return the state after an accepted step with its displacement (n, 3) in m.
 
-        `log_growth` is that of this step.
+        The other arguments are as the attributes, but `log_growth` is that of this step alone.
         """
         if log_growth is None:
             log_growth = self.log_growth
@@ -117,10 +117,10 @@ class State:
 
 
 def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) -> str:
-    """Return a hash of everything that decides the course of a run: mesh, parameters, maps, code of model and solver.
+    """Return a hash of everything that determines the states of a run: mesh, parameters, maps and code.
 
-    Parameters that only decide where it ends, when it writes, and on how many ranks are left out: a run that failed
-    resumes with an earlier end or more halvings.
+    Parameters are left out if they only determine the end of the run, its output, its ranks, or how long the solver
+    tries: so a run that failed can be resumed with an earlier end or more halvings.
     """
     values = parameters.model_dump(mode="json")
     for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
@@ -129,7 +129,7 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
         del values["solver"][name]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
     solver = modules_behind(Path(__file__).with_name("__main__.py"))
-    for source in sorted(module for module in solver if room_of(module) in ROOMS):
+    for source in sorted(module for module in solver if room_of(module) in SUBPACKAGES):
         digest.update(source.read_bytes())
     digest.update(mesh.vertices.tobytes())
     digest.update(mesh.tets.tobytes())

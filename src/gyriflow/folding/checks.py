@@ -13,14 +13,15 @@ from .zones import Zones
 MAX_BETWEEN_PLANES = 0.05
 """Share of the pial area between the contact planes above which a user is warned."""
 MAX_POISSON_RATIO = 0.46
-"""Poisson's ratio above which linear elements are clearly too stiff. With two of them through the cortex, the fastest
-wave of a slab grows 32 % too slowly at 0.45, 40 % at 0.48, 47 % at 0.49 and 69 % at 0.499; another is fastest there."""
+"""Poisson's ratio above which linear elements are clearly too stiff. With two of them through the cortex, the
+fastest-growing wave of a slab grows 32 % too slowly at 0.45, 40 % at 0.48, 47 % at 0.49 and 69 % at 0.499, where a wave
+of another length is the fastest."""
 
 
 def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dict:
     """Return a report on the zones.
 
-    It has the facets and area of each zone, the clamped share of each hemisphere, the order of the elements, the
+    It contains the facets and area of each zone, the clamped share of each hemisphere, the order of the elements, the
     initial penetration of the planes in mm (0 by construction), and the number of elements through the cortex.
     """
     pial = TriangleMesh(mesh.vertices, zones.facets)

@@ -1,4 +1,4 @@
-"""Compilation of forms and C code with a cache: one per kind of processor, one compilation at a time."""
+"""Compilation of forms and C code. Each kind of processor has a cache, in which one process compiles at a time."""
 
 import fcntl
 import hashlib
@@ -14,15 +14,15 @@ from typing import Any
 import cffi
 from mpi4py import MPI
 
-# sums in any order, a fifth faster; all of -ffast-math would break checks for NaN
+# lets the compiler reorder sums, a fifth faster; all of -ffast-math would break checks for NaN
 REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
 COMPILER_ARGUMENTS = ["-O3", "-march=native", *REORDERED_SUMS]
 
 
 def processor() -> str:
     """Return a text that differs between processors for which -march=native gives different code."""
-    described = Path("/proc/cpuinfo")
-    lines = described.read_text().splitlines() if described.exists() else []
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.processor())
 
 
@@ -30,8 +30,8 @@ def processor() -> str:
 def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     """Yield the options of the form compiler, for all ranks to compile forms within the block.
 
-    Rank 0 locks the cache during the block, since concurrent runs share it, and a killed compilation leaves a source
-    file for which all later ones would wait.
+    Rank 0 locks the cache during the block, since concurrent runs share it, and removes what a killed compilation has
+    left there: later ones would wait for it to finish.
     """
     kind = hashlib.sha256(processor().encode()).hexdigest()[:8]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))

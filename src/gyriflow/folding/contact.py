@@ -1,9 +1,10 @@
 """Contact of the pial surface with itself: Incremental Potential Contact (Li et al. 2020), with the IPC Toolkit.
 
-Pairs of surface parts nearer than a distance d̂ repel each other with a barrier potential that tends to infinity as
-they close in, and no displacement may move a pair through each other. Every rank has the whole surface
-(`contact_surface`) and searches for the pairs of its own part (`contact_search`). Energies, forces and stiffness are
-summed over the ranks, gaps and collision-free steps are minima over them, so that all ranks take the same decisions.
+Pairs of vertices, edges or faces that are nearer than a distance d̂ repel each other with a barrier potential, which
+tends to infinity as their distance tends to zero. No displacement may move one through the other. Every rank has the
+whole surface (`contact_surface`) and searches for the pairs of its own part (`contact_search`). Energies, forces and
+stiffness are summed over the ranks, gaps and collision-free steps are minima over them, so that all ranks take the same
+decisions.
 """
 
 import ipctk
@@ -23,21 +24,23 @@ from .domain import Domain
 from .surface_parts import bisect_points
 
 DISTANCE_PER_EDGE = 0.2
-"""Contact distance d̂ in mean edge lengths of the present surface: well below what the mesh resolves. As the surface
-grows, its edges do; a distance that did not grow with them would only make contact harder to solve."""
+"""Contact distance d̂ as a multiple of the current surface's mean edge length: well below what the mesh resolves. It
+grows with the edges of the surface; a fixed distance would only make contact harder to solve."""
 STIFFNESS_PER_MODULUS = 0.1
-"""The barrier's stiffness κ in shear moduli of the cortex. The pressure between folds, some tenths of the modulus, then
-holds them at about half of the distance; a stiffer barrier takes more iterations and changes nothing else."""
+"""The barrier's stiffness κ as a multiple of the cortex' shear modulus. The pressure between folds, some tenths of the
+modulus, then keeps them at about half of the contact distance; a stiffer barrier takes more iterations and changes
+nothing else."""
 EDGES_PER_SPACING = {1: 1, 2: 2}
-"""Edges of the surface of contact between neighbouring nodes, by the order of the elements."""
+"""Number of edges of the contact surface between neighbouring nodes, by the order of the elements."""
 STIFFEN_BELOW, SOFTEN_ABOVE = 0.1, 0.75
-"""Smallest gaps, as parts of the distance, below and above which the next step's barrier is twice and half as stiff.
-With stress memory folds press on each other ever harder, and a barrier that is too soft lets them come so near that
-Newton's method stagnates. A change of stiffness moves folds in contact, so it is made only if needed."""
+"""If the smallest gap is below the first fraction of the contact distance, the next step's barrier is twice as stiff;
+if it is above the second, half as stiff. With stress memory folds press on each other ever harder, and a barrier that
+is too soft lets them come so near that Newton's method stagnates. A change of stiffness moves folds in contact, so it
+is made only if needed."""
 MAX_STIFFENING = 1024.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
-MAX_PART_OF_GAP = 0.999
-"""Largest contact distance as a part of the smallest gap at the start of a run."""
+MAX_GAP_FRACTION = 0.999
+"""Largest contact distance as a fraction of the smallest gap at the start of a run."""
 MAX_DISPLACEMENT_MM = 8.0
 """Longest displacement of a vertex in one iteration; a solve with a longer one diverges."""
 BARRIER = ipctk.TwoStageBarrier()
@@ -100,12 +103,12 @@ class SelfContact:
             )
         if distance_mm is None:
             gap = domain.comm.allreduce(self._search.near(start).gap_mm, op=MPI.MIN)
-            # round-off must not make a pair of surface parts exactly at the limit
-            self._max_mm = MAX_PART_OF_GAP * gap
+            # round-off must not make a pair of surface elements exactly at the limit
+            self._max_mm = MAX_GAP_FRACTION * gap
             self.begin_step()
 
     def begin_step(self, last_row: dict | None = None) -> None:
-        """Take the mesh as it is placed, and set the barrier by its edges and the last row of the step table."""
+        """Start from the current positions; set the barrier by edge lengths and the last row of the step table."""
         self._rest = self.surface.reference_mm()
         # from rank 0, as above
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._rest, self._edges)
@@ -116,21 +119,21 @@ class SelfContact:
         self._near: NearPairs | None = None
 
     def near_pairs(self, u: Floats) -> NearPairs:
-        """Return this rank's pairs; those of the last displacement are kept."""
+        """Return this rank's pairs. Those of the last displacement are cached."""
         positions = self._rest + self.surface.displacement_mm(u)
         if self._near is None or not np.array_equal(positions, self._near.positions):
             self._near = self._search.near(positions)
         return self._near
 
     def join_touching(self, part: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the part numbers (n,) of the mesh's vertices, one for parts in contact when the step begins."""
+        """Return new part numbers (n,) of the mesh's vertices: parts in contact at the start of the step become one."""
         if part.max() == 0:
             return part
         near = self._search.near(self._rest)
         corners = [near.pairs[i].vertex_ids(near.mesh.edges, near.mesh.faces) for i in range(len(near.pairs))]
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]
-        # other numbers stand for missing vertices
+        # negative numbers stand for missing vertices
         sides = [part_of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in corners]
         own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
         links = np.array(sorted(set().union(*self.domain.comm.allgather(own_links)))).reshape(-1, 2)
@@ -159,7 +162,7 @@ class SelfContact:
         return self.surface.matrix_sum(near.part, self.barrier.stiffness(near, convex=convex))
 
     def max_step(self, u: Floats, direction: Floats) -> float:
-        """Return the largest part, at most 1, of a direction (k, 3) in m that can be added to u without a collision."""
+        """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be added to u without collision."""
         displacement = self.surface.displacement_mm(direction)
         # the candidates near a longer displacement would fill the memory
         part = MAX_DISPLACEMENT_MM / max(float(np.linalg.norm(displacement, axis=1).max()), MAX_DISPLACEMENT_MM)
@@ -167,7 +170,7 @@ class SelfContact:
         return part * self.domain.comm.allreduce(step, op=MPI.MIN)
 
     def smallest_distance_mm(self, u: Floats) -> float:
-        """Return the smallest distance between surface parts that do not adjoin, infinite if none is near."""
+        """Return the smallest distance between the two sides of a pair, infinite without pairs."""
         return self.domain.comm.allreduce(self.near_pairs(u).gap_mm, op=MPI.MIN)
 
     def pair_count(self, u: Floats) -> int:
@@ -179,7 +182,7 @@ class SelfContact:
         near = self.near_pairs(u)
         forces, areas = np.zeros_like(self._rest), np.zeros(len(self._rest))
         forces[near.part.vertices] = self.barrier.forces(near)
-        # the owner of a vertex has all faces around it
+        # only the owner of a vertex is sure to have all faces around it
         owned = near.part.owned
         areas[near.part.vertices[owned]] = np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2
         pressure = np.linalg.norm(self.domain.sum_over_ranks(forces), axis=1) / self.domain.sum_over_ranks(areas)

@@ -1,4 +1,4 @@
-"""Search for pairs of surface parts near each other, and collision detection, with the IPC Toolkit."""
+"""Search for near pairs of vertices, edges and faces, and collision detection, with the IPC Toolkit."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ from .surface_parts import SurfacePart, part_of_surface
 CANDIDATE_MARGIN_MM = 0.05
 """Displacement of the surface after which candidates for pairs are searched for again."""
 PART_MARGIN_MM = 1.0
-"""Displacement of the surface after which each rank takes its part of it again."""
+"""Displacement of the surface after which each rank determines its part of the surface again."""
 MAX_CLOSING = 0.9
-"""Largest part of a gap that a step may close."""
+"""Largest fraction of a gap by which a step may close it."""
 CCD = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
 """Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's distance. Interval bisection, the
-alternative, takes minutes if surfaces meet flat on."""
+alternative, takes minutes if flat surfaces meet face to face."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class ContactSearch:
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
-        """Return the part, at most 1, of a displacement (s, 3) in mm from `start` that makes no collision."""
+        """Return the largest fraction, at most 1, of a displacement (s, 3) in mm from `start` without a collision."""
         # everything that is not a pair is farther away than the contact distance
         gap = min(self._distance, start.gap_mm)
         if 2 * float(np.linalg.norm(displacement, axis=1).max()) <= MAX_CLOSING * gap:
@@ -101,7 +101,7 @@ class ContactSearch:
         part, mesh = self.part_at(first, last)
         candidates = self._candidates_at(first, last)
         if candidates is None and np.abs(displacement).max() <= PART_MARGIN_MM:
-            # a step's first guess leads nearly to its end, so that the whole step needs no other search
+            # the initial guess of a step is close to its solution, so the whole step needs no other search
             part, mesh, candidates = self._search(first, last)
         ends = part.restrict(first), part.restrict(last)
         if candidates is not None:
@@ -111,7 +111,7 @@ class ContactSearch:
         )
 
     def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
-        """Return a part of the surface that contains the rank's pairs at each of some (s, 3) positions in mm."""
+        """Return a part of the surface with all pairs of the rank, at each of the given (s, 3) positions in mm."""
         if self._part is None or not self._part[1].covers(self._distance, *positions):
             displacement = max(float(np.abs(at - positions[0]).max()) for at in positions)
             # a single rank has the whole surface

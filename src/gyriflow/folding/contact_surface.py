@@ -1,4 +1,4 @@
-"""The surface of contact: its positions on every rank, and sums over ranks that compute on a part of it each."""
+"""The contact surface: its positions on every rank, and sums over ranks, each of which computes on a part of it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,13 @@ from .surface_parts import SurfacePart
 class ContactSurface:
     """The pial surface as flat triangles; `facets` (f, 3) are its faces as vertex indices of the mesh.
 
-    A face of a quadratic element becomes 16 triangles whose vertices are interpolated between its nodes. Four triangles
-    between the nodes would turn an even pressure into uneven nodal forces, and deform elements into waves of their own
-    size.
+    A face of a quadratic element becomes 16 triangles whose vertices are interpolated between its nodes. With only four
+    triangles between the nodes, a uniform pressure would give non-uniform nodal forces, and waves as long as an
+    element.
 
-    Attributes: the vertices `nodes` (n,) of the mesh on the surface, the `faces` (f, 3) by the numbers of the surface's
-    own s vertices, and the `weights` (s, n) of the nodes at these; the first n of these are the nodes themselves.
+    Attributes: the mesh vertices on the surface, `nodes` (n,); the triangles, `faces` (f, 3), by the numbers of the
+    surface's own s vertices; and `weights` (s, n), which interpolate from the nodes to these s vertices. The first n of
+    the s vertices are the nodes themselves.
     """
 
     def __init__(self, domain: Domain, facets: NDArray[np.int64]) -> None:
@@ -41,7 +42,7 @@ class ContactSurface:
         self._part: SurfacePart | None = None
 
     def reference_mm(self) -> Floats:
-        """Return the (s, 3) positions in mm on the mesh as it is placed."""
+        """Return the (s, 3) positions in mm of the mesh before the displacement of the step."""
         return np.asarray(self.weights @ self.domain.positions[self.nodes] * MM_PER_M)
 
     def displacement_mm(self, u: Floats) -> Floats:
@@ -58,7 +59,7 @@ class ContactSurface:
         out.reshape(-1, 3)[self._local] += nodal[self._rows]
 
     def matrix_sum(self, part: SurfacePart, matrix: sparse.csc_matrix | None) -> PETSc.Mat:
-        """Return the sum over all ranks of symmetric (3p, 3p) matrices on their parts, by all nodes of the mesh."""
+        """Return the sum over ranks of their parts' symmetric (3p, 3p) matrices, as a matrix of all mesh nodes."""
         comm, components = self.domain.comm, np.arange(3)
         rows_for: list[sparse.csr_matrix | None] = [None] * comm.size
         if matrix is not None:
@@ -86,5 +87,5 @@ class ContactSurface:
         if self._part is not part:
             self._part, self._part_weights = part, self.weights[part.vertices]
             components = sparse.kron(self._part_weights, np.eye(3), format="csr")
-            # both stored by columns, as the stiffness is: their product needs no conversion
+            # stored by columns like the stiffness, so that products need no conversion
             self._nodes_to_part, self._part_to_nodes = components.tocsc(), components.T

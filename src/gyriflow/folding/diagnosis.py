@@ -18,7 +18,7 @@ from .zones import Zones
 def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
     """Return a cortical thickness over the mean edge length of the elements in the cortex; NaN if there are none.
 
-    `distance` (k,) is that of the local nodes to the pial surface; it is in m, as the thickness.
+    `distance` (k,) is from the local nodes to the pial surface, in m like the thickness.
     """
     inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
     nodes = domain.local(domain.positions)
@@ -49,7 +49,7 @@ def unconverged_warning(row: dict) -> str:
         return ""
     return (
         f"step {row['step']} ends at {row['residual']:.1e} of its initial residual, above "
-        "folding.solver.newton_tolerance: only round-off was left to gain"
+        "folding.solver.newton_tolerance: round-off prevents further progress"
     )
 
 

@@ -27,7 +27,7 @@ from ..geometry.tetrahedra import (
 from ..geometry.triangles import Floats
 from ..units import M_PER_MM
 
-# Scotch reads these when it first partitions a mesh; without them a run does not give the same numbers twice
+# Scotch reads these when it first partitions a mesh; without them runs are not reproducible
 for name in ("SCOTCH_RANDOM_FIXED_SEED", "SCOTCH_DETERMINISTIC", "SCOTCH_PTHREAD_NUMBER"):
     os.environ.setdefault(name, "1")
 
@@ -38,7 +38,7 @@ GRADIENTS_AT_NODES = shape_slopes(NODE_COORDINATES)
 
 
 def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
-    """Return on every rank the (n, ...) values of all ranks; `order` (n,) are their indices there, rank by rank."""
+    """Return on every rank the (n, ...) values of all ranks; `order` (n,) has the index of each, rank by rank."""
     shape = values.shape[1:]
     received, result = np.empty((len(order), *shape)), np.empty((len(order), *shape))
     comm.Allgatherv(np.ascontiguousarray(values), (received, comm.allgather(values.size)))
@@ -49,7 +49,7 @@ def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
 class Domain:
     """A tetrahedral mesh distributed over the ranks of a communicator, in metres.
 
-    A vertex is here a node of the mesh file: a corner of elements or, in quadratic elements (`order` 2), a node on an
+    Here, a vertex is a node of the mesh file: a corner of elements or, in quadratic elements (`order` 2), a node on an
     edge. `mesh` is the updated reference, which moves with every step; `space` is that of displacements in m on it.
 
     For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
@@ -135,8 +135,8 @@ class Domain:
     def _measure(self, node_positions: Floats) -> None:
         self.volumes = volumes_between(node_positions, self.cells)
         if self.order == 2:
-            self._maps_at_nodes = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
-            self._largest_maps = coefficients(node_positions, self.cells).max(axis=1)
+            self._determinants_at_nodes = jacobians(node_positions, self.cells, GRADIENTS_AT_NODES)
+            self._upper_bounds = coefficients(node_positions, self.cells).max(axis=1)
 
     def volume_ratios(self, node_positions: Floats) -> Floats:
         """Return det F after a move of the local nodes to (k, 3) positions in m.
@@ -145,18 +145,18 @@ class Domain:
         """
         if self.order == 1:
             return (volumes_between(node_positions, self.cells) / self.volumes)[:, None]
-        return jacobians(node_positions, self.cells, GRADIENTS_AT_NODES) / self._maps_at_nodes
+        return jacobians(node_positions, self.cells, GRADIENTS_AT_NODES) / self._determinants_at_nodes
 
     def smallest_volume_ratio(self, node_positions: Floats) -> float:
         """Return a lower bound of det F after a move, over the elements of all ranks.
 
-        It is positive only where no element is inverted anywhere. In linear elements it is the smallest det F. In
-        quadratic ones, where det F varies, it is a lower bound of the map's determinant after the move over an upper
-        bound of that before.
+        It is positive only if no element is inverted anywhere. In linear elements it is the smallest det F. In
+        quadratic ones, where det F varies, it is the ratio of a lower bound of the Jacobian determinant after the move
+        to an upper bound of that before.
         """
         if self.order == 1:
             return self.min_over_ranks(self.volume_ratios(node_positions))
-        return self.min_over_ranks(lower_bounds(node_positions, self.cells) / self._largest_maps)
+        return self.min_over_ranks(lower_bounds(node_positions, self.cells) / self._upper_bounds)
 
     def min_over_ranks(self, local_values: Floats) -> float:
         """Return the smallest value of all ranks."""

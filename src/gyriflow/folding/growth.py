@@ -17,7 +17,7 @@ from .tissue import Tissue
 from .zones import Zones
 
 GROWTH_TOL = 1e-10
-"""Difference of growth increments that counts as none: a hundred-millionth of the cortex' growth in a step."""
+"""Difference below which growth increments count as equal: a hundred-millionth of the cortex' growth in a step."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class StepStart:
     correction: Sequence[float] | None = None
 
     def week(self, p: FoldingParameters, part: float) -> float:
-        """Return the gestational week at a part of the step, from 0 at its start to 1 at its end."""
+        """Return the gestational week at a fraction of the step, from 0 at its start to 1 at its end."""
         return p.start_week + (self.time_s + part * self.step_s) / SECONDS_PER_GW
 
 
@@ -78,7 +78,7 @@ class StepStart:
 class StepGrowth(ABC):
     """Growth of tissue in one step.
 
-    `parameters` are the run's, with the rates of this step, which frames show.
+    `parameters` are those of the run, with the growth rates of this step, which are written to frames.
     """
 
     parameters: FoldingParameters
@@ -131,7 +131,7 @@ def increments(w: Any, g: Any, tangential: Any, radial: Any, core: Any, step_s: 
 def increments_at(
     p: FoldingParameters, w: Floats, g: Floats, maps: Maps, week: float, step_s: float
 ) -> tuple[Floats, Floats]:
-    """Return the increments of a step by the parameters' rates at a week, at the points that maps have values at."""
+    """Return the increments of a step by the parameters' rates at a week; `w`, `g` and maps are at the same points."""
     tangential, radial, core = (
         value_at(rate, week, maps)
         for rate in (p.growth_rate_per_s, p.radial_growth_rate_per_s, p.core_growth_rate_per_s)

@@ -1,4 +1,4 @@
-"""The growth model of a run, by the name that the configuration has for it."""
+"""The growth model of a run, by its name in the configuration."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,7 +15,7 @@ BUILDERS: dict[str, Callable[[FoldingParameters, GrowthInputs, Floats, Share], S
     "sizes": lambda p, inputs, positions_mm, share: SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth,
     "shapes": lambda p, inputs, positions_mm, share: GrowthToTargets.of(p, inputs, share).growth,
 }
-"""Functions of parameters, inputs, (n, 3) positions at the start and the ranks' share of work that make a model."""
+"""Functions that return a model, given the parameters, inputs, (n, 3) start positions and this rank's share of work."""
 
 
 def growth_model(p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats, share: Share = ALONE) -> StepModel:

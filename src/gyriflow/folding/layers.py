@@ -21,7 +21,7 @@ TIE_TOL = 1e-9
 
 
 def cortical_weight(distance: Floats, thickness: float | Floats) -> Floats:
-    """Return w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (paper, after Tallinen et al. 2016)."""
+    """Return w = 1/(1 + exp(10 (d/H − 1))): 1 in the cortex, 0 in the core (FetalFoldSim; Tallinen et al. 2016)."""
     return 1.0 / (1.0 + np.exp(np.minimum(CORTICAL_STEEPNESS * (distance / thickness - 1.0), 700.0)))
 
 
@@ -40,7 +40,7 @@ class PialSearch:
         self.surface = TriangleMesh(positions[self.pial], local)
         self.normals = vertex_normals(self.surface)
         self.tree = cKDTree(self.surface.vertices)
-        # rank of the vertices by their coordinates, to choose one of several equally near ones
+        # position of each vertex in the order of coordinates, to choose among equally near ones
         self._order = np.empty(len(self.pial), dtype=np.int64)
         self._order[np.lexsort(self.surface.vertices.T[::-1])] = np.arange(len(self.pial))
 

@@ -1,4 +1,4 @@
-"""Energy, forces and stiffness of linear elements without stress memory, two to four times as fast as by FFCx."""
+"""Energy, forces and stiffness of linear elements without stress memory, two to four times as fast as code by FFCx."""
 
 from pathlib import Path
 

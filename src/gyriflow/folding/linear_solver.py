@@ -21,18 +21,19 @@ from .surface_parts import bisect_points
 from .tangent import Residual, Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")
+"""Ways to solve a linear system: the second is tried where the first fails. A column of the step table."""
 PLAIN, SHIFTED = range(2)
 MAX_PARTS = 256
 """Parts of the mesh whose rigid motions are the coarse level."""
 COARSE_LIFETIME = 8
 """Number of assembled tangents for which a coarse level is used."""
 REGULARISATION = 1e-6
-"""Shift of the coarse matrix, as a part of its mean diagonal entry."""
+"""Shift of the coarse matrix, as a fraction of its mean diagonal entry."""
 _REASONS = PETSc.KSP.ConvergedReason
 INDEFINITE = (_REASONS.DIVERGED_INDEFINITE_MAT, _REASONS.DIVERGED_INDEFINITE_PC, _REASONS.DIVERGED_DTOL)
-"""Ends of a solve with a tangent that is not positive definite; its residual may also grow before that is detected."""
+"""PETSc's reasons if the tangent is not positive definite; the residual may grow (DTOL) before that is detected."""
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
-"""Shifts of a tangent's diagonal, as parts of it, that are tried in turn until it is positive definite."""
+"""Shifts of a tangent's diagonal, as fractions of it, tried in turn until the tangent is positive definite."""
 
 
 class NotConvergedError(SolverError):
@@ -43,8 +44,8 @@ class NotConvergedError(SolverError):
 class Direction:
     """A descent direction (k, 3) of the local nodes in m, and its slope, the derivative of the energy along it, in J.
 
-    Further the iterations and the rung of the linear solve, and whether the tangent was positive definite without a
-    shift (`convex`).
+    In addition the iterations of the linear solve, its index in `RUNGS`, and whether the tangent was positive definite
+    without a shift (`convex`).
     """
 
     values: Floats
@@ -70,7 +71,7 @@ class TwoLevelPreconditioner:
         self._part = self._part_of_vertex[self._vertex]
         self._own = slice(first := domain.space.dofmap.index_map.local_range[0], first + domain.n_owned)
         self._parts = int(self._part.max()) + 1
-        # the rows of the coarse inverse that this rank needs: motions of parts that have nodes of it
+        # the rows of the coarse inverse that this rank needs: motions of the parts that contain its nodes
         self._moved = (6 * np.unique(self._part[self._own])[:, None] + np.arange(6)).ravel()
         self._fixed = np.flatnonzero(tangent.elastic.matrix.fixed[self._own])
         self._made_at = -COARSE_LIFETIME
@@ -154,7 +155,7 @@ class LinearSolver:
     def __init__(self, problem: NonlinearProblem, max_iterations: int) -> None:
         self._problem = problem
         self._preconditioner: TwoLevelPreconditioner | None = None
-        self._level = 0  # of the shift that the last tangent needed
+        self._level = 0  # index in SHIFTS of the shift that the last tangent needed
         self._cg = PETSc.KSP().create(problem.domain.comm)
         self._cg.setType("cg")
         # the norm of Newton's convergence criterion
@@ -162,10 +163,10 @@ class LinearSolver:
         self._cg.setTolerances(atol=0.0, max_it=max_iterations)
 
     def solve(self, tangent: Tangent, residual: Residual, reduction: float, *, convexify: bool) -> Direction:
-        """Return a descent direction d from J d = −r, with the tangent J and the residual r at one displacement.
+        """Solve J d = −r for a descent direction d, with the tangent J and the residual r at the same displacement.
 
-        The solve leaves at most a part `reduction` of the right-hand side. An indefinite J is shifted; with `convexify`
-        its parts of contact are first made semidefinite. NotConvergedError if no shift helps.
+        `reduction` is the relative tolerance of the solve. An indefinite J is shifted; with `convexify`, the stiffness
+        of contact in it is first made semidefinite. NotConvergedError if no shift helps.
         """
         iterations = 0
         self._cg.setTolerances(rtol=reduction)

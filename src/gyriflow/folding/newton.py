@@ -15,15 +15,16 @@ ENERGY_ROUND_OFF = 1e-12
 MIN_RESOLVED = 1e-6
 """Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
 MIN_PROGRESS = 1e-6
-"""Relative fall of the energy above which an iteration does not count towards `max_newton`."""
+"""Relative decrease of the energy above which an iteration does not count towards `max_newton`."""
 MAX_ITERATIONS_FACTOR = 10
 """Iterations allowed in all, as a multiple of `max_newton`."""
 STAGNATION_FACTOR = 10.0
-"""Multiple of the tolerance below which an iteration that gains less than half calls for the true tangent."""
+"""Below this multiple of the tolerance, an iteration that does not halve the residual is followed by one with the exact
+tangent."""
 MAX_FORCING = 0.1
 """Largest forcing term: relative tolerance of a linear solve far from the solution."""
 ARMIJO = 1e-4
-"""Part of the decrease predicted by the slope that a line search asks for."""
+"""Fraction of the decrease predicted by the slope that a line search requires (Armijo 1966)."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,9 @@ class NewtonSettings:
 class Solution:
     """A step's displacement (k, 3) of the local nodes in m, and the work it took.
 
-    Further the iterations, the highest rung of a linear solve, and the residual relative to that at rest. It has
-    `converged` if that is below the tolerance, and not if only round-off was left to gain.
+    In addition the iterations, the highest index in `RUNGS` of a linear solve, and the residual relative to that at
+    zero displacement. `converged` is True if this is below the tolerance, False if round-off prevented further
+    progress.
     """
 
     displacement: Floats
@@ -61,8 +63,8 @@ class Solution:
 class Iterate:
     """An iterate: its residual at its displacement, and its energy in J if computed.
 
-    `progress` is the relative fall of the energy in the iteration, if computed; it is `exhausted` if only round-off is
-    left to gain.
+    `progress` is the relative decrease of the energy in the iteration, if computed. `exhausted` is True if round-off
+    prevents further progress.
     """
 
     residual: Residual
@@ -72,26 +74,28 @@ class Iterate:
 
 
 def forcing_term(final: float, left: float, tightest: float) -> float:
-    """Return the part of the residual that a linear solve may leave (inexact Newton, Eisenstat and Walker 1996).
+    """Return the forcing term of inexact Newton, the relative tolerance of a linear solve (Eisenstat and Walker 1996).
 
-    `final` would end the step, `left` is the part of its residual that the last iteration left (the next one leaves
-    about the square of it, however accurate its linear solve), and `tightest` the tolerance for fast convergence.
+    `final` is the tolerance that would end the step. `left` is the fraction of the residual that remained after the
+    last iteration (after the next one, about its square remains, however accurate the linear solve). `tightest` is the
+    tolerance for fast convergence.
     """
     if left**2 > MAX_FORCING:
         return max(MAX_FORCING, final)
     forcing = max(tightest, left**2)
-    # a little tighter where that ends the step
+    # a slightly tighter tolerance, if that ends the step
     return final if final >= 0.1 * forcing else forcing
 
 
 class NewtonSolver:
     """Newton's method for the steps of a run.
 
-    State that it keeps between steps affects how a solution is found, and changes it within the tolerance only.
+    State that it keeps between steps affects how a solution is found, and changes the solution within the tolerance
+    only.
 
-    A residual below `residual_floor`, in N, counts as solved whatever the residual at rest. `last` is the residual of
-    the present step's last iterate, also where the solve failed, and `inverted` det F (c, p) of the local elements at
-    its last trial that inverted one, if any.
+    A residual below `residual_floor`, in N, counts as solved even if that at zero displacement is hardly larger. `last`
+    is the residual of the current step's last iterate, even if the solve failed. `inverted` is det F (c, p) of the
+    local elements in its last trial that inverted an element, None if there was none.
     """
 
     def __init__(self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float) -> None:
@@ -99,26 +103,26 @@ class NewtonSolver:
         self.settings = settings
         self.residual_floor = residual_floor
         self.linear_solver = LinearSolver(problem, settings.max_krylov)
-        self._first_left = 0.0  # part of the residual that the first iteration of the last step left
+        self._first_left = 0.0  # fraction of the residual after the first iteration of the last step
         self.last: Residual | None = None
         self.inverted: Floats | None = None
 
     def solve(self, *guesses: Floats) -> Solution:
-        """Return the displacement of the step, starting from the first useful one of some guesses (k, 3) in m.
+        """Return the displacement of the step, starting from the first useful one of the guesses (k, 3) in m.
 
-        NotConvergedError where the residual does not fall below the tolerance.
+        NotConvergedError if the residual does not fall below the tolerance.
         """
         problem, settings = self.problem, self.settings
         self.inverted = None
         self.last = at_rest = problem.residual(problem.rest())
         if not np.isfinite(at_rest.norm):
-            raise NotConvergedError("the forces without any displacement are not finite")
+            raise NotConvergedError("the forces at zero displacement are not finite")
         tolerance = max(settings.newton_tolerance * at_rest.norm, self.residual_floor)
         iterate = Iterate(at_rest if at_rest.norm <= tolerance else self._first(guesses, at_rest))
         solution, before, stalled = Solution(iterate.residual.displacement), np.inf, 0
         while (norm := iterate.residual.norm) > tolerance and not iterate.exhausted:
             self.last = iterate.residual
-            # where folds snap or slide along each other, the energy falls long before the residual does
+            # where folds snap through or slide along each other, the energy decreases long before the residual does
             if max(stalled, solution.newton / MAX_ITERATIONS_FACTOR) >= settings.max_newton:
                 raise NotConvergedError(
                     "Newton's method did not converge",
@@ -150,7 +154,7 @@ class NewtonSolver:
         return solution
 
     def _first(self, guesses: Sequence[Floats], at_rest: Residual) -> Residual:
-        """Return the residual at the first guess that leaves less than half of that at rest, or else that at rest."""
+        """Return the first residual at a guess that is below half of that at rest, else the residual at rest."""
         problem = self.problem
         for guess in map(problem.without_rigid_motion, guesses):
             u = problem.max_step(at_rest.displacement, guess) * guess
@@ -169,7 +173,7 @@ class NewtonSolver:
         return self._line_search(iterate, direction)
 
     def _line_search(self, iterate: Iterate, direction: Direction) -> Iterate:
-        """Return the first of ever shorter moves along a direction that lowers the energy and inverts no element."""
+        """Halve the step along a direction until it lowers the energy and inverts no element; return that iterate."""
         problem, start, norm = self.problem, iterate.residual.displacement, iterate.residual.norm
         slope, convex, before = direction.slope, direction.convex, iterate.energy
         owned = direction.values[: problem.domain.n_owned].ravel()
@@ -183,14 +187,14 @@ class NewtonSolver:
             if problem.smallest_volume_ratio(u) > 0:
                 trial = problem.residual(u)
                 finite = np.isfinite(trial.norm)
-                # if the slope of a convex energy nearly vanishes, the energy fell by about half of it
+                # a convex energy whose slope nearly vanishes at the trial has fallen by about half of the initial slope
                 flat = abs(problem.domain.dot(owned, trial.owned)) <= 0.1 * abs(slope)
                 if convex and finite and trial.norm < norm and flat:
                     return Iterate(trial)
                 before = problem.energy(start) if before is None else before
                 energy = problem.energy(u)
                 lower = finite and energy <= before + ARMIJO * length * slope
-                # where the gain left is below the energy's round-off, the residual decides
+                # if the energy's change is within round-off, the residual decides
                 if lower or (trial.norm < norm and abs(energy - before) <= ENERGY_ROUND_OFF * abs(before)):
                     return Iterate(trial, energy, (before - energy) / max(abs(before), np.finfo(float).tiny))
             else:

@@ -29,7 +29,7 @@ ZONES = "zones.json"
 
 
 def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
-    """Print a line without buffering, so that a log follows the run, and log the `event` it stands for, if any."""
+    """Print a line without buffering, so that a log is always up to date, and log its `event`, if any."""
     print(text, flush=True)
     if event:
         log_event(event, **facts)
@@ -88,8 +88,8 @@ def layer_fields(
 ) -> dict[str, NDArray]:
     """Return the fields of a shape at its vertices, for names of the parameter `fields`.
 
-    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth has the logarithm (6, n) if given,
-    or else the rates of the parameters.
+    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is computed from its logarithm (6,
+    n) if given, else from the rates of the parameters.
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)

@@ -1,6 +1,6 @@
 """The discrete problem of one step: energy, residual and tangent on the updated reference.
 
-With `domain` and `tangent`, the only files that use dolfinx: differences between its versions are handled in them.
+Differences between versions of dolfinx are handled here, in `domain` and in `tangent`.
 """
 
 from functools import cached_property
@@ -30,7 +30,7 @@ FACET_DEGREE = {1: 2, 2: 4}
 
 
 class Contribution(Protocol):
-    """A further part of the energy, such as contact, as a function of displacements u (k, 3) of the local nodes in m.
+    """A further term of the energy, such as contact, as a function of displacements u (k, 3) of the local nodes in m.
 
     The energy is in J and the same on all ranks; forces are its derivative by the owned components, in N; stiffness is
     in N/m, None if it is zero.
@@ -52,8 +52,8 @@ class NonlinearProblem:
     the mesh may be stretched elastically at the start of the step. `quadrature_degree` is that of the polynomials that
     are integrated exactly; None takes what the elements' order needs.
 
-    Attributes: further `contributions` to the energy, whether the body is `free`, and the q integration `points` of
-    each element.
+    Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
+    `points` of each element.
     """
 
     def __init__(
@@ -80,14 +80,14 @@ class NonlinearProblem:
         # finite growth (Rodriguez et al. 1994) on the updated reference
         F = ufl.Identity(3) + ufl.grad(self._u)
         Fe = F * (self._G_inverse if self._V is None else self._V * self._G_inverse)
-        # a constant, so that other values need no other forms
+        # a constant, so that another value needs no new form
         moduli = self._mu, dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio) * self._mu
         self._tensors = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
         dx = self._volume_measure()
         self._linear: LinearElements | None = None
         if domain.order == 1 and len(self.points.weights) == 1 and not remembers_stress:
-            # instead of the form compiler's code
+            # written by hand, instead of the form compiler's code
             self._linear, energy = LinearElements(domain, material), 0
         elif self._V is None:
             energy = material.energy_density(Fe, *moduli) * dx
@@ -162,7 +162,7 @@ class NonlinearProblem:
             self._tangent.motions = RigidMotions(self.domain, self.domain.part if part is None else part)
 
     def rest(self) -> Floats:
-        """Return the displacement of zero."""
+        """Return a displacement of zero."""
         return np.zeros((len(self.domain.vertex_of_node), 3))
 
     def without_rigid_motion(self, u: Floats) -> Floats:
@@ -219,7 +219,7 @@ class NonlinearProblem:
         return Residual(u, elastic, total, self.domain.norm(total))
 
     def clear_fixed(self, owned: Floats) -> None:
-        """Set the fixed ones among the owned components (3 · n_owned,) to exactly 0."""
+        """Set the fixed components among the owned ones (3 · n_owned,) to exactly 0."""
         owned[self._fixed_owned] = 0.0
 
     def _add_stiffness(self, u: Floats, blocks: MatrixCSR) -> None:
@@ -230,10 +230,10 @@ class NonlinearProblem:
             dolfinx.fem.assemble_matrix(blocks, self._forms[2])
 
     def tangent(self, at: Residual, *, within: float = 0.0) -> Tangent:
-        """Return the tangent in N/m at a residual's displacement, that of the unit matrix where it is fixed.
+        """Return the tangent in N/m at a residual's displacement, with unit rows and columns of fixed components.
 
-        Its elastic part may be lagged, that is an earlier one, where that predicts the change of the elastic forces
-        since to within a part `within`. All calls return the same object.
+        Its elastic part may be lagged, that is of an earlier iterate, if it predicts the change of the elastic forces
+        since then with a relative error of at most `within`. All calls return the same object.
         """
         # petsc4py keeps objects that several ranks share until all ranks agree to destroy them
         PETSc.garbage_cleanup(self.domain.comm)
@@ -257,7 +257,7 @@ class NonlinearProblem:
         return [part for part in parts if part is not None]
 
     def max_step(self, u: Floats, direction: Floats) -> float:
-        """Return the largest part, at most 1, of a direction (k, 3) in m that all contributions allow to add to u."""
+        """Return the largest fraction, up to 1, of a direction (k, 3) in m that all contributions allow to add to u."""
         return min((part.max_step(u, direction) for part in self.contributions), default=1.0)
 
     def volume_ratios(self, u: Floats) -> Floats:

@@ -39,8 +39,9 @@ def run(
 ) -> None:
     """Simulate a brain from the first to the last output week; write frames, step table and summary into `out`.
 
-    A checkpoint in `out` of this mesh and these parameters is continued. A run that diverges raises SolverError; where
-    it `may_diverge`, it ends with the output weeks that it has reached, and its summary gives the reason.
+    The run resumes from a checkpoint in `out` of this mesh and these parameters. A run that diverges raises
+    SolverError; if it `may_diverge`, it ends with the output weeks that it has reached, and its summary gives the
+    reason.
     """
     began = time.monotonic()
     folding = Folding(comm, mesh, zones, parameters, maps)
@@ -48,7 +49,7 @@ def run(
     folder = out / f"checkpoint-{key}"
     state, message = comm.bcast(load_state(folder, key, parameters) if comm.rank == 0 else None, root=0)
     if comm.rank == 0:
-        for note in filter(None, (message, *foreign_checkpoints(out, folder), shortened_step_note(parameters))):
+        for note in filter(None, (message, *delete_old_checkpoints(out, folder), shortened_step_note(parameters))):
             print_line(note)
     if state is None:
         state = State.at_start(folding.start, parameters.step_s)
@@ -87,9 +88,9 @@ def run(
 
 
 def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_diverge: bool) -> tuple[State, str | None]:
-    """Return the state at the end of a run, with a frame in `folder` for each output week and a checkpoint a step.
+    """Run to the end and return the last state; write a frame per output week and a checkpoint per step into `folder`.
 
-    Where a run that `may_diverge` does so, the state is the last good one, and the reason comes with it.
+    If a run that `may_diverge` diverges, return the last good state and the reason.
     """
     p, rank = folding.parameters, folding.domain.comm.rank
     resumed_after, resumed = len(state.rows), time.monotonic()
@@ -117,7 +118,7 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
     """Write the frame of a week and return the state to continue with; collective over the ranks."""
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
     pressure, elements = folding.fields.contact_pressure(names, solved), folding.fields.elements(names, solved)
-    # a mean over the steps since the last frame; before the first one, that step's
+    # a mean over the steps since the last frame; before the first step, the growth of that step
     log_growth = solved.growth.logarithm()
     if state.log_growth is not None:
         log_growth = state.log_growth * (p.step_s / state.log_growth_s)
@@ -158,7 +159,7 @@ def low_radius_ratio(mesh: TetrahedralMesh, positions: Floats) -> float:
 def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
 
-    It is used only if the frames of all output weeks that it has passed exist.
+    A checkpoint is used only if the frames of all output weeks that it has passed exist.
     """
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
@@ -166,7 +167,7 @@ def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[S
     end_s = seconds_to(parameters.end_week, parameters)
     passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
     if not all(frame_path(folder, week).exists() for week in passed):
-        return None, f"the checkpoint {folder} has no frames of some output weeks that it has passed: starting again"
+        return None, f"the checkpoint {folder} lacks frames of some output weeks: not used, the run starts again"
     within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
     return replace(state, rows=within), message
 
@@ -176,16 +177,16 @@ def seconds_to(week: float, parameters: FoldingParameters) -> float:
     return (week - parameters.start_week) * SECONDS_PER_GW
 
 
-def foreign_checkpoints(out: Path, present: Path) -> list[str]:
+def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and return messages about these two."""
-    foreign = sorted(
-        (path for path in out.glob("checkpoint-*") if path != present),
+    others = sorted(
+        (path for path in out.glob("checkpoint-*") if path != own),
         key=lambda path: path.stat().st_mtime,
         reverse=True,
     )
-    for old in foreign[2:]:
+    for old in others[2:]:
         shutil.rmtree(old, ignore_errors=True)
-    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in foreign[:2]]
+    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in others[:2]]
 
 
 def shortened_step_note(parameters: FoldingParameters) -> str:

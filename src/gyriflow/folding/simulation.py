@@ -32,17 +32,17 @@ from .tissue import Elements, Tissue
 from .zones import Zones
 
 PENALTY_PA_PER_M = 5.0e5
-"""Pressure per depth of penetration at the contact planes (the paper)."""
-STEPS_BEFORE_GROWING = 4
+"""Pressure per depth of penetration at the contact planes (FetalFoldSim)."""
+STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
 
 class Folding:
     """A brain that folds: the solver's objects, made once, and its steps.
 
-    The mesh is that at the start, RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions
-    in m. `solved` is the last step that was accepted, at first one without displacement; `fields` gives its fields,
-    until the next step begins.
+    `mesh` is the start brain in RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions in m.
+    `solved` is the last accepted step (at first, one without displacement); `fields` computes its fields until the next
+    step begins.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Folding:
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
-        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.first_guesses(step_s)])
+        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.initial_guesses(step_s)])
         u = solution.displacement
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
@@ -117,7 +117,7 @@ class Folding:
         return after
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
-        """Set the problem of a step; return its tissue, with parameters of its middle, and its growth."""
+        """Set up the problem of a step; return its tissue, with the parameters at mid-step, and its growth."""
         start = StepStart(state.positions * MM_PER_M, state.time_s, step_s, state.correction)
         p, domain, week = self.parameters, self.domain, start.week(self.parameters, 0.5)
         if domain.positions is not state.positions:
@@ -168,7 +168,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
     whole = min(p.step_s, remaining) if state.step_s >= p.step_s else p.step_s
     smallest = whole / 2**p.solver.max_halvings
     while True:
-        # no separate step for a remainder of round-off
+        # a remainder as small as round-off gets no step of its own
         step_s = remaining if remaining < state.step_s * (1 + 1e-6) else state.step_s
         try:
             after = folding.step(state, step_s)
@@ -189,6 +189,6 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             coarse = resolution_warning(after.rows, folding.domain.order)
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
                 warn(warning)
-        if after.successes >= STEPS_BEFORE_GROWING and after.step_s < p.step_s:
+        if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after

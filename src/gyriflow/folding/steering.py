@@ -34,7 +34,7 @@ class SteeredStep(GrowthByRates):
     """Growth of a step with rates set so that the size `before` becomes the size `target`.
 
     `free_rates` (2,) are the rates of the logarithms of area and volume, in 1/s, of unconstrained growth; `limited` is
-    True if bounds of the rates keep the brain off its curves.
+    True if the bounds of the rates prevent the brain from following its curves.
     """
 
     before: Size
@@ -85,11 +85,11 @@ class SteeredGrowth:
 
 
 def steered_rates(required: Floats, gain: Floats, bounds: tuple[float, float]) -> tuple[float, float, bool]:
-    """Return the rates of cortex and core, and whether bounds keep the brain off its curves.
+    """Return the rates of cortex and core, and whether bounds prevent the brain from following its curves.
 
     The rate of the cortex is set by the area, then that of the core by the remaining volume. If bounds exclude both
     curves, that of the volume is followed. `required` are the (2,) rates of the logarithms of area and volume, `gain`
-    (2, 2) what unit rates of cortex and core add to them (`free_growth`). SolverError if one adds no volume.
+    (2, 2) what unit rates of cortex and core add to them (`free_growth`). SolverError if cortex or core adds no volume.
     """
     cortex_volume, core_volume = gain[1]
     if min(cortex_volume, core_volume) <= 0:

@@ -30,10 +30,11 @@ class SolvedStep:
 
 
 class StepFields:
-    """The fields of a solved step: names are those of the parameter `fields`, those of arrays have units.
+    """The fields of a solved step, by names of the parameter `fields`. Names of arrays contain units.
 
-    They refer to the problem of the step, whose mesh stays where the step began until the next one begins. Where stress
-    is forgotten, that of a step, its strain and its contact pressure are in proportion to the step and given per week.
+    Fields are computed with the problem of the step, whose mesh stays at the start of the step until the next one
+    begins. Without stress memory, stress, strain and contact pressure of a step are proportional to its length, so they
+    are given per week.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class StepFields:
             self._start_normals = PialSearch(domain.positions, zones.cortex_facets).nearest_normals(centres)
 
     def elements(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
-        """Return the fields of elements among some names, (m,), equal on every rank, averaged over points."""
+        """Return those of the named fields that elements have, (m,), averaged over points, equal on every rank."""
         problem, u, domain = self.problem, step.displacement, self.problem.domain
         fields: dict[str, Floats] = {}
         if set(ELEMENT_FIELDS).isdisjoint(names):
@@ -77,7 +78,7 @@ class StepFields:
         return dict(zip(fields, gathered.T, strict=True))
 
     def contact_pressure(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
-        """Return the contact pressure (n,) at all vertices if it is among some names."""
+        """Return the contact pressure (n,) at all vertices, if it is one of the named fields."""
         if self.contact is None or "contact_pressure" not in names:
             return {}
         return self._per_gw({"contact_pressure_pa": self.contact.pressure(step.displacement)}, step.step_s)

@@ -40,7 +40,7 @@ class Stretches:
         rows, columns = (np.concatenate([*ends, vertices]) for ends in (self._ends, self._ends[::-1]))
         self._pattern = sparse.coo_matrix((np.arange(len(rows)), (rows, columns))).tocsr()
 
-    def of(self, positions: Floats, displacement: Floats) -> tuple[Floats, Floats, sparse.csr_matrix]:
+    def compute(self, positions: Floats, displacement: Floats) -> tuple[Floats, Floats, sparse.csr_matrix]:
         """Return volume-weighted sums of ln U (n, 6), volumes (n,), and the (n, n) stiffness matrix.
 
         Positions and displacement are (n, 3) in mm. Each element counts at each of its corners with a quarter of its

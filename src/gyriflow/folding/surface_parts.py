@@ -52,7 +52,7 @@ class SurfacePart:
 
 
 def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
-    """Return for points at (n, 3) positions the number (n,) of one of `count` boxes with nearly equally many points.
+    """Divide (n, 3) points into `count` boxes with nearly equal numbers of points; return the box (n,) of each point.
 
     A box is split across its longest side, in proportion to the counts on both sides, and so on (recursive coordinate
     bisection, Berger and Bokhari 1987).

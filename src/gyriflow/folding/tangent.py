@@ -39,7 +39,7 @@ def rigid_motions(arms: NDArray[np.float32]) -> Floats:
 
 
 class RigidMotions:
-    """Translations and rotations of parts of the mesh as it is placed; `part` (n,) is the part of each vertex."""
+    """Translations and rotations of parts of the mesh, where it is now; `part` (n,) is the part of each vertex."""
 
     def __init__(self, domain: Domain, part: NDArray[np.int64]) -> None:
         vertices = domain.vertex_of_node[: domain.n_owned]
@@ -63,10 +63,10 @@ class ElasticMatrix:
     Blocks below the diagonal between owned nodes are not read, since the matrix is symmetric; `add` may omit them.
 
     `coupling` is a form with the same sparsity pattern, `add` adds the blocks at a displacement, and `fixed` (owned, 3)
-    are the components of the owned nodes whose rows and columns are those of the unit matrix; as an attribute it is
-    (all nodes, 3), by global nodes. `products` multiplies. Of the (b,) blocks of the owned rows, row by row, `nodes`
-    are the owned nodes, counted on this rank, and `columns` the global ones; `row_ends` (owned + 1,) are the first
-    blocks of the rows and the end of the last one.
+    is the mask of the owned nodes' components whose rows and columns are those of the unit matrix. The attribute
+    `fixed` (all nodes, 3) is the same for all global nodes. `products` multiplies the matrix with vectors. The (b,)
+    blocks of the owned rows are stored row by row: `nodes` are their rows, as local nodes, `columns` their columns, as
+    global nodes; `row_ends` (owned + 1,) are the first block of each row and the end of the last one.
     """
 
     def __init__(
@@ -84,9 +84,9 @@ class ElasticMatrix:
         self.fixed = np.concatenate(row_map.comm.allgather(fixed))
         rows = first + self.nodes
         self._diagonal = np.flatnonzero(rows == self.columns)
-        crossed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
-        self._crossed = np.flatnonzero(crossed)
-        self._crossed_diagonal = np.einsum("bii->bi", crossed)[self._diagonal]
+        is_fixed = self.fixed[rows][:, :, None] | self.fixed[self.columns][:, None, :]
+        self._fixed_entries = np.flatnonzero(is_fixed)
+        self._fixed_diagonal = np.einsum("bii->bi", is_fixed)[self._diagonal]
         # without the mirror images of blocks within a rank
         self._stored = np.flatnonzero((self.columns >= rows) | (local_columns >= owned)).astype(np.int32)
         self.products = SymmetricProducts(column_map, self.nodes[self._stored], local_columns[self._stored])
@@ -99,8 +99,8 @@ class ElasticMatrix:
         self._add(u, self._blocks)
         self._blocks.scatter_reverse()
         values = self.values
-        values.reshape(-1)[self._crossed] = 0.0
-        np.einsum("bii->bi", values)[self._diagonal] += self._crossed_diagonal
+        values.reshape(-1)[self._fixed_entries] = 0.0
+        np.einsum("bii->bi", values)[self._diagonal] += self._fixed_diagonal
         self.products.take(values, self._stored)
 
     def half(self) -> sparse.bsr_matrix:
@@ -125,7 +125,7 @@ class ElasticMatrix:
 class Residual:
     """The residual at a displacement (k, 3) of the local nodes in m: `owned` components (3 · n_owned,) and norm in N.
 
-    `elastic` are the forces of the elements alone, with their resultant also in a free body.
+    `elastic` are the forces of the elements alone; in a free body, their resultant is not removed.
     """
 
     displacement: Floats
@@ -148,11 +148,11 @@ class LaggedTangent:
         self._last: Residual | None = None
 
     def forget(self) -> None:
-        """Have the next tangent assembled, since mesh, stiffness, growth or stretch have changed."""
+        """Require that the next tangent is assembled, since mesh, stiffness, growth or stretch have changed."""
         self._last = None
 
     def update(self, at: Residual, within: float) -> None:
-        """Assemble the tangent at a displacement, unless it `predicts` the elastic forces there to within a part."""
+        """Assemble the tangent at a displacement, unless it `predicts` the elastic forces there."""
         self.lagged = within > 0 and self.predicts(at, within)
         if not self.lagged:
             self.matrix.assemble(at.displacement)
@@ -160,7 +160,7 @@ class LaggedTangent:
         self._last = at
 
     def predicts(self, at: Residual, within: float) -> bool:
-        """Return whether the tangent predicts the change of elastic forces since the last update to within a part."""
+        """Return whether it predicts how elastic forces changed since the last update, to a relative error `within`."""
         if self._last is None:
             return False
         change = (at.displacement - self._last.displacement)[: self._domain.n_owned].ravel()
@@ -188,7 +188,7 @@ class Tangent:
         self.matrix.setUp()
 
     def shift_diagonal(self, part: float) -> None:
-        """Shift the diagonal by a part of its absolute values in all products from now on; with 0 not at all."""
+        """Shift the diagonal by a fraction of its absolute values in all further products; 0 removes the shift."""
         self._shift = part * np.abs(np.einsum("nii->ni", self._diagonal())).ravel() if part else None
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:

@@ -78,7 +78,7 @@ class GrowthToTargets:
         return cls(p, inputs, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> StepGrowth:
-        """Return the growth of a step: its part of the misfit to the next target.
+        """Return the growth of a step: its share of the misfit to the next target.
 
         A step that crosses a target goes on towards the next one.
         """
@@ -107,9 +107,9 @@ class GrowthToTargets:
 def log_growth(positions: Floats, stretches: Stretches, displacement: Floats, smoothing_mm: float) -> Floats:
     """Return the (n, 6) Hencky strain ln U of a displacement at the vertices, smoothed: xx yy zz xy xz yz.
 
-    Positions and displacement are (n, 3) in mm. Ranks share elements, then components, as `stretches` are shared.
+    Positions and displacement are (n, 3) in mm. Ranks divide first the elements among them, then the six components.
     """
-    sums, sizes, stiffness = stretches.of(positions, displacement)
+    sums, sizes, stiffness = stretches.compute(positions, displacement)
     sizes = np.where(sizes > 0, sizes, 1.0)[:, None]
     if smoothing_mm == 0:
         return sums / sizes

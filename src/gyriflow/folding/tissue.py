@@ -87,7 +87,7 @@ class Tissue:
         return np.asarray(values[..., elements.vertices[elements.cells[chunk]]] @ linear.T)
 
     def normals(self, needed: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
-        """Return the mask (c,) of elements in which a normal is `needed`, and their (e, q, 3) unit normals.
+        """Return the mask (c,) of elements that need a normal at a node or point, and their unit normals (e, q, 3).
 
         A linear element has one normal, that of the pial vertex nearest to its centre.
         """

@@ -1,6 +1,7 @@
 """Zones of the brain: facets in contact, clamped facets, and vertices that grow.
 
-They are set on the mesh at the start of a run and do not change. Drawing them needs no solver.
+They are set on the mesh at the start of a run and do not change. This module imports no solver, so that figures of the
+zones do not need one.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from .layers import PialSearch
 
 Tags = dict[str, NDArray[np.int32]]
 FLAT_TOL = 0.01
-"""Tolerance of a flat base or side, as a part of the extent."""
+"""Tolerance of a flat base or side, as a fraction of the extent."""
 MAX_WALL_MM, MIN_WALL_COSINE = 2.0, 0.7
 """The medial wall of a single hemisphere: its largest distance to the innermost point, and the smallest cosine of the
 angle between its normal and the left-right axis."""
@@ -120,7 +121,7 @@ def _wall_anchors(vertices: Floats, wall: NDArray[np.int64]) -> tuple[NDArray[np
 
 
 def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Return the mask of vertices in the ellipsoid without growth of a brain with extreme coordinates (3,)."""
+    """Return the mask of vertices in the ellipsoid without growth; `low`, `high` (3,) are the ends of the brain."""
     extent = high - low
     centre = (low + high) / 2 + np.array([0.0, *ellipsoid.shift]) * extent
     return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1

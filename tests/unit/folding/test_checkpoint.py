@@ -37,7 +37,7 @@ def test_the_first_guess_continues_a_displacement_whose_rate_changes_linearly():
     state = State.at_start(at(0.0), 1.0)
     for before, after in pairwise(times[:3]):
         state = state.after(at(after) - at(before), after - before, {})
-    np.testing.assert_allclose(state.first_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
+    np.testing.assert_allclose(state.initial_guesses(1.5)[0], at(3.0) - at(1.5), rtol=1e-13)
 
 
 def test_a_checkpoint_comes_back_as_it_was(tmp_path):

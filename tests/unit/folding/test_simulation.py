@@ -18,7 +18,7 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.run import shortened_step_note
-from gyriflow.folding.simulation import STEPS_BEFORE_GROWING, advance
+from gyriflow.folding.simulation import STEPS_BEFORE_DOUBLING, advance
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
 
@@ -71,8 +71,8 @@ def test_a_failing_step_is_halved_and_grows_back():
     assert lengths[0] == 10_800
     assert max(lengths) == 43_200
     first = lengths.index(21_600)
-    assert first >= STEPS_BEFORE_GROWING
-    assert lengths[first + STEPS_BEFORE_GROWING] == 43_200
+    assert first >= STEPS_BEFORE_DOUBLING
+    assert lengths[first + STEPS_BEFORE_DOUBLING] == 43_200
 
 
 @pytest.mark.fault(32)
