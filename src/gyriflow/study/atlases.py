@@ -1,4 +1,4 @@
-"""Atlases of a study: series and weeks, files that are here or to be fetched, and the brains that they are."""
+"""Atlases of a study: their series and weeks, their files, present or to be fetched, and the brains of these files."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -17,9 +17,9 @@ from ..settings.root import Config
 
 @dataclass(frozen=True)
 class AtlasFile:
-    """A file of an atlas: its week and key, its place, its address and its record.
+    """A file of an atlas: its series, week and key, its path, the address for its download, and its size and checksum.
 
-    `copies` are the files of that name: none if it is missing, several if it is ambiguous.
+    `copies` are the files of that name in the folder: none if it is missing, several if it is ambiguous.
     """
 
     series: str
@@ -78,7 +78,7 @@ class UsedAtlas:
         return [week for week in sorted(self.settings.weeks) if week in self.known_weeks(name)]
 
     def known_weeks(self, name: str) -> set[float]:
-        """Return the weeks of a series that are published or whose necessary files are in the folder."""
+        """Return the weeks of a series that are published, or whose required files are in the folder."""
         series = self.atlas.series[name]
         present = [set(self._in_folder[series.files[key]]) for key in series.needed]
         return set(series.weeks) | set.intersection(*present)
@@ -89,7 +89,7 @@ class UsedAtlas:
         return {pattern: self._copies(pattern) for pattern in patterns}
 
     @cached_property
-    def _files_there(self) -> list[Path]:
+    def _folder_files(self) -> list[Path]:
         return files_below(self.folder)
 
     def _copies(self, pattern: str) -> dict[float, list[Path]]:
@@ -98,7 +98,7 @@ class UsedAtlas:
         pieces = list(Formatter().parse(tail))
         name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
         copies: dict[float, list[Path]] = {}
-        for path in self._files_there:
+        for path in self._folder_files:
             if match := re.fullmatch(f"(?:.*/)?{name}", path.as_posix()):
                 copies.setdefault(float(match[1]), []).append(path)
         return copies
@@ -111,7 +111,7 @@ class UsedAtlas:
 
 
 def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
-    """Return the entries of `brains` that an atlas stands for, whether their files are there or to be fetched."""
+    """Return the entries of `brains` for the brains of an atlas, even if their files have yet to be fetched."""
     entries: dict[str, dict[str, Any]] = {}
     for file in used.files:
         series, name = used.atlas.series[file.series], used.atlas.brain_id(file.series, file.week)
@@ -128,7 +128,7 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
 
 
 def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
-    """Yield the problems between a section, its atlas and its folder."""
+    """Yield the problems of a section `atlas` with respect to its atlas and its folder."""
     atlas, settings, licence = used.atlas, used.settings, used.atlas.licence
     if unknown := [name for name in used.series if name not in atlas.series]:
         yield KeyProblem(f"found {', '.join(unknown)}; {atlas.name} has {', '.join(atlas.series)}", ("series",))
@@ -142,12 +142,13 @@ def atlas_problems(used: UsedAtlas) -> Iterator[KeyProblem]:
         yield KeyProblem(text, ("accept_licence",))
     available = set.union(*map(used.known_weeks, used.series))
     if unknown_weeks := set(settings.weeks or ()) - available:
-        of = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
-        text = f"{of} has no files of {_listed(unknown_weeks)}; it has {_listed(available)}. A week is never rounded"
+        source = atlas.name if settings.series is None else f"{atlas.name} ({', '.join(used.series)})"
+        weeks = f"{_listed(unknown_weeks)} GW; it has {_listed(available)} GW"
+        text = f"{source} has no files of {weeks}. Weeks are not rounded: write one of these"
         yield KeyProblem(text, ("weeks",))
     for file in used.files:
         if len(file.copies) > 1:
-            yield KeyProblem(f"found {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
+            yield KeyProblem(f"found copies {' and '.join(map(str, file.copies))}; keep one of them", ("folder",))
         elif not file.copies and file.url is None:
             yield KeyProblem(f"{file.path} is missing, and {atlas.name} has no url for it", ("weeks",))
 
@@ -171,7 +172,7 @@ def _listed(weeks: Iterable[float]) -> str:
 
 
 def used_atlases(config: Config) -> list[UsedAtlas]:
-    """Return the atlases of a configuration with their descriptions, as their files lie at this moment."""
+    """Return the atlases of a configuration, with their descriptions and the files that exist now."""
     return [UsedAtlas(section, Atlas(**read_keys(section.description))) for section in config.atlas]
 
 

@@ -1,4 +1,4 @@
-"""Checks across sections that are valid each: names, starts, runs, growth, metrics, studies, calibration."""
+"""Checks of sections against each other: names, starts, runs, growth, metrics, studies, calibration."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,21 +28,21 @@ from ..settings.varying import Varying
 from .atlases import used_atlases
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
-"""Names that stand for something else in results, tables and settings."""
+"""Ids that brains may not have, since they have another meaning in results, tables or settings."""
 RESERVED_STUDIES = (
     *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
 )
-"""Folders of the study's results that are not sweeps."""
+"""Names that sweeps may not have, since other results of the study have folders of these names."""
 
 
 def problems_between(config: Config) -> list[KeyProblem]:
     """Return the problems between the sections of a configuration, each once."""
-    every = (names, starts, runs, growth, studies, calibration, metrics)
-    return list(dict.fromkeys(problem for check in every for problem in check(config)))
+    checks = (names, starts, runs, growth, studies, calibration, metrics)
+    return list(dict.fromkeys(problem for check in checks for problem in check(config)))
 
 
 def names(config: Config) -> Iterator[KeyProblem]:
-    """Yield problems of the names of brains, runs, studies and schemes. Some are used as folder names."""
+    """Yield problems with the names of brains, runs, studies and schemes. Folders have the names of brains and runs."""
     if not config.brains and not config.atlas:
         yield KeyProblem("found nothing; expected a list of brains, each with id, week and a source", ("brains",))
     counts = Counter(brain.id for brain in config.brains)
@@ -52,9 +52,12 @@ def names(config: Config) -> Iterator[KeyProblem]:
         if name in RESERVED_BRAINS:
             yield KeyProblem(f"the id {name} is reserved; choose another", ("brains",))
     for first, second in _equal_but_for_case(counts):
-        yield KeyProblem(f"the ids {first} and {second} are the same folder on some disks; rename one", ("brains",))
+        yield KeyProblem(
+            f"the ids {first} and {second} differ only in case, so some disks mix up their folders; rename one",
+            ("brains",),
+        )
     for first, second in _equal_but_for_case(config.runs):
-        text = f"is the same folder as that of the run {first} on some disks; rename one"
+        text = f"differs from the run {first} only in case, so some disks mix up their folders; rename one"
         yield KeyProblem(text, ("runs", second))
     reserved = {"runs": (MEASURED,), "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
@@ -107,7 +110,7 @@ def runs(config: Config) -> Iterator[KeyProblem]:
     for name, run in config.runs.items():
         brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
         weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
-        # without a start, what holds at the end is checked
+        # without a start brain, check the values at the end
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
                 yield KeyProblem(problem.text, _place(name, problem.key, config))
@@ -131,8 +134,8 @@ def growth(config: Config) -> Iterator[KeyProblem]:
     lists: dict[Key, Sequence[str]] = {("growth", "brains", name): ids for name, ids in named.items()}
     if growth_brains is not None and not named:
         lists = {("growth", "brains"): list(growth_brains)}
-    every = [brain.id for brain in config.brains]
-    lists = {key: every if named and ALL in ids else ids for key, ids in lists.items()}
+    all_ids = [brain.id for brain in config.brains]
+    lists = {key: all_ids if named and ALL in ids else ids for key, ids in lists.items()}
     unknown = [problem for key, ids in lists.items() for problem in _unknown(ids, config, key)]
     yield from unknown
     if unknown:
@@ -164,13 +167,17 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     with_regions = settings.regions if isinstance(settings.regions, dict) else {}
     yield from _unknown(with_regions, config, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
-    # the carrying of regions and their asymmetry are of both sides
+    # regions are carried, and their asymmetry measured, on both hemispheres together
     if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
-        yield KeyProblem(f"found {', '.join(wrong)}, of one hemisphere; regions need both", ("metrics", "regions"))
+        yield KeyProblem(
+            f"found {', '.join(wrong)} with one hemisphere; expected brains with both", ("metrics", "regions")
+        )
     scans = Counter((brain.subject, brain.week) for brain in config.brains if brain.subject is not None)
     for (subject, week), count in scans.items():
         if count > 1:
-            yield KeyProblem(f"{count} scans of the subject {subject} are of week {week:g}; expected one", ("brains",))
+            yield KeyProblem(
+                f"found {count} scans of the subject {subject} in week {week:g}; expected one", ("brains",)
+            )
 
 
 def studies(config: Config) -> Iterator[KeyProblem]:
@@ -183,8 +190,8 @@ def studies(config: Config) -> Iterator[KeyProblem]:
             yield from _member_problems(study, config.runs[study.base], key)
             for run, _ in variants(name, study):
                 if run in config.runs or study_of_run.setdefault(run, name) != name:
-                    where = "runs" if run in config.runs else f"the study {study_of_run[run]}"
-                    yield KeyProblem(f"has a run of the name {run}, as {where} has; rename one", key)
+                    where = "the section runs" if run in config.runs else f"the study {study_of_run[run]}"
+                    yield KeyProblem(f"has a run with the name {run}, and so has {where}; rename one", key)
 
 
 def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyProblem]:
@@ -237,7 +244,7 @@ def calibration(config: Config) -> Iterator[KeyProblem]:
         return
     yield from _comparison_problems(calibrate, config, ("calibrate",))
     for name in sorted(set(calibrate.runs) & set(config.runs)):
-        yield KeyProblem("the name is that of a run of the calibration; choose another", ("runs", name))
+        yield KeyProblem("the name is used for a run of the calibration; choose another", ("runs", name))
     if calibrate.base in config.runs:
         for key, bounds in calibrate.parameters.items():
             for text in _parameter_problems(key, bounds, config.runs[calibrate.base]):
@@ -248,7 +255,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
     curve = key.removesuffix(AMPLITUDE)
     if key == STIFFNESS_RATIO or curve != key:
         if min(bounds) <= 0:
-            yield f"found {min(bounds):g}; it should be above 0"
+            yield f"found {min(bounds):g}; expected bounds above 0"
         if key == STIFFNESS_RATIO and isinstance(base.shear_modulus_core_pa, Varying):
             yield "the core's shear modulus varies in the base run; expected a number"
         if curve != key and not _is_curve(curve, base):

@@ -12,7 +12,7 @@ RUN_FIGURES, STUDY_FIGURES, SWEEP_FIGURES = f"{RUN}/figures", f"{STUDY}/figures"
 MAX_DEVIATIONS = 4
 """Weeks for which the deviation from the expected brain is shown."""
 
-Given = dict[str, Any]
+Arguments = dict[str, Any]
 
 
 def comparison_figures(study: Study) -> Iterator[Figure]:
@@ -116,7 +116,7 @@ def expected_figure(simulation: Simulation) -> Figure:
     # the last week, and others at equal steps
     weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
     weeks_drawn = {min(surfaces), *weeks}
-    inputs: Given = {
+    inputs: Arguments = {
         "runs": {"expected": {week: surface for week, surface in surfaces.items() if week in weeks_drawn}},
         "observed": {week: brain.pial for week, brain in observed.items() if week in weeks_drawn},
         "deviations": {week: deviations[week] for week in weeks},
@@ -141,8 +141,8 @@ DEVIATION_MAPS = Kind(
 
 def deviation_figure(simulation: Simulation, quantity: str) -> Figure:
     maps = {week: [files] for week, files in _deviations(simulation).items()}
-    options: Given = {"quantity": quantity, "views": AROUND}
-    inputs: Given = {"brains": {"observed minus expected": maps}}
+    options: Arguments = {"quantity": quantity, "views": AROUND}
+    inputs: Arguments = {"brains": {"observed minus expected": maps}}
     return Figure(DEVIATION_MAPS, inputs, options, {**simulation.names, "quantity": quantity})
 
 
@@ -185,7 +185,7 @@ def _members(sweep: Sweep) -> dict[str, Measurement]:
     return {simulation.run: simulation.at(sweep.week) for simulation, _ in sweep.members if simulation.start is start}
 
 
-def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Given, **options: Any) -> Figure:
+def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Arguments, **options: Any) -> Figure:
     """Return a figure of the runs of a sweep; runs may have ended before the week of comparison."""
     start = _start(sweep)
     values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
@@ -215,7 +215,7 @@ INFLUENCE = Kind(
 
 def influence_figure(sweep: Sweep) -> Figure:
     observed = sweep.observed[_start(sweep).id]
-    inputs: Given = {
+    inputs: Arguments = {
         "members": {run: halves_of(row) for run, row in _members(sweep).items()},
         "observed": halves_of(observed[0].measurement) if observed else None,
     }
@@ -239,7 +239,7 @@ INFLUENCE_SPECTRA = Kind(
 
 
 def influence_spectra(sweep: Sweep) -> Figure:
-    inputs: Given = {
+    inputs: Arguments = {
         "members": {run: f"{row.folder}/spectra.csv" for run, row in _members(sweep).items()},
         "observed": [f"{brain.measurement.folder}/spectra.csv" for brain in sweep.observed[_start(sweep).id][:1]],
     }

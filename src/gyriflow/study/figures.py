@@ -24,7 +24,7 @@ ZONES = {"contact", "no_growth", "support"}
 """Settings that determine the zones of a run. Runs with equal ones share a figure of the zones."""
 MIN_NORM_SUBJECTS, MAX_SERIES = 5, 4
 
-Given = dict[str, Any]
+Arguments = dict[str, Any]
 
 
 def figures_of(study: Study) -> list[Figure]:
@@ -95,7 +95,7 @@ INPUTS = Kind("inputs_figure", f"{STUDY_FIGURES}/inputs.png", "pictures:runs_by_
 def inputs_figure(study: Study) -> Figure:
     """Return the picture of the first and the last brain of a study."""
     ends = dict.fromkeys(pick(study.brains.values(), key=lambda brain: brain.week) for pick in (min, max))
-    inputs: Given = {"runs": {}, "observed": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
+    inputs: Arguments = {"runs": {}, "observed": {f"{brain.id}\n{brain.week:g} GW": brain.pial for brain in ends}}
     return Figure(INPUTS, inputs, {"views": THREE_SIDES, "observed_name": ""})
 
 
@@ -204,7 +204,7 @@ def predicted_figure(simulation: Simulation, atlas_brain: Brain) -> Figure:
     start, predicted = simulation.start, f"predicted\n{simulation.weeks[-1]:g} GW"
     brains = {f"start\n{start.week:g} GW": start.pial, predicted: simulation.measurements[-1].parts["whole"]}
     brains[f"atlas' own brain\n{atlas_brain.week:g} GW"] = atlas_brain.pial
-    options: Given = {"views": THREE_SIDES, "observed_name": "", "predicted": predicted}
+    options: Arguments = {"views": THREE_SIDES, "observed_name": "", "predicted": predicted}
     return Figure(PREDICTED, {"runs": {}, "observed": brains}, options, simulation.names)
 
 
@@ -226,7 +226,7 @@ WEEKLY = Kind(
 
 def weekly_figure(start: Brain, simulations: list[Simulation]) -> Figure:
     observed = observed_by_week(*simulations)
-    inputs: Given = {
+    inputs: Arguments = {
         "runs": {simulation.run: surfaces_by_week(simulation) for simulation in simulations},
         "observed": {week: brain.pial for week, brain in observed.items()},
     }
@@ -250,7 +250,7 @@ OUTLINES = Kind(
 
 def outlines_figure(start: Brain, simulations: list[Simulation]) -> Figure:
     observed = observed_by_week(*simulations)
-    inputs: Given = {"observed": {week: brain.pial for week, brain in observed.items()}, "runs": {}}
+    inputs: Arguments = {"observed": {week: brain.pial for week, brain in observed.items()}, "runs": {}}
     for simulation in simulations:
         surfaces = surfaces_by_week(simulation)
         inputs["runs"][simulation.run] = {week: surfaces[week] for week in observed_by_week(simulation)}
@@ -363,7 +363,7 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
         yield norms_figure(study, options)
 
 
-def _chart_options(study: Study) -> Given:
+def _chart_options(study: Study) -> Arguments:
     """Return the names and groups of brains in charts over the weeks."""
     brains, groups = study.brains.values(), _groups(study)
     return {
@@ -443,7 +443,7 @@ NORMS = Kind(
 )
 
 
-def norms_figure(study: Study, options: Given) -> Figure:
+def norms_figure(study: Study, options: Arguments) -> Figure:
     reference = [study.brains[brain] for brain in study.norm_reference]
     tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
     comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]

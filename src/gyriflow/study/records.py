@@ -65,8 +65,8 @@ class Measurement:
 class Brain:
     """A brain of the study; `config` is its entry in the configuration.
 
-    `labels` is None if it is defined by surfaces. `has_thickness` and `has_white`: its cortical thickness
-    and white surfaces are measured, from labels or from white surfaces of the configuration. `regions_from` is the
+    `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there are results for its cortical
+    thickness and its white surfaces, from labels or from white surfaces of the configuration. `regions_from` is the
     source of its regions: given for this brain, carried from another brain, or named sulci. `has_regions`: its metrics
     are also measured by region. `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
     """
@@ -152,8 +152,8 @@ class Brain:
 class Chain:
     """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
 
-    `correspondences` are the files that map each brain to the next; `posed` has for both whether the map refers to
-    posed surfaces or to the coordinates of their files. Shapes are also computed for `further_weeks`.
+    `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
+    refers to its posed surface (True) or to the coordinates of its files. Shapes are also computed for `further_weeks`.
     """
 
     brains: tuple[Brain, ...]

@@ -27,8 +27,8 @@ Chains = Mapping[tuple[str, Origin], Chain]
 def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     """Return the study of a configuration, without the brains that are `refused`.
 
-    A refused start brain is not replaced by another one. A start brain whose growth needs refused brains is not folded
-    either (see `Study.unreachable`). InputError if a run lacks brains to grow towards and none is refused.
+    No other brain replaces a refused start brain. A start brain whose growth needs refused brains is not folded either
+    (see `Study.unreachable`). InputError if a run lacks brains to grow towards and none is refused.
     """
     checksums = known_checksums(config)
     brains = {brain.id: _brain(brain, config, refused, checksums) for brain in config.brains if brain.id not in refused}
@@ -107,7 +107,7 @@ def _later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
 
 @dataclass(frozen=True)
 class _Planned:
-    """A run from one start brain, before the brains of its growth are known."""
+    """A run from one start brain, before the brains that its growth is measured on are known."""
 
     run: str
     start: Brain
@@ -119,7 +119,7 @@ class _Planned:
 class Member:
     """A run of a sweep: its name, the varied values by key, and its complete settings.
 
-    It has the name of an equal run of `runs` or of an earlier sweep, if there is one.
+    If `runs` or an earlier sweep has an equal run, the member has its name, and the run is simulated once.
     """
 
     run: str
@@ -166,9 +166,9 @@ def _plan(
 
 
 def _members(config: Config, plan: Sequence[_Planned]) -> dict[str, list[Member]]:
-    """Return the members of each sweep. Equal members share a run, which ends at the latest of their weeks.
+    """Return the members of each sweep. Equal members share one simulated run, which ends at the latest of their weeks.
 
-    They share one of `runs` if its simulations have all of their weeks.
+    If a run of `runs` is equal too, and its simulations have all their weeks, they share that one.
     """
     combinations = [
         (name, member, values, changed(config.runs[study.base], study.changes(values)))
@@ -177,22 +177,23 @@ def _members(config: Config, plan: Sequence[_Planned]) -> dict[str, list[Member]
     ]
     weeks: dict[str, set[float]] = {}
     for *_, settings in combinations:
-        weeks.setdefault(_model(settings), set()).add(settings.end_week)
-    solved = {
-        _model(run): name
+        weeks.setdefault(_equality_key(settings), set()).add(settings.end_week)
+    names = {
+        _equality_key(run): name
         for name, run in reversed(list(config.runs.items()))
-        if all(weeks.get(_model(run), set()) <= set(planned.weeks) for planned in plan if planned.run == name)
+        if all(weeks.get(_equality_key(run), set()) <= set(planned.weeks) for planned in plan if planned.run == name)
     }
     members: dict[str, list[Member]] = {name: [] for name in config.studies}
     for name, member, values, settings in combinations:
-        run = solved.setdefault(_model(settings), member)
-        complete = config.runs.get(run) or changed(settings, {"end_week": max(weeks[_model(settings)])})
+        key = _equality_key(settings)
+        run = names.setdefault(key, member)
+        complete = config.runs.get(run) or changed(settings, {"end_week": max(weeks[key])})
         members[name].append(Member(run, values, complete))
     return members
 
 
-def _model(run: Run) -> str:
-    # without keys that do not affect the shapes of a run
+def _equality_key(run: Run) -> str:
+    """Return a text that is the same for runs whose shapes are the same at each week."""
     return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})
 
 
@@ -240,13 +241,13 @@ def _chains(plan: Sequence[_Planned], series: Series, brains: Iterable[Brain]) -
 
 
 def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
-    """Return a start brain and the later brains of its growth series, one for each week, to the first past an end week.
+    """Return a start brain and later brains of its growth series, one a week, up to the first at or past an end week.
 
     All have label volumes, or surfaces with the same vertices.
     """
     # scans of the same subject come first in a population's series
     members = sorted(series.brains.get(series.with_brain(start), ()), key=lambda brain: brain.subject != start.subject)
-    # growth up to the end week needs the first brain past it
+    # growth up to the end week needs the first brain at or past it
     last = min((brain.week for brain in members if brain.week >= end), default=end)
     by_week = {start.week: start}
     for brain in members:
@@ -259,10 +260,10 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
 def _atlas_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     """Return a start brain and the brains of the only series of another population, one for each week.
 
-    They begin with the last week not after the start, or else the first, and end with the first week past an end week
-    (at least two weeks, if available).
+    They begin with the last week up to that of the start (else with the first week), and end with the first week at or
+    past an end week. There are at least two weeks, if available.
     """
-    names = series.of_other_populations(start)
+    names = series.from_other_populations(start)
     members = series.brains[names[0]] if len(names) == 1 else ()
     weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
     if not weekly:
@@ -288,7 +289,7 @@ def _unreachable(plan: Iterable[_Planned], series: Series, chains: Chains) -> di
             expected = "the start's own growth series with label volumes or matched surfaces"
             remedy = "Add later brains to its series (growth.brains), or grow by sizes or rates."
         else:
-            names = series.of_other_populations(start)
+            names = series.from_other_populations(start)
             is_complete = len(chain.brains) > 2 and start.week >= chain.later[0].week - BEFORE_GW
             expected = "one series of another population with the same hemispheres"
             remedy = "Add an atlas of these weeks, or name one of several series in growth.series."
@@ -313,7 +314,7 @@ def _simulation(
     run, start, growth = planned.run, planned.start, planned.settings.growth
     shapes = _shapes(planned.settings)
     sizes = growth.definition.measured == "sizes" and "measured" in [getattr(growth, size) for size in SIZES]
-    # brains of other subjects are compared with if the run grows towards them
+    # the run is also compared with brains of other subjects if it grows towards them
     targets = [brain for brain in chains[start.id, "self"].later if brain.sides == start.sides]
     candidates = list(dict.fromkeys([*start.comparable(brains), *targets]))
     candidates.sort(key=lambda brain: brain.subject != start.subject)

@@ -42,8 +42,8 @@ class Series:
         populations = [name for name in self.brains if not self._is_single_subject(name)]
         return next(iter(own or (populations if len(populations) == 1 else [])), None)
 
-    def of_other_populations(self, start: Brain) -> list[str]:
-        """Return the series of other populations with a brain's hemispheres; only the preferred one, if it is one.
+    def from_other_populations(self, start: Brain) -> list[str]:
+        """Return the series of other populations with a brain's hemispheres; only the preferred one, if among them.
 
         A series of scans of another subject is returned only if it is preferred.
         """
@@ -74,7 +74,7 @@ class Series:
     def posed(self, *pair: Brain) -> list[bool]:
         """Return for each of two brains whether their correspondence refers to the pose of its surface.
 
-        This is the case for masks made from surfaces. Otherwise it refers to the world of its files.
+        This is the case for masks made from surfaces. Otherwise it refers to the world coordinates of its files.
         """
         return [not brain.config.has_labels and not self.are_matched(*pair) for brain in pair]
 
@@ -85,10 +85,10 @@ def several_subjects(brains: Iterable[Brain]) -> bool:
 
 
 def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
-    """Return the growth series of a configuration among some of its brains.
+    """Return the growth series of a configuration, limited to the given brains.
 
-    Surfaces are read to find whether their vertices are matched. For files of an atlas that are not downloaded yet, the
-    atlas' description counts.
+    Surfaces are read to find out whether their vertices are matched. For atlas files that have yet to be downloaded,
+    the description of the atlas says so.
     """
     names = growth_series([brain.config for brain in brains.values()], config.growth.brains)
     assumed = {

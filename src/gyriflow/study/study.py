@@ -21,9 +21,9 @@ from .series import Series, several_subjects
 class Study:
     """Everything a configuration asks for. Refused brains are in `config`, not in `brains`.
 
-    `simulations` are those of runs, sweeps and calibration, by run and start brain. `chains` are the brains that a
-    start brain's growth comes from, by its id and the origin of growth. `unreachable` has the reasons why start brains
-    are not folded.
+    `simulations` are those of runs, sweeps and calibration, by run and start brain. `chains` are the brains on which
+    growth for a start brain is measured, by its id and the origin of growth. `unreachable` has the reasons why start
+    brains are not folded.
     """
 
     config: Config
@@ -61,7 +61,7 @@ class Study:
 
     @cached_property
     def growth_brains(self) -> list[tuple[str, Brain]]:
-        """Series and brain of all brains that growth is measured on, in the order of weeks within a series."""
+        """All brains that growth is measured on, each with its series, in the order of weeks within a series."""
         series = self.series.brains
         return [(name, brain) for name in series for brain in sorted(series[name], key=lambda brain: brain.week)]
 
@@ -188,7 +188,7 @@ class Study:
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:
-        """The atlas of each brain that belongs to one, by id."""
+        """The atlas of each brain of an atlas, by the id of the brain."""
         return {
             used.atlas.brain_id(file.series, file.week): used.atlas
             for used in used_atlases(self.config)
@@ -252,7 +252,7 @@ class Study:
 
     @property
     def exported(self) -> list[dict[str, Any]]:
-        """Names and files, by side, of each measured brain for the export."""
+        """Names and files, by side, of each observed or simulated brain for the export."""
         return [self._exported(row, self.brains[row.subject]) for row in self.measurements.values()]
 
     def _exported(self, row: Measurement, brain: Brain) -> dict[str, Any]:
@@ -279,7 +279,7 @@ class Study:
             "volume": volume if brain.labels and not is_observed else {},
         }
 
-    # contents of the report and of the table of quality besides figures
+    # contents of the report and the quality table, other than figures
 
     @property
     def used_settings(self) -> dict[str, Any]:
