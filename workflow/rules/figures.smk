@@ -55,7 +55,7 @@ rule influence_figures:
         target_files(FIGURES, "influence_figures"),
 
 
-# figures and tables of the paper; brains are measured only at the weeks of comparison
+# figures and tables of the paper; observed brains are measured only at the weeks of comparison
 rule paper:
     input:
         target_files(FIGURES, "paper"),
