@@ -1,5 +1,6 @@
-"""What all tests share, and how they are dealt out to workers."""
+"""Fixtures and options of all tests, and their distribution to workers."""
 
+import logging
 import os
 from pathlib import Path
 
@@ -22,6 +23,12 @@ class Sets(LoadScopeScheduling):
         file, _, _ = nodeid.partition("::")
         # these compile forms of their own: two should not fill one cache at once
         return "tests/unit/folding" if file.startswith("tests/unit/folding/") else file
+
+
+@pytest.fixture(autouse=True)
+def default_logging_level():
+    """Start each test at the default level, which scripts run in this process lower."""
+    logging.getLogger().setLevel(logging.WARNING)
 
 
 def pytest_addoption(parser):
