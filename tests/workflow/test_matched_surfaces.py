@@ -83,6 +83,7 @@ def in_week_21(results, points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
+@pytest.mark.extended
 def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres):
     name = write_study(workflow, hemispheres)
     outcome = workflow.run("results/brains/b21/mesh/carried.h5", "--cores", "2", "--configfile", name)

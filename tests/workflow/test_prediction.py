@@ -40,6 +40,7 @@ def brains_of(workflow, population, seed, *weeks):
 
 
 @pytest.mark.slow
+@pytest.mark.extended
 def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(workflow):
     brains = [*brains_of(workflow, "a", 1, 21, 22, 23), *brains_of(workflow, "b", 2, 21.5, 22.6, 23)]
     name = workflow.write("study.yaml", STUDY | {"brains": brains, "start": "b21.5"})

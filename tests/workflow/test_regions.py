@@ -52,6 +52,7 @@ def write_regions(path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.extended
 def test_regions_of_phantoms_are_where_they_are_known_to_be(workflow):
     write_regions(workflow.directory / "regions.nii.gz")
     name = workflow.write("study.yaml", STUDY)

@@ -72,6 +72,7 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_
 
 
 @pytest.mark.slow
+@pytest.mark.extended
 def test_a_calibration_scores_its_runs_and_finds_the_rate_that_meets_a_brain(workflow):
     """The brain of the later week is a tenth larger along each axis: its area takes growth, the volume stays behind."""
     search = {
