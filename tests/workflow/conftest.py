@@ -14,6 +14,7 @@ from facts import Facts
 from processes import ran
 from shapes import ellipsoid_mesh, hemisphere, phantom, save_labels
 
+from gyriflow.geometry.poses import Pose
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
@@ -132,7 +133,7 @@ class Workflow:
         arguments = ("mesh", "--configfile", self.write("study.yaml", config))
         self.lay_out(*arguments)
         brain = self.directory / "results" / "brains" / "a"
-        write_json(brain / "surface" / "surface.json", {"fissure_x_mm": 0.0})
+        write_json(brain / "surface" / "surface.json", {"fissure_x_mm": 0.0, "pose": Pose().plain()})
         for side, sign in (("left", -1), ("right", 1)):
             write_surface(brain / "surface" / f"{side}.pial.surf.gii", hemisphere(sign))
         write_tetrahedral_mesh(brain / "mesh" / "brain.xdmf", ellipsoid_mesh(cells, (20.0, 26.0, 18.0)))

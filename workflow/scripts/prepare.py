@@ -18,9 +18,8 @@ from gyriflow.step import step
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
     mesh, maps, sizes = read_tetrahedral_mesh(files.mesh), {}, {}
-    facets = boundary_faces(mesh)[0]
+    facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
     for name, source in params.maps.items():
-        pose = read_pose(files.surface)
         path = ", ".join(source["map"])
         if source["surface"]:
             surface, values = read_surface_maps(source["map"], source["surface"])

@@ -1,4 +1,4 @@
-"""Norms: published curves and measured brains over gestational weeks, and where a brain stands among them."""
+"""Norms of published curves and of measured brains over gestational weeks, and the scores of brains against them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ WINDOW_GW = 0.5
 """Brains at most this far from a week are of that week."""
 
 CURVE_POINTS = 41
-"""Weeks at which a curve is given, from the reference's first to its last."""
+"""Number of weeks at which a curve is given, from the reference's first to its last."""
 
 OTHER_SIDES = "other hemispheres"
 """The flag of a brain that has other hemispheres than those it would be compared with."""
@@ -38,9 +38,10 @@ OTHER_SIDES = "other hemispheres"
 class PublishedNorm:
     """A published curve: mean and standard deviation as polynomials of the week, highest power first.
 
-    It is for the first to the last of `weeks`, measured in a label `scheme` by counting `labels`, of so many
-    `subjects`, None if its source does not state it. `tissue` is the list of a `LabelScheme` that is closest to it in
-    other schemes, "" where there is none; `side` the hemisphere of the structure, None where it is in both.
+    It is valid from the first to the last of `weeks`. The volumes are those of `labels` of a label `scheme`, in
+    `subjects` brains (None if the source does not give their number). `tissue` is the closest field of `LabelScheme`
+    for brains of other schemes ("" if no field is close); `side` is the structure's hemisphere, None if it is in
+    both.
     """
 
     mean: Sequence[float]
@@ -70,38 +71,38 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
 def structure_volumes(
     volumes: Mapping[int, float], scheme: LabelScheme, norms: Mapping[str, PublishedNorm]
 ) -> tuple[dict[str, float], list[str]]:
-    """Return the volumes of the structures that norms are of, and those that are of labels of another scheme.
+    """Return the volumes of the structures of published norms, and the structures measured with another label scheme.
 
-    Volumes are by label, in the norms' unit. A brain of another scheme has those of its nearest tissues, such as its
-    cortex; a structure that it has no list for, or no voxel of, is left out.
+    `volumes` are by label, in the norms' unit. With another scheme than the norm's, a structure is the scheme's tissue
+    that is closest to it, such as the cortex. A structure without voxels, or without labels in the scheme, is left out.
     """
-    structures, others = {}, []
+    structures, substitutes = {}, []
     for name, norm in norms.items():
         same = norm.scheme == scheme.name
         labels = norm.labels if same else getattr(scheme, norm.tissue, ())
         total = sum(volumes.get(label, 0.0) for label in labels)
         if total > 0:
             structures[name] = total
-            others += [] if same else [name]
-    return structures, others
+            substitutes += [] if same else [name]
+    return structures, substitutes
 
 
 def published_scores(
     volumes: Mapping[str, float],
     week: float,
     norms: Mapping[str, PublishedNorm],
-    others: Sequence[str] = (),
+    substitutes: Sequence[str] = (),
     sides: Sequence[Side] = SIDES,
 ) -> pd.DataFrame:
-    """Return where the volumes of a brain stand among published ones.
+    """Return the scores of the volumes of a brain against published norms.
 
-    Volumes are by structure, in the norms' unit; structures without a norm are left out. `others` are those of labels
-    of another scheme than the norms', `sides` the hemispheres that the brain has.
+    `volumes` are by structure, in the norms' unit; structures without a norm are left out. `substitutes` are the
+    structures measured with another label scheme than the norm's, `sides` the hemispheres of the brain.
 
     Columns structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution,
-    0 to 100), brains (that the norm was made of; NaN if its source does not state it), flag ("ok"; "other labels": the
-    norm was measured with labels of another scheme; "outside the norm's weeks", or "one hemisphere" where the norm is
-    of more than the brain has, then without expected, z and centile).
+    0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other labels": the norm
+    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain lacks a hemisphere
+    of the norm). Expected, z and centile are NaN with the last two flags.
     """
     rows = []
     for name, value in volumes.items():
@@ -114,7 +115,7 @@ def published_scores(
         mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
         z = (value - mean) / sd
         brains = np.nan if norm.subjects is None else norm.subjects
-        flag = "other labels" if name in others else "ok"
+        flag = "other labels" if name in substitutes else "ok"
         if not scored:
             flag = "outside the norm's weeks" if is_present else "one hemisphere"
         rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
@@ -124,7 +125,7 @@ def published_scores(
 
 @dataclass(frozen=True)
 class LabelledBrain:
-    """A measured brain with the volume in mL of each of its labels, and what these mean."""
+    """A measured brain, the volume in mL of each of its labels, and the label scheme."""
 
     subject: str
     week: float
@@ -136,7 +137,7 @@ class LabelledBrain:
 def volume_tables(
     brains: Sequence[LabelledBrain], norms: Mapping[str, PublishedNorm]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the volumes of all labels of some brains, and where these brains stand among published ones.
+    """Return the volumes of all labels of brains, and their scores against published norms.
 
     Columns subject, run ("real"), week, label, tissue, volume_mL; subject and those of `published_scores`.
     """
@@ -144,20 +145,20 @@ def volume_tables(
     for brain in brains:
         columns = brain.subject, MEASURED, brain.week
         rows += [(*columns, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
-        found, others = structure_volumes(brain.volumes, brain.scheme, norms)
-        scored = published_scores(found, brain.week, norms, others, brain.sides)
+        found, substitutes = structure_volumes(brain.volumes, brain.scheme, norms)
+        scored = published_scores(found, brain.week, norms, substitutes, brain.sides)
         scores.append(scored.assign(subject=brain.subject)[["subject", *scored.columns]])
     volumes = pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"])
     return volumes, pd.concat(scores, ignore_index=True)
 
 
 def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Return the metrics of measured brains over weeks, with quantiles where several brains of a week are given.
+    """Return mean, standard deviation and quantiles of the metrics of reference brains at each of their weeks.
 
-    Metrics have the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person, whose scan it
-    is, unless each brain is of another; the reference are the brains that are the norm as measured. Columns hemisphere,
-    metric, unit, week, brains (persons with a scan at most half a week away; several scans of one are their mean),
-    mean, sd (NaN for one), q05, q25, q50, q75, q95 (NaN for fewer than five).
+    `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person (the subject
+    scanned; may be absent if no one was scanned twice). `reference` are ids of brains. Columns of the result:
+    hemisphere, metric, unit, week, brains (number of persons with a scan at most half a week away; several scans of one
+    person are averaged), mean, sd (NaN for one person), q05, q25, q50, q75, q95 (NaN for fewer than five).
     """
     rows = []
     for names, brains in _by_metric(metrics, reference):
@@ -171,18 +172,18 @@ def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFr
 
 
 def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
-    """Return where brains stand among the measured brains of a reference, at their own week.
+    """Return the scores of brains against the reference brains, at each brain's own week.
 
-    A quadratic of the week (a line for three weeks, their mean for fewer) is put through the reference brains by least
-    squares, in which the scans of a subject count as one together. The centile is that of a further brain's value under
-    Student's distribution, which is the wider the fewer subjects there are: t = (x − expected)/(s √(1 + h)), with s the
-    scatter round the curve and h the leverage of the week. All brains of the table are scored; one of the reference is
-    compared with those of other subjects. If the reference's brains are not `individuals`, but averages as those of
-    an atlas, their scatter is not that of individuals: there are values to be expected, and no sd, z and centile.
+    A quadratic in the week (a line for three weeks, the mean for fewer) is fitted to the reference brains by least
+    squares; all scans of a subject together have the weight of one. The centile is that of a new observation under
+    Student's t distribution: t = (x − expected)/(s √(1 + h)), where s is the residual standard deviation and h the
+    leverage of the week. All brains of the table are scored; a brain of the reference is compared with those of other
+    subjects. If the reference brains are not `individuals` but averages, as in an atlas, their scatter is not that of
+    individuals: the expected value is given without sd, z and centile.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
     (0 to 100), brains (subjects of the reference), brains_of_week, flag: "ok"; `SPREAD_UNKNOWN`; "outside the
-    reference's weeks", "too few brains" or "other hemispheres" (than the reference has), then without all of these.
+    reference's weeks", "too few brains" or "other hemispheres" (than the reference), whose scores are NaN.
     """
     by_metric = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
@@ -250,10 +251,10 @@ def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
 
 
 def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
-    """Return the curves that centiles are of, over the reference's weeks; no rows where there are too few brains.
+    """Return the fitted curve of each metric over the reference's weeks; no rows for metrics with too few brains.
 
-    Columns hemisphere, metric, unit, week, expected, low, high: between which 90 % of further brains are expected, by
-    Student's distribution; NaN if the reference's brains are not `individuals`.
+    Columns hemisphere, metric, unit, week, expected, low, high. 90 % of new brains are expected between low and high,
+    by Student's t distribution; both are NaN if the reference brains are not `individuals`.
     """
     columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
     parts = [pd.DataFrame(columns=columns)]
