@@ -43,7 +43,7 @@ def validated_study():
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, input_contents(Path.cwd(), found, record=RUNS)
+        return study, input_contents(Path.cwd(), found, study.checksums, record=RUNS)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)

@@ -68,13 +68,12 @@ rule study_records:
         "../scripts/study_records.py"
 
 
-def figures_on_page(brain=None):
-    """Return the figures of the page of a brain or of the study, with their captions."""
-    shown = [figure for figure in FIGURES if figure.kind.section]
-    alone = [figure for figure in shown if figure.kind.target in ("quality", "brain")]
-    if brain is None:
-        return [figure.described for figure in shown if figure not in alone]
-    return [figure.described for figure in alone if figure.names["brain"] == brain]
+# the figures with their captions, by page: of each brain, and of the study (None)
+ON_PAGE = {brain: [] for brain in (*study.brains, None)}
+for figure in FIGURES:
+    if figure.kind.section:
+        of_brain = figure.kind.target in ("quality", "brain")
+        ON_PAGE[figure.names["brain"] if of_brain else None].append(figure.described)
 
 
 # the surfaces of the 3D view by week: of all runs, and of measured brains of the start's population
@@ -128,8 +127,8 @@ rule html_report:
     conda:
         ENVIRONMENT
     params:
-        figures=figures_on_page(),
-        brain_figures={brain: figures_on_page(brain) for brain in study.brains},
+        figures=ON_PAGE[None],
+        brain_figures={brain: ON_PAGE[brain] for brain in study.brains},
         brains=study.brain_descriptions,
         prediction=study.prediction_facts,
         surfaces=SURFACES,

@@ -1,13 +1,11 @@
 # Downloads missing files of atlases. No rule makes a file that exists, so a user's own copy is never deleted or
 # replaced.
-from gyriflow.study.atlases import retrieval_note, used_atlases
+from gyriflow.study.atlases import retrieval_note
 
-ATLAS_FILES = {
-    str(file.path).removeprefix("/"): file for atlas in used_atlases(CONFIG) for file in atlas.missing
-}
+ATLAS_FILES = {str(file.path).removeprefix("/"): file for atlas in study.used_atlases for file in atlas.missing}
 
 if workflow.is_main_process:
-    for atlas in used_atlases(CONFIG):
+    for atlas in study.used_atlases:
         if atlas.missing:
             print(f"gyriflow: {retrieval_note(atlas)}", file=sys.stderr)
 

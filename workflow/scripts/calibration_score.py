@@ -24,12 +24,12 @@ with step(snakemake.log[0]):
     values = read_table(files.design).set_index("run").loc[run].to_dict()
     causes = [summary["diverged"] for summary in map(read_json, files.summaries) if summary["diverged"]]
     observed = map(read_surface, files.real)
-    # a diverged run has not reached the week
-    simulated = [] if causes else map(surface_at_week, files.regions, files.frames)
-    pairs = [
+    # read by `run_score`, since a diverged run has not reached the week
+    simulated = map(surface_at_week, files.regions, files.frames)
+    pairs = (
         (surface, brain)
-        for surface, count in zip(simulated, params.compared, strict=not causes)
+        for surface, count in zip(simulated, params.compared, strict=True)
         for brain in islice(observed, count)
-    ]
+    )
     score = run_score(pairs, params.weights, causes, radius_mm=params.curvature_radius_mm)
     write_table(snakemake.output[0], pd.DataFrame([{"run": run, "round": params.round, **values, **score}]))

@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
-from ..geometry.triangles import TriangleMesh, area, corners, euler_number, merged, signed_volume, transformed
+from ..geometry.triangles import (
+    TriangleMesh,
+    area,
+    area_cm2,
+    corners,
+    euler_number,
+    merged,
+    signed_volume,
+    transformed,
+    volume_ml,
+)
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -408,8 +418,8 @@ def _pial_surface(
         "pose": pose.plain(),
         "week": week,
         "fissure_x_mm": fissure_x,
-        "area_cm2": {name: area(part) * CM2_PER_MM2 for name, part in parts.items() if part},
-        "volume_mL": signed_volume(whole) * ML_PER_MM3,
+        "area_cm2": {name: area_cm2(part) for name, part in parts.items() if part},
+        "volume_mL": volume_ml(whole),
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),
         "faces": len(whole.faces),

@@ -168,7 +168,7 @@ def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
 
 
 def _check_files(brain: BrainConfig, config: Config) -> Iterator[str]:
-    checksums = known_checksums(config)
+    checksums = known_checksums(used_atlases(config))
     files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
     require_checksums({path: checksums[path] for path in files})
     volume = brain.label_volume

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import KDTree
 
 from ..geometry.diffusion import diffuse
 from ..geometry.matching import match_surface, values_at
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas, vertex_normals
 from ..metrics.norms import measured_scores
 from ..metrics.regions import region_metrics
+from ..metrics.thickness import at_part
 from ..settings.terms import MEASURED
 
 SMOOTHING_MM = 3.0
@@ -98,9 +98,10 @@ def deviation_table(
         The labels, hemisphere, region ("" for all of it), metric (the map, without its unit), value, unit.
     """
     parts = {"whole": surface, **sides}
-    places = {part: KDTree(surface.vertices).query(mesh.vertices)[1] for part, mesh in parts.items()}
-    part_maps = {part: {name: values[place] for name, values in maps.items()} for part, place in places.items()}
-    everywhere = {part: np.ones(len(place), dtype=np.int64) for part, place in places.items()}
+    part_maps = {
+        part: {name: at_part(values, surface, mesh) for name, values in maps.items()} for part, mesh in parts.items()
+    }
+    everywhere = {part: np.ones(len(mesh.vertices), dtype=np.int64) for part, mesh in parts.items()}
     tables = [region_metrics(parts, part_maps, everywhere, {1: ""})]
     tables += [
         region_metrics({side: sides[side]}, part_maps, {side: vertex_labels}, names)

@@ -129,7 +129,8 @@ class SelfContact:
         """Return new part numbers (n,) of the mesh's vertices: parts in contact at the start of the step become one."""
         if part.max() == 0:
             return part
-        near = self._search.near(self._rest)
+        # the first residual of the step needs them again
+        near = self._near = self._search.near(self._rest)
         corners = [near.pairs[i].vertex_ids(near.mesh.edges, near.mesh.faces) for i in range(len(near.pairs))]
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]

@@ -29,8 +29,8 @@ class LinearElements:
         code = energy_code(material) + Path(__file__).with_suffix(".c").read_text()
         self._interface, self._code = compiled(domain.comm, DECLARATION, code)
         self._places: NDArray[np.int32] | None = None
-        self.mu: Floats = np.ones(len(domain.cells))
-        self.G_inverse: Floats = np.tile(np.eye(3), (len(domain.cells), 1, 1))
+        self.mu: Floats
+        self.G_inverse: Floats
 
     def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
         """Return the energy in J at displacements u (k, 3) in m; add to the given forces in N and matrix in N/m.

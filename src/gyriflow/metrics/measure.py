@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import crossing_faces
-from ..geometry.triangles import Floats, TriangleMesh, area, convex_hull, mean_edge_length, signed_volume, vertex_areas
+from ..geometry.triangles import (
+    Floats,
+    TriangleMesh,
+    area,
+    area_cm2,
+    convex_hull,
+    mean_edge_length,
+    signed_volume,
+    vertex_areas,
+    volume_ml,
+)
 from ..quantities import METRICS, WHITE_METRICS
 from ..settings.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -118,8 +128,8 @@ def measure_hemisphere(
 def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
     """Return volume and area of a hemisphere or of the whole, and the number of faces that cut others."""
     return {
-        "volume": signed_volume(cap(mesh)) * ML_PER_MM3,
-        "area": area(mesh) * CM2_PER_MM2,
+        "volume": volume_ml(cap(mesh)),
+        "area": area_cm2(mesh),
         "crossing_faces": float(crossing),
     }
 

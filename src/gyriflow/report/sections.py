@@ -9,8 +9,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..geometry.alignment import fit_onto
-from ..geometry.triangles import TriangleMesh, transformed
+from ..geometry.alignment import align
+from ..geometry.triangles import TriangleMesh
 from ..settings.terms import OBSERVED_BRAIN
 from .labels import week_label
 from .style import (
@@ -60,7 +60,7 @@ def outlines_chart(
     """
     weeks, colours = sorted(observed)[-MAX_WEEKS:], run_colours(runs)
     runs = {
-        run: {week: transformed(mesh, fit_onto(mesh, observed[week])) for week, mesh in brains.items() if week in weeks}
+        run: {week: align(mesh, observed[week]) for week, mesh in brains.items() if week in weeks}
         for run, brains in runs.items()
     }
     drawn = [brains[week] for brains in (observed, *runs.values()) for week in weeks if week in brains]

@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
@@ -12,7 +12,6 @@ from typing import Any
 from ..errors import InputError
 from ..io.files import contents, read_json, write_json
 from ..settings.root import Config
-from ..study.atlases import known_checksums
 from ..version import commit, version
 
 PACKAGES = (
@@ -71,10 +70,12 @@ def texts_in(value: Any) -> list[str]:
     return [value] if isinstance(value, str) else [text for item in items for text in texts_in(item)]
 
 
-def input_contents(directory: Path, config: Config, record: bool) -> dict[str, str]:
+def input_contents(
+    directory: Path, config: Config, checksums: Mapping[str, tuple[str, str]], record: bool
+) -> dict[str, str]:
     """Return the SHA-256 of each input file of a study, by path.
 
-    For a file of an atlas that is not downloaded yet, it is the atlas' own record. With `record`, hashes are stored in
+    For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
     the results with sizes and times, so that unchanged files are not read again.
     """
     path = directory / "results" / "study" / "inputs.json"
@@ -84,5 +85,5 @@ def input_contents(directory: Path, config: Config, record: bool) -> dict[str, s
     files = contents(dict.fromkeys(texts_in(config.model_dump())), recorded)
     if record and files != recorded:
         write_json(path, files)
-    expected = {name: sha256 for name, (_, sha256) in known_checksums(config).items()}
+    expected = {name: sha256 for name, (_, sha256) in checksums.items()}
     return expected | {name: state[0] for name, state in files.items()}

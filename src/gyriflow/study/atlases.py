@@ -176,11 +176,11 @@ def used_atlases(config: Config) -> list[UsedAtlas]:
     return [UsedAtlas(section, Atlas(**read_keys(section.description))) for section in config.atlas]
 
 
-def known_checksums(config: Config) -> dict[str, tuple[str, str]]:
+def known_checksums(atlases: Iterable[UsedAtlas]) -> dict[str, tuple[str, str]]:
     """Return the atlas and the SHA-256 of each atlas file whose checksum is known, by the file's path."""
     return {
         str(file.path): (used.atlas.name, file.record.sha256)
-        for used in used_atlases(config)
+        for used in atlases
         for file in used.files
         if file.record.sha256 is not None
     }

@@ -3,16 +3,25 @@
 from collections.abc import Iterator
 from typing import Any
 
-from .paths import CALIBRATION, DEVIATION, PUBLISHED, RUN, STUDY
+from .paths import CALIBRATION, DEVIATION, PUBLISHED, STUDY, SWEEP, file_of
 from .records import Brain, Measurement, Simulation, Sweep
-from .registry import AROUND, Figure, Kind, halves_of, observed_by_week, observed_name, surfaces_by_week
+from .registry import (
+    AROUND,
+    RUN_FIGURES,
+    STUDY_FIGURES,
+    Arguments,
+    Figure,
+    Kind,
+    halves_of,
+    observed_by_week,
+    observed_name,
+    surfaces_by_week,
+)
 from .study import Study
 
-RUN_FIGURES, STUDY_FIGURES, SWEEP_FIGURES = f"{RUN}/figures", f"{STUDY}/figures", f"{STUDY}/{{study}}/figures"
+SWEEP_FIGURES = f"{SWEEP}/figures"
 MAX_DEVIATIONS = 4
 """Weeks for which the deviation from the expected brain is shown."""
-
-Arguments = dict[str, Any]
 
 
 def comparison_figures(study: Study) -> Iterator[Figure]:
@@ -268,5 +277,5 @@ def nearest_figure(kind: Kind, sweep: Sweep, **inputs: str) -> Figure:
     start, (varied,) = _start(sweep), sweep.members[0][1]
     observed = [brain.id for brain in sweep.observed[start.id][:1]]
     options = {"varied": varied, "subject": start.id, "observed": observed, "week": sweep.week}
-    inputs["comparison"] = f"{STUDY}/{sweep.name}/comparison.csv"
+    inputs["comparison"] = file_of(f"{SWEEP}/comparison.csv", study=sweep.name)
     return Figure(kind, inputs, options, _sweep_names(sweep))

@@ -5,10 +5,13 @@ from typing import Any
 
 from ..settings.terms import MAX_COLOURS, run_names
 from .comparison_figures import comparison_figures
-from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, RUN, STUDY
+from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY
 from .records import Brain, Simulation
 from .registry import (
+    RUN_FIGURES,
+    STUDY_FIGURES,
     THREE_SIDES,
+    Arguments,
     Figure,
     Kind,
     halves_of,
@@ -19,12 +22,10 @@ from .registry import (
 )
 from .study import Study
 
-BRAIN_FIGURES, RUN_FIGURES, STUDY_FIGURES = f"{BRAIN}/figures", f"{RUN}/figures", f"{STUDY}/figures"
+BRAIN_FIGURES = f"{BRAIN}/figures"
 ZONES = {"contact", "no_growth", "support"}
 """Settings that determine the zones of a run. Runs with equal ones share a figure of the zones."""
 MIN_NORM_SUBJECTS, MAX_SERIES = 5, 4
-
-Arguments = dict[str, Any]
 
 
 def figures_of(study: Study) -> list[Figure]:

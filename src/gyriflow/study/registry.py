@@ -5,8 +5,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..settings.terms import OBSERVED_BRAIN
+from .paths import RUN, STUDY
 from .records import Brain, Measurement, Simulation
 
+Arguments = dict[str, Any]
+"""Inputs or options of a drawing function, by parameter."""
+RUN_FIGURES, STUDY_FIGURES = f"{RUN}/figures", f"{STUDY}/figures"
 AROUND = ["left", "right", "top", "bottom"]
 THREE_SIDES = ["left", "top", "bottom"]
 

@@ -15,7 +15,7 @@ from ..settings.root import Config
 from ..settings.runs import ComparisonSettings, Run, changed, starts_of, variants
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
-from .atlases import known_checksums
+from .atlases import known_checksums, used_atlases
 from .paths import CURVES
 from .records import Brain, CalibrationRuns, Chain, Origin, Simulation, Sweep
 from .series import Series, series_of, several_subjects
@@ -30,9 +30,11 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
     No other brain replaces a refused start brain. A start brain whose growth needs refused brains is not folded either
     (see `Study.unreachable`). InputError if a run lacks brains to grow towards and none is refused.
     """
-    checksums = known_checksums(config)
+    # their descriptions and folders are read once
+    atlases = used_atlases(config)
+    checksums = known_checksums(atlases)
     brains = {brain.id: _brain(brain, config, refused, checksums) for brain in config.brains if brain.id not in refused}
-    accepted, series = list(brains.values()), series_of(config, brains)
+    accepted, series = list(brains.values()), series_of(config, brains, atlases)
     plan, members = _plan(config, brains, series)
     chains = _chains(plan, series, accepted)
     unreachable = _unreachable(plan, series, chains)
@@ -51,6 +53,8 @@ def resolve(config: Config, refused: Collection[str] = ()) -> Study:
         calibration = CalibrationRuns(base, settings.runs, observed) if base else None
     return Study(
         config=config,
+        used_atlases=atlases,
+        checksums=checksums,
         brains=brains,
         series=series,
         simulations=simulations,
@@ -142,7 +146,7 @@ def _plan(
         for start in starts[name]:
             settings = _up_to_last_scan(run, start, series)
             plan.append(_Planned(name, start, settings, _weeks(settings, start, further.get(start, []))))
-    members = _members(config, plan)
+    members = _members(config, plan) if config.studies else {}
     varied: dict[str, tuple[Run, list[Brain], set[float]]] = {}
     for name, study in config.studies.items():
         for member in members[name]:

@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.runs import growth_series
-from .atlases import used_atlases
+from .atlases import UsedAtlas
 from .paths import MATCHED, REGISTERED
 from .records import Brain
 
@@ -84,19 +84,14 @@ def several_subjects(brains: Iterable[Brain]) -> bool:
     return len({brain.config.subject for brain in brains}) > 1
 
 
-def series_of(config: Config, brains: Mapping[str, Brain]) -> Series:
+def series_of(config: Config, brains: Mapping[str, Brain], atlases: Iterable[UsedAtlas]) -> Series:
     """Return the growth series of a configuration, limited to the given brains.
 
     Surfaces are read to find out whether their vertices are matched. For atlas files that have yet to be downloaded,
     the description of the atlas says so.
     """
     names = growth_series([brain.config for brain in brains.values()], config.growth.brains)
-    assumed = {
-        str(file.path)
-        for used in used_atlases(config)
-        for file in used.missing
-        if used.atlas.series[file.series].matched
-    }
+    assumed = {str(file.path) for used in atlases for file in used.missing if used.atlas.series[file.series].matched}
     matched, unmatched = {}, {}
     for name, ids in names.items():
         members = sorted((brains[brain].config for brain in ids), key=lambda brain: brain.week)

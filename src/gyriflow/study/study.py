@@ -1,6 +1,6 @@
 """A resolved study: its records, and selections of them for rules, tables and the report."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -12,7 +12,7 @@ from ..settings.atlas import Atlas
 from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
-from .atlases import used_atlases
+from .atlases import UsedAtlas
 from .records import Brain, CalibrationRuns, Chain, Measurement, Origin, Simulation, Sweep
 from .series import Series, several_subjects
 
@@ -21,12 +21,14 @@ from .series import Series, several_subjects
 class Study:
     """Everything a configuration asks for. Refused brains are in `config`, not in `brains`.
 
-    `simulations` are those of runs, sweeps and calibration, by run and start brain. `chains` are the brains on which
-    growth for a start brain is measured, by its id and the origin of growth. `unreachable` has the reasons why start
-    brains are not folded.
+    `checksums` are those of atlas files (see `known_checksums`). `simulations` are those of runs, sweeps and
+    calibration, by run and start brain. `chains` are the brains on which growth for a start brain is measured, by its
+    id and the origin of growth. `unreachable` has the reasons why start brains are not folded.
     """
 
     config: Config
+    used_atlases: Sequence[UsedAtlas]
+    checksums: Mapping[str, tuple[str, str]]
     brains: Mapping[str, Brain]
     series: Series
     simulations: Mapping[tuple[str, str], Simulation]
@@ -190,9 +192,7 @@ class Study:
     def atlases(self) -> dict[str, Atlas]:
         """The atlas of each brain of an atlas, by the id of the brain."""
         return {
-            used.atlas.brain_id(file.series, file.week): used.atlas
-            for used in used_atlases(self.config)
-            for file in used.files
+            used.atlas.brain_id(file.series, file.week): used.atlas for used in self.used_atlases for file in used.files
         }
 
     def are_individuals(self, ids: Iterable[str]) -> bool:
@@ -250,7 +250,7 @@ class Study:
         template = self.brains.get(self.config.metrics.template or "")
         return [side for side in row.sides if template is not None and side in template.sides]
 
-    @property
+    @cached_property
     def exported(self) -> list[dict[str, Any]]:
         """Names and files, by side, of each observed or simulated brain for the export."""
         return [self._exported(row, self.brains[row.subject]) for row in self.measurements.values()]
@@ -267,8 +267,8 @@ class Study:
             "run": row.run,
             "week": row.week,
             "subject": brain.subject,
-            "surfaces": {side: row.parts[side] for side in row.sides},
-            "maps": {side: f"{row.folder}/{side}.shape.gii" for side in row.sides},
+            "surfaces": dict(zip(row.sides, row.hemispheres, strict=True)),
+            "maps": dict(zip(row.sides, row.maps, strict=True)),
             "regions": dict(zip(SIDES, row.regions.values(), strict=False)),
             "report": brain.report,
             "covariates": brain.config.covariates,

@@ -135,7 +135,7 @@ def test_a_file_is_known_by_the_part_of_its_path_with_the_week(tmp_path):
     file = f"{tmp_path}/mine/x/HarvardSTA22_Study1/parcellation.nii.gz"
     assert [brain.labels for brain in config.brains][1] == file
     # which is looked at by the stage that reads it
-    found = {file: known_checksums(config)[file]}
+    found = {file: known_checksums(used_atlases(config))[file]}
     assert found == {file: ("crl", known[22]["labels"]["sha256"])}
     with pytest.raises(InputError, check=Facts(f"{file}:", "crl", known[22]["labels"]["sha256"])):
         require_checksums(found)
