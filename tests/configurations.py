@@ -5,6 +5,7 @@ import yaml
 from facts import Facts
 
 from gyriflow.errors import InputError
+from gyriflow.study import resolve
 from gyriflow.study.loading import load
 from gyriflow.study.study import Study
 
@@ -20,6 +21,15 @@ def labelled(*weeks, names="abcdefgh"):
 def study(brains=None, **changes):
     """Return a valid configuration, of two brains if no brains are given, with changes on its top level."""
     return {"brains": brains or labelled(21, 22.5), "start": "a", "folding": {"end_week": 24}} | changes
+
+
+def resolved(brains=None, refused=(), **changes):
+    """Return the study of such a configuration, without some refused brains."""
+    return resolve(load(study(brains, **changes)), refused)
+
+
+def ids(brains):
+    return [brain.id for brain in brains]
 
 
 def touched(folder, *names):
@@ -74,7 +84,7 @@ def keys(raw, folder="."):
 
 def series_of(study: Study) -> dict[str, list[str]]:
     """Return the ids of the brains of each growth series."""
-    return {name: [brain.id for brain in brains] for name, brains in study.series.brains.items()}
+    return {name: ids(brains) for name, brains in study.series.brains.items()}
 
 
 def series_for(study: Study, brain: str) -> str | None:

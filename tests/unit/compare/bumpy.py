@@ -31,3 +31,7 @@ def shaped(mesh: TriangleMesh, pattern: Floats | None = None) -> PreparedSurface
         bend = curvature(mesh, radius_mm=3.0)
         return PreparedSurface(mesh, bend.mean, bend.shape_index)
     return PreparedSurface(mesh, 0.1 * pattern, np.tanh(pattern))
+
+
+REAL, SMOOTH = bumpy(1), bumpy(1, height=0.0)
+PREPARED = shaped(REAL)

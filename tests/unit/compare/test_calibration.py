@@ -18,7 +18,7 @@ from gyriflow.compare.calibration import (
 )
 from gyriflow.geometry.triangles import TriangleMesh
 
-from .bumpy import RADIUS, bumpy, shaped
+from .bumpy import PREPARED, RADIUS, REAL, bumpy, shaped
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
@@ -88,13 +88,13 @@ def test_values_take_their_places_in_the_parameters():
 
 
 def test_the_same_brain_has_the_score_0():
-    shape = shaped(bumpy(1))
+    shape = PREPARED
     assert shape_scores(shape, shape) == pytest.approx(dict.fromkeys(SCORES, 0.0), abs=1e-9)
     assert size_score(shape.mesh, shape.mesh) == 0
 
 
 def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution():
-    one, same, other = shaped(bumpy(1)), shaped(bumpy(1, height=1.05)), shaped(bumpy(2))
+    one, same, other = PREPARED, shaped(bumpy(1, height=1.05)), shaped(bumpy(2))
     near, far = shape_scores(same, one), shape_scores(other, one)
     assert near["shape_index"] < 0.1 < far["shape_index"]
     assert near["mean_curvature"] < 0.1 < far["mean_curvature"]
@@ -103,31 +103,28 @@ def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution(
 
 
 def test_a_brain_scaled_by_a_tenth_differs_in_area_and_volume():
-    mesh = bumpy(1)
-    larger = TriangleMesh(1.1 * mesh.vertices, mesh.faces)
-    assert size_score(larger, mesh) == pytest.approx(np.hypot(1.1**2 - 1, 1.1**3 - 1))
+    larger = TriangleMesh(1.1 * REAL.vertices, REAL.faces)
+    assert size_score(larger, REAL) == pytest.approx(np.hypot(1.1**2 - 1, 1.1**3 - 1))
 
 
 def test_a_brain_has_the_scores_that_are_asked_for():
-    mesh = bumpy(1)
-    larger = TriangleMesh(1.05 * mesh.vertices, mesh.faces)
-    assert brain_scores(larger, mesh, ["size"], radius_mm=3.0) == {"size": size_score(larger, mesh)}
-    found = brain_scores(larger, mesh, ["surface_distance", "shape_index", "curvature_distribution"], radius_mm=3.0)
+    larger = TriangleMesh(1.05 * REAL.vertices, REAL.faces)
+    assert brain_scores(larger, REAL, ["size"], radius_mm=3.0) == {"size": size_score(larger, REAL)}
+    found = brain_scores(larger, REAL, ["surface_distance", "shape_index", "curvature_distribution"], radius_mm=3.0)
     assert list(found) == ["surface_distance", "shape_index", "curvature_distribution"]
     assert found["surface_distance"] == pytest.approx(0.05 * RADIUS, rel=0.05)
     # folds are compared after scaling
     assert found["shape_index"] == pytest.approx(0, abs=0.05)
     assert found["curvature_distribution"] == pytest.approx(0, abs=0.002)
-    other = brain_scores(bumpy(2), mesh, ["shape_index"], radius_mm=3.0)
+    other = brain_scores(bumpy(2), REAL, ["shape_index"], radius_mm=3.0)
     assert other["shape_index"] > 0.5
 
 
 def test_a_run_has_the_weighted_sum_of_the_means_over_its_pairs():
-    mesh = bumpy(1)
-    first, second = (TriangleMesh(factor * mesh.vertices, mesh.faces) for factor in (1.05, 1.15))
+    first, second = (TriangleMesh(factor * REAL.vertices, REAL.faces) for factor in (1.05, 1.15))
     weights = {"size": 2.0, "surface_distance": 0.5}
-    found = run_score([(first, mesh), (second, mesh)], weights, [], radius_mm=3.0)
-    size = (size_score(first, mesh) + size_score(second, mesh)) / 2
+    found = run_score([(first, REAL), (second, REAL)], weights, [], radius_mm=3.0)
+    size = (size_score(first, REAL) + size_score(second, REAL)) / 2
     assert found["size"] == pytest.approx(size)
     assert found["surface_distance"] == pytest.approx(0.1 * RADIUS, rel=0.05)
     assert found["score"] == pytest.approx(2 * size + 0.5 * found["surface_distance"])
@@ -135,7 +132,6 @@ def test_a_run_has_the_weighted_sum_of_the_means_over_its_pairs():
 
 
 def test_a_run_that_has_diverged_has_no_score_whatever_its_other_brains_are():
-    mesh = bumpy(1)
-    found = run_score([(mesh, mesh)], {"size": 1.0}, ["det F", "no step"], radius_mm=3.0)
+    found = run_score([(REAL, REAL)], {"size": 1.0}, ["det F", "no step"], radius_mm=3.0)
     assert np.isnan([found["score"], found["size"]]).all()
     assert (found["outcome"], found["cause"]) == ("diverged", "det F; no step")

@@ -8,11 +8,7 @@ from gyriflow.compare.placement import correlation, gain_interval, make_patches,
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
 
-from .bumpy import RADIUS, bumpy, field, shaped
-
-REAL = bumpy(1)
-TRUTH = shaped(REAL)
-SMOOTH = bumpy(1, height=0.0)
+from .bumpy import PREPARED, RADIUS, REAL, SMOOTH, bumpy, field, shaped
 
 
 def noise(seed: int) -> np.ndarray:
@@ -36,18 +32,18 @@ def test_skill_is_between_the_start_and_the_adjacent_week():
 def test_a_brain_moved_and_scaled_back_has_its_folds_in_place():
     scaled = transformed(REAL, rigid(0, 0, 12, shift=(5, -3, 2)) @ np.diag([0.7, 0.7, 0.7, 1.0]))
     aligned = prepare_for_comparison(scaled, REAL)
-    row = score_placement(aligned, TRUTH, shaped(SMOOTH, noise(1)), TRUTH, horizon=3)
+    row = score_placement(aligned, PREPARED, shaped(SMOOTH, noise(1)), PREPARED, horizon=3)
     assert row["r_mean_curvature"] > 0.95
     assert row["r_start_mean_curvature"] == pytest.approx(0, abs=0.06)
     assert row["matched_share"] == pytest.approx(1.0)
-    rotated = score_placement(shaped(transformed(REAL, rigid(0, 0, 90))), TRUTH, TRUTH, TRUTH, horizon=3)
+    rotated = score_placement(shaped(transformed(REAL, rigid(0, 0, 90))), PREPARED, PREPARED, PREPARED, horizon=3)
     assert abs(rotated["r_mean_curvature"]) < 0.25
 
 
 def test_noise_lowers_the_correlation_by_its_variance():
-    pattern = TRUTH.mean_curvature
+    pattern = PREPARED.mean_curvature
     added = pattern + pattern.std() * noise(4)
-    row = score_placement(PreparedSurface(REAL, added, added), TRUTH, shaped(SMOOTH, noise(2)), TRUTH, horizon=3)
+    row = score_placement(PreparedSurface(REAL, added, added), PREPARED, shaped(SMOOTH, noise(2)), PREPARED, horizon=3)
     assert row["r_mean_curvature"] == pytest.approx(1 / np.sqrt(2), abs=0.06)
     assert row["skill_mean_curvature"] == pytest.approx(row["r_mean_curvature"], abs=0.08)
     assert row["gain_low_mean_curvature"] < row["gain_mean_curvature"] < row["gain_high_mean_curvature"]
@@ -76,7 +72,7 @@ def two_sided(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def test_mirror_patches_are_drawn_together_where_the_brain_is_its_mirror_image():
-    brain = two_sided(bumpy(1))
+    brain = two_sided(REAL)
     half = len(REAL.vertices)
     # in any pose
     posed = transformed(brain, rigid(0, 0, 8, shift=(5, -3, 2)))

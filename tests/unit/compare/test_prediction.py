@@ -10,7 +10,7 @@ from gyriflow.compare.prediction import add_skill, prediction_row, prediction_ta
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, transformed
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 
-from .bumpy import RADIUS, bumpy, shaped
+from .bumpy import RADIUS, REAL, bumpy, shaped
 
 
 def test_jagged_vertices_are_rough_and_even_ones_are_not():
@@ -66,7 +66,7 @@ def test_skill_is_against_the_best_baseline_of_the_week():
 
 
 def test_simple_predictions_have_the_volume_of_the_target_or_are_taken_as_they_are():
-    start, target = sphere(10.0), bumpy(1)
+    start, target = sphere(10.0), REAL
     registered = {"atlas": sphere(12.0), "displaced": sphere(13.0)}
     models = simple_predictions(start, target, registered, None)
     assert list(models) == ["scaled", "atlas", "displaced", "target"]
@@ -82,7 +82,7 @@ def test_simple_predictions_have_the_volume_of_the_target_or_are_taken_as_they_a
 
 
 def test_each_week_and_model_is_compared_with_the_observed_brain_of_its_week():
-    first, second = bumpy(1), bumpy(2)
+    first, second = REAL, bumpy(2)
     larger = TriangleMesh(1.05 * second.vertices, second.faces)
     models = {22.0: {"run": first}, 24.0: {"run": second, "scaled": larger, "target": second}}
     observed = {22.0: first, 24.0: second}

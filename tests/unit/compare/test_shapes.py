@@ -10,10 +10,8 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
 
-from .bumpy import RADIUS, bumpy
+from .bumpy import RADIUS, REAL, SMOOTH, bumpy
 
-REAL = bumpy(1)
-SMOOTH = bumpy(1, height=0.0)
 SHARP = bumpy(1, height=2.0, sharpness=60.0)
 
 

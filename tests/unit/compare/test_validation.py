@@ -7,10 +7,8 @@ from shapes import rigid
 from gyriflow.compare.validation import ObservedWeek, validation_table
 from gyriflow.geometry.triangles import area, signed_volume, transformed
 
-from .bumpy import RADIUS, bumpy, shaped
+from .bumpy import PREPARED, RADIUS, REAL, bumpy, shaped
 
-REAL = bumpy(1)
-PREPARED = shaped(REAL)
 LABELS = {"run": "measured", "kind": "predicted", "start": "a", "start_week": 21.0}
 OBSERVED = ObservedWeek("b", REAL, PREPARED, start=shaped(bumpy(2)), adjacent=shaped(bumpy(1, height=0.8)))
 SIZES = {"area_cm2": area(REAL) / 100, "volume_ml": signed_volume(REAL) / 1000}

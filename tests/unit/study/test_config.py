@@ -7,7 +7,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from configurations import keys, labelled, problems, refusal, study
+from configurations import keys, labelled, problems, refusal, resolved, study
 from facts import Facts
 
 from gyriflow.io.yaml_files import read_yaml
@@ -86,11 +86,11 @@ def test_a_mistake_in_a_run_names_the_run_and_one_in_folding_is_said_once():
 
 def test_a_run_folds_the_brains_that_it_names():
     runs = {"one": {"start": "b"}, "some": {"start": ["b", "a"]}, "every": {"start": "all"}, "default": None}
-    found = resolve(load(study(runs=runs)))
+    found = resolved(runs=runs)
     pairs = [("one", "b"), ("some", "a"), ("some", "b"), ("every", "a"), ("every", "b"), ("default", "a")]
     assert found.pairs == pairs
     assert found.simulations["some", "b"].weeks == (22.5, 23.5, 24)
-    assert resolve(load(study(start="all"))).pairs == [("reference", "a"), ("reference", "b")]
+    assert resolved(start="all").pairs == [("reference", "a"), ("reference", "b")]
     without = study(runs={"one": {"start": "b"}})
     del without["start"]
     assert resolve(load(without)).pairs == [("one", "b")]
@@ -128,7 +128,7 @@ def test_output_weeks_hold_the_start_and_the_end(end, every, weeks):
 
 
 def test_parameters_of_a_run_are_what_the_folding_program_reads():
-    (one,) = resolve(load(study(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}))).run_simulations
+    (one,) = resolved(folding={"end_week": 24, "stress_memory_gw": "infinite", "ranks": 7}).run_simulations
     known = {"start_week": one.weeks[0], "output_weeks": one.weeks, "fissure_x_mm": 0.0}
     read = parameters_from(known | one.parameters)
     assert read.stress_memory_gw == math.inf

@@ -1,7 +1,7 @@
 """Which brains growth is measured on, whose surfaces match by their vertices, and which are references of norms."""
 
 import pytest
-from configurations import LABELLED, both_kinds, labelled, series_for, series_of, study, touched
+from configurations import LABELLED, both_kinds, labelled, resolved, series_for, series_of, study, touched
 from facts import Facts
 from shapes import sphere
 
@@ -86,7 +86,7 @@ def test_an_atlas_is_believed_until_its_files_are_there(folder):
     [({}, ["a", "b", "c"]), ({"brains": ["c", "a"]}, ["a", "c"]), ({"brains": None}, ["a", "b", "c"])],
 )
 def test_growth_is_of_all_brains_or_those_named(growth, brains):
-    assert series_of(resolve(load(study(labelled(21, 22, 22), growth=growth)))) == {"volume": brains}
+    assert series_of(resolved(labelled(21, 22, 22), growth=growth)) == {"volume": brains}
 
 
 def test_surfaces_and_volumes_are_two_series_and_the_start_says_which_is_followed(tmp_path):

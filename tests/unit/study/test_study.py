@@ -4,6 +4,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from configurations import ids, resolved
 from facts import Facts
 
 from gyriflow.errors import InputError
@@ -18,10 +19,6 @@ CURVE = {21: 99, 24: 150}
 SIZES = {"model": "sizes", "area_cm2": CURVE, "volume_ml": CURVE}
 SPHERE = {"shape": {}}
 EXPECTED = {"runs": {"a": {"preset": "expected"}}}
-
-
-def ids(brains):
-    return [brain.id for brain in brains]
 
 
 def surface(brain):
@@ -60,8 +57,7 @@ def of_two(labels):
 
 
 def study(brains, refused=(), **sections):
-    raw = {"brains": brains, "start": "first", "folding": {"end_week": 24}, **sections}
-    return resolve(load(raw), refused)
+    return resolved(brains, refused, **{"start": "first", **sections})
 
 
 def refusal(brains, **sections):

@@ -1,16 +1,10 @@
 """Choice of brains in studies of three or more; the order in the configuration decides nothing by chance."""
 
 import pytest
-from configurations import LABELLED, labelled, study
+from configurations import LABELLED, ids, labelled, resolved
 
 from gyriflow.errors import InputError
-from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
-from gyriflow.study.loading import load
-
-
-def resolved(brains, refused=(), **changes):
-    return resolve(load(study(brains, **changes)), refused)
 
 
 def brain(name, week, side=None, **more):
@@ -21,10 +15,6 @@ def brain(name, week, side=None, **more):
 
 def sphere(name, week):
     return {"id": name, "week": week, "shape": {}}
-
-
-def ids(brains):
-    return [found.id for found in brains]
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
