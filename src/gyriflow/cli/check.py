@@ -159,16 +159,16 @@ def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
 
     Unreadable files and labels of another scheme are problems; an unusual size for the week is a warning.
     """
+    checksums = known_checksums(used_atlases(config))
     for brain in config.brains:
         try:
-            for doubt in _check_files(brain, config):
+            for doubt in _check_files(brain, config, checksums):
                 yield f"warning: brain {brain.id}: {doubt}", False
         except GyriflowError as error:
             yield f"brain {brain.id}: {error}", True
 
 
-def _check_files(brain: BrainConfig, config: Config) -> Iterator[str]:
-    checksums = known_checksums(used_atlases(config))
+def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[str, str]]) -> Iterator[str]:
     files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
     require_checksums({path: checksums[path] for path in files})
     volume = brain.label_volume

@@ -3,8 +3,9 @@
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from itertools import count
 from typing import Any
 
@@ -126,6 +127,10 @@ class Origin:
     methods: str
     configuration: str
 
+    @cached_property
+    def methods_html(self) -> Markup:
+        return caption_html(self.methods)
+
 
 def study_page(
     brains: Sequence[Mapping[str, Any]],
@@ -159,7 +164,7 @@ def study_page(
         title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
         numbers, accuracy = predicted_table(tables.metrics, prediction), accuracy_table(prediction["accuracy"])
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
-    return _shared(brains, tables, origin, figures, norm, pictures) | {
+    return _shared(brains, tables, tables.warnings, origin, figures, norm, pictures) | {
         "title": title,
         "verdict": sentence,
         "prediction": prediction,
@@ -176,7 +181,7 @@ def brain_page(
     """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
     own = tables.metrics["subject"] == brain["id"]
     warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
-    return _shared([brain], replace(tables, warnings=warnings), origin, figures, norm, {}) | {
+    return _shared([brain], tables, warnings, origin, figures, norm, {}) | {
         "title": f"Measured cortical folding, {brain['id']}",
         "verdict": "",
         "prediction": None,
@@ -190,6 +195,7 @@ def brain_page(
 def _shared(
     brains: Sequence[Mapping[str, Any]],
     tables: Tables,
+    warnings: pd.DataFrame,
     origin: Origin,
     figures: Sequence[Mapping[str, Any]],
     norm: str,
@@ -208,11 +214,11 @@ def _shared(
         "given": brains,
         "brains": html_table(brains_table(brains, tables.quality, tables.metrics, centiles, pictures)),
         "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
-        "warnings": "" if tables.warnings.empty else html_table(group_warnings(tables.warnings)),
+        "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
         "provenance": provenance_line(provenance),
-        "methods": caption_html(origin.methods),
+        "methods": origin.methods_html,
         "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
         "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
         "configuration": origin.configuration,

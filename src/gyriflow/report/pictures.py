@@ -104,7 +104,7 @@ def runs_by_week(
     Parameters
     ----------
     runs : {run: {week: surface in RAS+ mm}}
-    real : {week, or another heading: surface in RAS+ mm}
+    observed : {week, or another heading: surface in RAS+ mm}
         A missing week leaves its panel empty.
     deviations : {week: (surface, maps)}
         The map `distance_mm` is shown below.
@@ -320,7 +320,7 @@ def influence_picture(
     ----------
     members : {run: hemispheres with their maps}
         In the order of the sweep; None for a run that ended before the week.
-    real
+    observed
         The hemispheres of the observed brain of the week with their maps, shown last under `observed_name`.
     values : {run: {parameter: value}}
         The varied parameters, for the headings.

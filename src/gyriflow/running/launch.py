@@ -38,6 +38,8 @@ ENVIRONMENT_VARIABLES = {
     "PRTE_MCA_hwloc_default_binding_policy": "none",
 }
 """Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
+MAX_WAIT_S = 3.0
+"""Time to wait for a run that is about to end."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 READ_ONLY_OPTIONS = (
     "dryrun",
@@ -91,13 +93,13 @@ def hold_lock(directory: Path) -> IO[str] | None:
     return file
 
 
-def clear_stale_lock(directory: Path, max_wait_s: float = 3.0) -> None:
+def clear_stale_lock(directory: Path) -> None:
     """Remove Snakemake's locks from a working directory if nothing runs in it.
 
-    Waits at most `max_wait_s` seconds for a run to end. StorageError if it still runs, or if the directory cannot be
+    Waits at most `MAX_WAIT_S` seconds for a run to end. StorageError if it still runs, or if the directory cannot be
     written.
     """
-    deadline = time.monotonic() + max_wait_s
+    deadline = time.monotonic() + MAX_WAIT_S
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
             remedy = "Wait for it to end, or choose another folder with --directory"
