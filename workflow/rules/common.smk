@@ -9,6 +9,7 @@ from gyriflow.study.registry import target_files, by_rule, files_in, halves_of, 
 from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to
+from gyriflow.running.reruns import remove_stale
 from gyriflow.step import record_exit_code
 
 # scripts and programs find the package without an installation, also in conda environments of single rules
@@ -60,6 +61,7 @@ if REFUSED and workflow.is_main_process:
     rest = "finishing the study without" if study.brains else "no brain is left"
     print(f"gyriflow: refused: {', '.join(REFUSED)}; {rest}", file=sys.stderr)
 if REFUSED and not study.brains:
+    remove_stale([], STUDY, REPORT)
     sys.exit(0)
 # Brains of one hemisphere have fewer files, so they have separate rules with the same script: in Snakemake all output
 # files of a rule must have the same wildcards, and files of whole brains have no wildcard for the side.

@@ -19,6 +19,9 @@ MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
 CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
 # limit of the ratio between left and right of cortex over white matter
 MAX_IMBALANCE = 4.0
+# limit of the share of the contacts inside the cerebrum that labels of one side have with those of the other; in the
+# shipped brains, drawn with two sides, at most 0.11; with sides that are none 0.69 or more
+MAX_ACROSS = 0.4
 HOLE = -1
 """Value for unlabelled voxels enclosed by labels, which are neither inside nor outside."""
 
@@ -83,6 +86,9 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
         share = contact_share(tissue, cerebrum & ~cortex)
         if share > MAX_OUTSIDE and layout.count[tissue].sum() > SMALL * size:
             yield f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its neighbours are there"
+    sided, across = layout.contact[np.ix_(left | right, cerebrum)].sum(), layout.contact[np.ix_(left, right)].sum()
+    if 2 * across > MAX_ACROSS * sided:
+        yield f"left and right would be mixed: {2 * across / sided:.0%} of their contacts are with the other side"
     (a, b), (c, d) = ([layout.count[tissue & side].sum() for side in (left, right)] for tissue in (cortex, white))
     # a hemisphere may be small or missing, but with all of its tissues
     is_unequal = (a > 0) != (c > 0) or (b > 0) != (d > 0) or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)

@@ -1,12 +1,16 @@
 """Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and what a file was."""
 
+import gzip
 import hashlib
+import html
 import json
 import math
 import os
+import re
 import shutil
 import uuid
 import warnings
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -17,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, StorageError
+from ..settings.base import absent_content
 
 if TYPE_CHECKING:
     import h5py
@@ -24,16 +29,46 @@ if TYPE_CHECKING:
 
 AnyPath = str | PathLike[str]
 AGAIN = "The file may be truncated or of another kind: copy or export it again."
+PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
+EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
+"""Name of a file beside a GIFTI file that has the values of one of its arrays."""
+
+
+def files_behind(path: AnyPath) -> list[str]:
+    """Return the further files that readers open with a file: the other of a pair, the external data of GIFTI."""
+    name = str(path)
+    if ending := PAIR.search(name):
+        stem = name[: ending.start()]
+        return [f"{stem}{part}{ending[1] or ''}" for part in (".hdr", ".img", ".HDR", ".IMG")]
+    names: set[bytes] = set()
+    if name.lower().endswith((".gii", ".gii.gz")):
+        # damaged files are reported by their readers
+        opener = gzip.open if name.lower().endswith(".gz") else open
+        with suppress(OSError, EOFError, zlib.error), opener(name, "rb") as file:
+            names = set(EXTERNAL.findall(file.read()))
+    return sorted(os.path.join(os.path.dirname(name), html.unescape(other.decode(errors="replace"))) for other in names)
+
+
+def require_content(path: AnyPath) -> None:
+    """Raise InputError if the content of a file of git-annex or Git LFS is not here."""
+    beginning = b""
+    with suppress(OSError), open(path, "rb") as file:
+        beginning = file.read(64)
+    if absent := absent_content(str(path), beginning):
+        raise InputError(absent, path=path)
 
 
 @contextmanager
 def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
     """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
+    require_content(path)
     try:
         yield
-    except InputError:
-        raise
     except Exception as error:  # readers raise whatever a file leads them into
+        for behind in files_behind(path):
+            require_content(behind)
+        if isinstance(error, InputError):
+            raise
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair of files the one that is not there
         path = getattr(error, "filename", None) or path
@@ -186,24 +221,28 @@ def sha256_of(path: AnyPath) -> str:
 
 
 def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return for each file that can be read its SHA-256, size in bytes, and last writing and last change of any kind.
+    """Return the SHA-256, size, and last writing and change of each file that can be read, and the `files_behind` it.
 
-    A file whose size and times (ns, of the epoch) are those in `earlier`, an answer from before, is not read again.
+    The files behind others are among them. A file whose size (bytes) and times (ns, of the epoch) are those in
+    `earlier`, an answer from before, is not read again.
     """
     by_path: dict[str, list[Any]] = {}
-    for path in map(str, files):
+    waiting = list(map(str, files))
+    for path in waiting:
         with suppress(OSError, StorageError):
             state = Path(path).stat()
             # one that takes another's place keeps its date, but has been renamed
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
-            by_path[path] = earlier[path] if earlier.get(path, [])[1:] == current else [sha256_of(path), *current]
+            known = len(found := earlier.get(path, [])) > len(current) + 1 and found[1:-1] == current
+            by_path[path] = found if known else [sha256_of(path), *current, files_behind(path)]
+            waiting += [behind for behind in by_path[path][-1] if behind not in waiting]
     return by_path
 
 
 def fingerprints(files: Iterable[AnyPath]) -> dict[str, dict[str, Any]]:
     """Return for each file that is there its SHA-256, its size in bytes and when it was last written (UTC)."""
     by_path = {}
-    for path, (sha256, size, written_ns, _) in contents(files, {}).items():
+    for path, (sha256, size, written_ns, *_) in contents(files, {}).items():
         written = datetime.fromtimestamp(written_ns // 10**9, UTC).isoformat(timespec="seconds")
         by_path[path] = {"sha256": sha256, "bytes": size, "written": written}
     return by_path
@@ -219,13 +258,17 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice."""
+    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice.
+
+    Links of git-annex are files too if their content is not here.
+    """
     entered: set[str] = set()
     found = []
     for place, folders, names in os.walk(folder, followlinks=True):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
-        found += [here / name for name in names if (here / name).is_file() and real not in entered]
+        paths = [here / name for name in names if real not in entered]
+        found += [path for path in paths if path.is_file() or absent_content(path)]
         entered.add(real)
     return sorted(found)

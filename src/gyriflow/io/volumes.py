@@ -1,14 +1,18 @@
 """Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm."""
 
+import gzip
 import logging
 import math
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import nibabel as nib
 import numpy as np
+from nibabel.fileholders import FileHolder
+from nibabel.openers import ImageOpener
 from nibabel.spatialimages import HeaderDataError, SpatialImage
 from numpy.typing import NDArray
 
@@ -27,6 +31,10 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
+MAX_LABEL_ERROR = 0.05
+"""How far labels stored through a slope or as floats may be from whole numbers."""
+GZIP_SUFFIXES = (".gz", ".mgz")
+PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
 MAX_COMPRESSION = 1100
 """How many times shorter gzip makes a file at most (1032 times), with some room."""
 
@@ -117,7 +125,7 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
     with reading(path, "an image", _expected(content)):
         if nib.is_proxy(image.dataobj):
             _require_its_size(image, path)
-        values = np.asanyarray(image.dataobj)
+        values = _stored_values(image, path)
     values = _three_axes(values, path, content)
     return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
 
@@ -170,12 +178,37 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
     needed = math.prod(map(int, image.shape)) * image.get_data_dtype().itemsize
     # of a pair of files the one with the values, not the header
     data = Path(image.file_map["image"].filename or path)
-    packed = data.name.lower().endswith((".gz", ".mgz", ".bz2"))
+    packed = data.name.lower().endswith(PACKED_SUFFIXES)
     size = data.stat().st_size
     if needed < 0 or needed > size * (MAX_COMPRESSION if packed else 1):
         expected = f"{needed} bytes for {' x '.join(map(str, image.shape))} values of {image.get_data_dtype()}"
         problem = "is shorter than its header specifies"
         raise InputError(problem, path=data, found=f"{size} bytes", expected=expected, remedy=AGAIN)
+
+
+def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
+    """Return the values of an image, with compressed files read to their ends, where their checksums are."""
+    with ExitStack() as opened:
+        streams = {}
+        for part, holder in image.file_map.items():
+            name = str(holder.filename).lower()
+            if name.endswith(PACKED_SUFFIXES):
+                # nibabel's reader of gzip may be one that checks nothing
+                opener = gzip.open if name.endswith(GZIP_SUFFIXES) else ImageOpener
+                streams[part] = opened.enter_context(opener(holder.filename))
+        if streams:
+            holders = {part: FileHolder(fileobj=stream) for part, stream in streams.items()}
+            image = type(image).from_file_map(image.file_map | holders)
+        values = np.asanyarray(image.dataobj)
+        for stream in streams.values():
+            try:
+                while stream.read(2**20):
+                    pass
+            except gzip.BadGzipFile as error:
+                if not str(error).startswith("Not a gzipped file"):
+                    raise
+                log.warning("%s: further data behind the compressed ones were ignored, as gzip does", path)
+    return values
 
 
 def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Floats:
@@ -251,11 +284,18 @@ def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     if values.dtype.kind == "f":
         require_finite(values.ravel(), path, "values", "voxels")
-        broken = np.abs(values - np.rint(values)) > 1e-3
+        errors = np.abs(values - np.rint(values))
+        broken = errors > MAX_LABEL_ERROR
         if broken.any():
-            broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
-            remedy = "gyriflow does not segment images: give a tissue label volume."
-            raise InputError("contains non-integer values", path=path, found=broken_values, remedy=remedy)
+            raise InputError(
+                "contains values that are neither whole numbers nor near them, as interpolation leaves them",
+                path=path,
+                found=f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}",
+                expected=f"tissue labels: whole numbers, to {MAX_LABEL_ERROR:g}",
+                remedy="Resample labels with nearest neighbour; gyriflow does not segment images.",
+            )
+        if (error := errors.max(initial=0)) > 1e-3:
+            log.warning("%s: labels are stored up to %.3g off whole numbers and were rounded", path, error)
         values = np.rint(values)
     least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:

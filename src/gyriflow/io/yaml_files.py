@@ -9,7 +9,7 @@ import yaml
 from ..errors import InputError
 from ..settings.base import validated
 from ..settings.schemes import SCHEME_FILES, LabelScheme, SchemeSettings
-from .files import AnyPath, write_text
+from .files import AnyPath, require_content, write_text
 
 MAX_VALUES = 1_000_000
 """How many values a file may have, so that a few lines of nested aliases don't fill the memory."""
@@ -45,6 +45,7 @@ _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _m
 
 def read_yaml(path: AnyPath) -> Any:
     """Return the content of a YAML (or JSON) file; InputError where it is missing, malformed or names a key twice."""
+    require_content(path)
     try:
         content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_StrictLoader)
         size = _size(content, {})

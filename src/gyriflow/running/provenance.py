@@ -73,7 +73,7 @@ def texts_in(value: Any) -> list[str]:
 def input_contents(
     directory: Path, config: Config, checksums: Mapping[str, tuple[str, str]], record: bool
 ) -> dict[str, str]:
-    """Return the SHA-256 of each input file of a study, by path.
+    """Return the SHA-256 of each input file of a study and of the files behind it, by path.
 
     For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
     the results with sizes and times, so that unchanged files are not read again.
@@ -86,4 +86,8 @@ def input_contents(
     if record and files != recorded:
         write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
-    return expected | {name: state[0] for name, state in files.items()}
+    hashes = {
+        name: " ".join([sha256, *(files[path][0] for path in behind if path in files and path != name)])
+        for name, (sha256, *_, behind) in files.items()
+    }
+    return expected | hashes

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+STALE_SUFFIXES = (".csv", ".html", ".png", ".pdf")
+
 from ..code_hash import code_hash
 
 
@@ -32,6 +34,14 @@ def _contents_of(rule: Any, contents: Mapping[str, str]) -> Any:
         return [f"input with the content {contents[path]}" for path in inputs if path in contents]
 
     return read_by_job
+
+
+def remove_stale(rules: Iterable[Any], *folders: str) -> None:
+    """Remove the tables, figures and pages in folders that no rule makes, such as those of brains that were refused."""
+    rules = list(rules)
+    for path in (path for folder in folders for path in Path(folder).rglob("*") if path.suffix in STALE_SUFFIXES):
+        if not any(rule.is_producer(str(path)) for rule in rules):
+            path.unlink()
 
 
 def benchmark_patterns(rules: Iterable[Any]) -> dict[str, str]:

@@ -11,7 +11,7 @@ from typing import Any
 from ..io.files import files_below
 from ..io.yaml_files import read_keys
 from ..settings.atlas import DOWNLOADS, Atlas, AtlasFileRecord, AtlasSettings, FileKey
-from ..settings.base import KeyProblem
+from ..settings.base import KeyProblem, own_name
 from ..settings.root import Config
 
 
@@ -106,7 +106,7 @@ class UsedAtlas:
     def _shipped(self, path: str) -> list[Path]:
         if self.atlas.folder is None:
             return []
-        place = (self.settings.description.parent / self.atlas.folder / path).resolve()
+        place = own_name(self.settings.description.parent / self.atlas.folder / path)
         return [place] if place.is_file() else []
 
 
