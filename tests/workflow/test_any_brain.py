@@ -301,14 +301,19 @@ def test_pathologies_go_through_to_metrics(study, measuring, name):
     assert found["whole", "volume"] / plain["whole", "volume"] == pytest.approx(ratio, abs=0.04)
 
 
-@pytest.mark.fault(12)
+@pytest.mark.fault(12, 68)
 def test_a_study_whose_every_brain_is_refused_ends_with_the_cause_of_each(workflow):
     save_labels(workflow.directory / "whole.nii.gz", LABELS, AFFINE)
     whole = (workflow.directory / "whole.nii.gz").read_bytes()
     (workflow.directory / "torn.nii.gz").write_bytes(whole[: len(whole) // 2])
     brain = {"id": "a", "week": 21, "labels": "torn.nii.gz", "scheme": "binary"}
     name = workflow.write("study.yaml", {"brains": [brain], "start": "a", "folding": {"end_week": 23}})
+    # it was fine before
+    table = workflow.directory / "results" / "study" / "volumes.csv"
+    table.parent.mkdir(parents=True)
+    table.touch()
     outcome = workflow.run("--keep-going", "--cores", "1", "--configfile", name)
     assert outcome.returncode == 2
     assert outcome.stderr == Facts(workflow.directory / "torn.nii.gz")
+    assert not table.exists()
     assert "ValueError" not in outcome.stdout + outcome.stderr

@@ -2,6 +2,7 @@
 import os
 
 from gyriflow.errors import GyriflowError
+from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
@@ -38,7 +39,7 @@ def validated_study():
             # Snakemake itself keeps the last of two equal keys
             file = Path(workflow.workdir_init, path)
             if set(read_keys(file)) & {"brains", "atlas", "participants"}:
-                base = file.resolve().parent
+                base = folder_of(file)
         found = load(config, base, keep_going=KEEP_GOING_VAR in os.environ)
         study = resolve(found.measured_only if MEASURE_ONLY_VAR in os.environ else found, refused_brains())
         if workflow.is_main_process:

@@ -172,11 +172,11 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
     files = [path for path in (*brain.files, brain.image) if path in checksums and Path(path).is_file()]
     require_checksums({path: checksums[path] for path in files})
     volume = brain.label_volume
-    if volume is not None and os.path.lexists(volume):
+    if volume is not None and Path(volume).is_file():
         yield from _check_labels(volume, brain, label_scheme(config, brain))
     for file in brain.files:
         # files of atlases may be missing yet
-        if file != volume and os.path.lexists(file):
+        if file != volume and Path(file).is_file():
             # takes half a second, which label volumes need not wait for
             from ..io.surfaces import read_one_hemisphere, read_surface
 

@@ -191,7 +191,7 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
         return 0
     from ..running.launch import main as launch
 
-    return launch(["--configfile", str(config.resolve()), *options, "--directory", str(directory), *targets])
+    return launch(["--configfile", str(config.absolute()), *options, "--directory", str(directory), *targets])
 
 
 @main.command()

@@ -30,31 +30,29 @@ if TYPE_CHECKING:
 AnyPath = str | PathLike[str]
 AGAIN = "The file may be truncated or of another kind: copy or export it again."
 PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
+PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
-"""Name of a file beside a GIFTI file that has the values of one of its arrays."""
 
 
 def files_behind(path: AnyPath) -> list[str]:
-    """Return the further files that readers open with a file: the other of a pair, the external data of GIFTI."""
-    name = str(path)
-    if ending := PAIR.search(name):
-        stem = name[: ending.start()]
-        return [f"{stem}{part}{ending[1] or ''}" for part in (".hdr", ".img", ".HDR", ".IMG")]
-    names: set[bytes] = set()
+    """Return the further files that readers open with a file: the second of a pair, the external data of GIFTI."""
+    name, names = Path(path).name, set[bytes]()
+    if pair := PAIR.search(name):
+        return [str(Path(path).with_name(name[: pair.start()] + end + (pair[1] or ""))) for end in PAIR_ENDINGS]
     if name.lower().endswith((".gii", ".gii.gz")):
+        opener = gzip.open if name.lower().endswith(".gz") else Path.open
         # damaged files are reported by their readers
-        opener = gzip.open if name.lower().endswith(".gz") else open
-        with suppress(OSError, EOFError, zlib.error), opener(name, "rb") as file:
+        with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
             names = set(EXTERNAL.findall(file.read()))
-    return sorted(os.path.join(os.path.dirname(name), html.unescape(other.decode(errors="replace"))) for other in names)
+    return [str(Path(path).parent / html.unescape(found.decode(errors="replace"))) for found in sorted(names)]
 
 
 def require_content(path: AnyPath) -> None:
     """Raise InputError if the content of a file of git-annex or Git LFS is not here."""
-    beginning = b""
-    with suppress(OSError), open(path, "rb") as file:
-        beginning = file.read(64)
-    if absent := absent_content(str(path), beginning):
+    start = b""
+    with suppress(OSError), Path(path).open("rb") as file:
+        start = file.read(64)
+    if absent := absent_content(Path(path), start):
         raise InputError(absent, path=path)
 
 
@@ -221,10 +219,10 @@ def sha256_of(path: AnyPath) -> str:
 
 
 def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return the SHA-256, size, and last writing and change of each file that can be read, and the `files_behind` it.
+    """Return for each file that can be read, and the files behind it, its SHA-256, size, times and `files_behind`.
 
-    The files behind others are among them. A file whose size (bytes) and times (ns, of the epoch) are those in
-    `earlier`, an answer from before, is not read again.
+    A file whose size (bytes) and times of writing and any change (ns, of the epoch) are those in `earlier`, an answer
+    from before, is not read again.
     """
     by_path: dict[str, list[Any]] = {}
     waiting = list(map(str, files))
@@ -233,8 +231,8 @@ def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, 
             state = Path(path).stat()
             # one that takes another's place keeps its date, but has been renamed
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
-            known = len(found := earlier.get(path, [])) > len(current) + 1 and found[1:-1] == current
-            by_path[path] = found if known else [sha256_of(path), *current, files_behind(path)]
+            found = earlier.get(path, [])
+            by_path[path] = found if found[1:-1] == current else [sha256_of(path), *current, files_behind(path)]
             waiting += [behind for behind in by_path[path][-1] if behind not in waiting]
     return by_path
 
@@ -258,17 +256,14 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice.
-
-    Links of git-annex are files too if their content is not here.
-    """
+    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice."""
     entered: set[str] = set()
     found = []
     for place, folders, names in os.walk(folder, followlinks=True):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
-        paths = [here / name for name in names if real not in entered]
-        found += [path for path in paths if path.is_file() or absent_content(path)]
+        files = [here / name for name in names if (here / name).is_file() or absent_content(here / name)]
+        found += files if real not in entered else []
         entered.add(real)
     return sorted(found)

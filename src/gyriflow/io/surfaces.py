@@ -268,8 +268,9 @@ def read_vertex_labels(path: AnyPath) -> tuple[Ints, dict[int, str]]:
         expected = "one label for each vertex (.label.gii)"
         raise InputError("is not a label file", path=path, found=shapes, expected=expected)
     values = np.asarray(arrays[0].data)
+    require_finite(values, path, "labels", "vertices")
     labels = np.rint(values).astype(np.int64)
-    if not np.isfinite(values).all() or np.abs(values - labels).max(initial=0.0) > 1e-3:
+    if np.abs(values - labels).max(initial=0.0) > 1e-3:
         raise InputError("contains non-integer values", path=path, expected="labels")
     names = {int(key): str(name).strip() for key, name in image.labeltable.get_labels_as_dict().items()}
     return labels, {key: name for key, name in names.items() if key != NO_REGION and name not in UNNAMED}

@@ -31,8 +31,8 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
+# labels stored through a slope or as floats may be this far off whole numbers
 MAX_LABEL_ERROR = 0.05
-"""How far labels stored through a slope or as floats may be from whole numbers."""
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
 MAX_COMPRESSION = 1100
@@ -188,18 +188,16 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
 
 def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
     """Return the values of an image, with compressed files read to their ends, where their checksums are."""
+    files = {part: holder.filename for part, holder in image.file_map.items()}
     with ExitStack() as opened:
-        streams = {}
-        for part, holder in image.file_map.items():
-            name = str(holder.filename).lower()
-            if name.endswith(PACKED_SUFFIXES):
-                # nibabel's reader of gzip may be one that checks nothing
-                opener = gzip.open if name.endswith(GZIP_SUFFIXES) else ImageOpener
-                streams[part] = opened.enter_context(opener(holder.filename))
-        if streams:
-            holders = {part: FileHolder(fileobj=stream) for part, stream in streams.items()}
-            image = type(image).from_file_map(image.file_map | holders)
-        values = np.asanyarray(image.dataobj)
+        # nibabel's own reader of gzip may be one that checks nothing
+        streams = {
+            part: opened.enter_context((gzip.open if file.lower().endswith(GZIP_SUFFIXES) else ImageOpener)(file))
+            for part, file in files.items()
+            if file.lower().endswith(PACKED_SUFFIXES)
+        }
+        holders = {part: FileHolder(fileobj=stream) for part, stream in streams.items()}
+        values = np.asanyarray(type(image).from_file_map(image.file_map | holders).dataobj)
         for stream in streams.values():
             try:
                 while stream.read(2**20):
@@ -207,7 +205,7 @@ def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
             except gzip.BadGzipFile as error:
                 if not str(error).startswith("Not a gzipped file"):
                     raise
-                log.warning("%s: further data behind the compressed ones were ignored, as gzip does", path)
+                log.warning("%s: further data follow the compressed data; they are ignored, as by gzip", path)
     return values
 
 
@@ -285,17 +283,13 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     if values.dtype.kind == "f":
         require_finite(values.ravel(), path, "values", "voxels")
         errors = np.abs(values - np.rint(values))
-        broken = errors > MAX_LABEL_ERROR
-        if broken.any():
-            raise InputError(
-                "contains values that are neither whole numbers nor near them, as interpolation leaves them",
-                path=path,
-                found=f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}",
-                expected=f"tissue labels: whole numbers, to {MAX_LABEL_ERROR:g}",
-                remedy="Resample labels with nearest neighbour; gyriflow does not segment images.",
-            )
+        if (broken := errors > MAX_LABEL_ERROR).any():
+            problem = f"contains values that are more than {MAX_LABEL_ERROR:g} off whole numbers, so not labels"
+            broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
+            remedy = "Resample labels with nearest neighbour. gyriflow does not segment images."
+            raise InputError(problem, path=path, found=broken_values, remedy=remedy)
         if (error := errors.max(initial=0)) > 1e-3:
-            log.warning("%s: labels are stored up to %.3g off whole numbers and were rounded", path, error)
+            log.warning("%s: labels are up to %.3g off whole numbers and were rounded", path, error)
         values = np.rint(values)
     least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:

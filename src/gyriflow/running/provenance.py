@@ -86,8 +86,5 @@ def input_contents(
     if record and files != recorded:
         write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
-    hashes = {
-        name: " ".join([sha256, *(files[path][0] for path in behind if path in files and path != name)])
-        for name, (sha256, *_, behind) in files.items()
-    }
-    return expected | hashes
+    together = {name: [path for path in dict.fromkeys([name, *files[name][-1]]) if path in files] for name in files}
+    return expected | {name: " ".join(files[path][0] for path in paths) for name, paths in together.items()}

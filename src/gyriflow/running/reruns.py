@@ -1,12 +1,12 @@
 """Have Snakemake run jobs again after a change of code or of contents, by internals of it that nothing else uses."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-STALE_SUFFIXES = (".csv", ".html", ".png", ".pdf")
-
 from ..code_hash import code_hash
+
+REMOVED = (".csv", ".html", ".png", ".pdf")
 
 
 def rerun_on_changes(rules: Iterable[Any], contents: Mapping[str, str], scripts: Path) -> None:
@@ -36,10 +36,9 @@ def _contents_of(rule: Any, contents: Mapping[str, str]) -> Any:
     return read_by_job
 
 
-def remove_stale(rules: Iterable[Any], *folders: str) -> None:
-    """Remove the tables, figures and pages in folders that no rule makes, such as those of brains that were refused."""
-    rules = list(rules)
-    for path in (path for folder in folders for path in Path(folder).rglob("*") if path.suffix in STALE_SUFFIXES):
+def remove_stale(rules: Collection[Any], *folders: str) -> None:
+    """Remove the tables, figures and pages in folders that no rule makes, such as those of refused brains."""
+    for path in (path for folder in folders for path in Path(folder).rglob("*") if path.suffix in REMOVED):
         if not any(rule.is_producer(str(path)) for rule in rules):
             path.unlink()
 

@@ -10,6 +10,7 @@ from tabulate import tabulate
 from ..errors import InputError, StorageError
 from ..io.files import read_json
 from ..io.yaml_files import read_yaml
+from ..settings.base import folder_of
 from ..shipped import CONFIG
 from ..study import resolve
 from ..study.loading import load
@@ -96,7 +97,7 @@ def _configured(directory: Path) -> list[tuple[str, str]]:
         if (record := directory / STUDY_RECORD).is_file():
             path = Path(read_json(record)["configuration"][-1])
         if path.is_file():
-            return resolve(load(read_yaml(path), path.resolve().parent)).pairs
+            return resolve(load(read_yaml(path), folder_of(path))).pairs
     return []
 
 

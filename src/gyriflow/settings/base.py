@@ -161,26 +161,26 @@ def path_in(folder: Path, path: str) -> Path:
 def located(folder: Path | str, path: str) -> Path:
     """Return the absolute path of a file in a folder or, if it only exists there, in the working directory."""
     places = [path_in(Path(folder), path), Path.cwd() / path]
-    return own_name(next((place for place in places if os.path.lexists(place)), places[0]))
+    return own_name(next((place for place in places if place.exists() or absent_content(place)), places[0]))
 
 
 def own_name(path: Path) -> Path:
-    """Return the absolute path of a file without links to folders, or of a folder without links.
-
-    A link to a file keeps its name, which tells the format: what it leads to, such as a key of git-annex, may not.
-    """
+    """Return an absolute path without links, except that a link to a file keeps its name, which tells the format."""
     return path.resolve() if path.is_dir() else path.parent.resolve() / path.name
 
 
-def absent_content(path: Path | str, beginning: bytes = b"") -> str:
-    """Return why the content of a file of git-annex or Git LFS is not here and how to get it, or "".
+def folder_of(path: Path) -> Path:
+    """Return the folder of a configuration: of a link, that of its target, unless this is in a store of git-annex."""
+    real = path.resolve()
+    return (own_name(path) if "annex/objects" in real.as_posix() else real).parent
 
-    The file is a broken link, or a pointer, which is known by its `beginning`.
-    """
-    if beginning.startswith(b"version https://git-lfs.github.com"):
+
+def absent_content(path: Path, start: bytes = b"") -> str:
+    """Return how to get the content of a broken link or a pointer, by its `start`, of git-annex or Git LFS, or ""."""
+    if start.startswith(b"version https://git-lfs.github.com"):
         return f"its content is not here (Git LFS). Get it with `git lfs pull --include {path}`"
-    is_link = os.path.islink(path) and not os.path.exists(path) and "annex/objects" in os.readlink(path)
-    if is_link or beginning.startswith(b"/annex/objects/"):
+    is_broken = path.is_symlink() and not path.exists() and "annex/objects" in path.readlink().as_posix()
+    if is_broken or start.startswith(b"/annex/objects/"):
         return f"its content is not here (git-annex). Get it with `datalad get {path}` or `git annex get {path}`"
     return ""
 
@@ -194,9 +194,10 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     if not info.context:
         return path
     folder, place = Path(info.context["folder"]), located(info.context["folder"], path)
+    if absent := absent_content(place):
+        raise refused(absent)
     if not place.is_file() and path not in info.context.get("awaited", ()):
-        present = _present_instead(path_in(folder, path))
-        raise refused(absent_content(place) or f"no such file: {path_in(folder, path)}{present}")
+        raise refused(f"no such file: {path_in(folder, path)}{_present_instead(path_in(folder, path))}")
     if not WILDCARD.search(str(place)):
         return str(place)
     # a relative path avoids the braces of the working directory

@@ -17,6 +17,7 @@ from gyriflow.anatomy.labels import (
     require_sides,
     unlabelled_ventricles,
 )
+from gyriflow.anatomy.layout import layout_of, scheme_contradictions
 from gyriflow.anatomy.repair import surface_without_stalks
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume
@@ -244,3 +245,18 @@ def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain
     expected = clean.report["label_volumes_mL"]["cerebrum"]
     assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(expected, rel=1e-6)
     assert Facts(found.report["outside"]["parts"], "mL", "%") in found.warnings
+
+
+FETA = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])
+"""The numbers of FeTA for those of the spina bifida atlas."""
+
+
+@pytest.mark.fault(67)
+@pytest.mark.parametrize(("left", "right"), [(10, 0), (0, 10), (11, 0), (0, 11), (10, 10)])
+def test_numbers_that_occur_in_a_scheme_of_sides_by_accident_contradict_it(left, right):
+    path = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA22_notoperated" / "parcellation.nii.gz"
+    labels = FETA[read_label_volume(path, cropped=True).labels]
+    is_left = np.indices(labels.shape)[0] < np.argwhere(labels == 3)[:, 0].mean()
+    volume = labels + (labels > 0) * np.where(is_left, left, right)
+    found = list(scheme_contradictions(layout_of(volume), SCHEMES["multi-bounti-43"]))
+    assert "left and right would be mixed" in " ".join(found)

@@ -4,14 +4,22 @@ import errno
 import hashlib
 import os
 
+import nibabel as nib
 import numpy as np
 import pytest
+from configurations import refusal
 from facts import Facts
+from shapes import sphere
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
-from gyriflow.io.files import atomic_write, contents, read_json, read_tab_separated, write_json
+from gyriflow.io.files import atomic_write, contents, files_below, read_json, read_tab_separated, write_json
+from gyriflow.io.surfaces import read_surface, write_surface
+from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
+from gyriflow.running.provenance import input_contents
+from gyriflow.settings.base import folder_of, located
+from gyriflow.study.loading import load
 
 
 @pytest.mark.promise(1)
@@ -93,6 +101,74 @@ def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monk
     second = contents([one, other], first)
     assert read == [str(one)]
     assert (second[str(one)][0], second[str(other)]) == ("new", first[str(other)])
+
+
+@pytest.mark.fault(65)
+@pytest.mark.parametrize(
+    ("name", "behind", "text"),
+    [
+        ("a.hdr", "a.img", b""),
+        ("a.img.gz", "a.hdr.gz", b""),
+        ("a.surf.gii", "points & more.dat", b'<DataArray ExternalFileName="points &amp; more.dat" Dim0="3">'),
+    ],
+)
+def test_a_change_behind_an_input_is_one_of_its_contents(tmp_path, name, behind, text):
+    (tmp_path / name).write_bytes(text)
+    file = str(tmp_path / name)
+    source = {"pial": file} if text else {"labels": file, "scheme": "binary"}
+    found, config = [], load({"brains": [{"id": "a", "week": 21, **source}]})
+    for content in ("one", "two"):
+        (tmp_path / behind).write_text(content)
+        found.append(input_contents(tmp_path, config, {}, record=True)[file])
+    assert found[0] != found[1]
+    assert input_contents(tmp_path, config, {}, record=True)[file] == found[1]
+
+
+LINK = ".git/annex/objects/aa/bb/K/K"
+ABSENT = {
+    LINK: "datalad get",
+    "/annex/objects/K\n": "datalad get",
+    "version https://git-lfs.github.com/spec/v1\n": "lfs",
+}
+
+
+@pytest.mark.fault(66)
+@pytest.mark.parametrize(("content", "command"), ABSENT.items(), ids=["link", "pointer", "LFS"])
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("a.nii.gz", read_label_volume),
+        ("a.img", lambda path: read_label_volume(path.with_suffix(".hdr"))),
+        ("a.surf.gii", read_surface),
+        ("lh.pial", read_surface),
+        ("a.tsv", read_tab_separated),
+        ("a.json", read_json),
+        ("a.yaml", read_yaml),
+    ],
+)
+def test_content_that_is_not_here_is_named_with_the_command_that_gets_it(tmp_path, name, read, content, command):
+    nib.save(nib.Nifti1Pair(np.zeros((9, 9, 9), np.uint8), np.eye(4)), tmp_path / "a.img")
+    path = tmp_path / name
+    path.unlink(missing_ok=True)
+    path.symlink_to(content) if content is LINK else path.write_text(content)
+    with pytest.raises(InputError, check=Facts(f"{path}:", command)):
+        read(path)
+    if content is LINK:
+        assert path in files_below(tmp_path)
+        assert refusal({"brains": [{"id": "a", "week": 21, "pial": str(path)}]}) == Facts(f"datalad get {path}")
+
+
+@pytest.mark.fault(66)
+def test_a_link_to_a_key_is_read_as_its_own_name_says(tmp_path):
+    key, link = tmp_path / ".git" / "annex" / "objects" / "K" / "K", tmp_path / "a.surf.gii"
+    write_surface(tmp_path / "b.surf.gii", sphere(10, 1))
+    key.parent.mkdir(parents=True)
+    (tmp_path / "b.surf.gii").rename(key)
+    link.symlink_to(key)
+    assert located(tmp_path, "a.surf.gii") == link
+    assert len(read_surface(located(tmp_path, "a.surf.gii")).faces) == 80
+    # a configuration too has its brains beside it, not in the store
+    assert folder_of(link) == tmp_path
 
 
 def test_what_is_written_is_read(tmp_path):

@@ -1,5 +1,7 @@
 """Label volumes: whatever their storage, units and headers, the same positions in RAS+ mm, or a refusal."""
 
+import gzip
+
 import nibabel as nib
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from shapes import rigid, scaling
 
 from gyriflow.errors import InputError
 from gyriflow.io.volumes import LabelVolume, read_label_volume, read_volume_map, write_label_volume
+from gyriflow.shipped import SHIPPED
 
 AFFINE = np.array([[0.8, 0, 0, -10], [0, 0.9, 0, 5], [0, 0, 1.0, 20], [0, 0, 0, 1.0]])
 
@@ -100,6 +103,63 @@ def with_values(path, labels, value):
     saved(path, values)
 
 
+def with_slope(path, labels, slope, kind):
+    image = nib.Nifti1Image(np.rint(labels / slope).astype(kind), AFFINE)
+    image.header.set_slope_inter(slope, 0)
+    nib.save(image, path)
+
+
+@pytest.mark.fault(63)
+@pytest.mark.parametrize(
+    ("name", "make", "off"),
+    [
+        # labels 2 and 7 become 2.01 and 6.99
+        ("a.nii", lambda path, labels: with_slope(path, labels, 0.03, np.uint8), 0.01),
+        ("a.nii", lambda path, labels: with_slope(path, labels, 1 / 255, np.int16), None),
+        ("a.nii", lambda path, labels: saved(path, (labels * 0.994).astype(np.float32)), 0.042),
+        ("a.mgz", lambda path, labels: nib.save(nib.MGHImage((labels + 0.02).astype("f4"), AFFINE), path), 0.02),
+    ],
+)
+def test_labels_that_their_storage_moved_are_rounded_with_a_warning(tmp_path, labels, caplog, name, make, off):
+    make(tmp_path / name, labels)
+    assert np.array_equal(read_label_volume(tmp_path / name).labels, labels)
+    warnings = [record.getMessage() for record in caplog.records]
+    assert warnings == ([] if off is None else [Facts(tmp_path / name, off)])
+
+
+@pytest.mark.fault(64)
+@pytest.mark.parametrize(("name", "flips"), [("a.nii.gz", 150), ("a.img.gz", 20), ("a.hdr.gz", 20), ("a.mgz", 20)])
+def test_a_flipped_bit_of_a_compressed_volume_changes_no_label(tmp_path, name, flips):
+    shipped = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
+    path, volume, random = tmp_path / name, nib.load(shipped), np.random.default_rng(0)
+    kind = {"a.nii.gz": nib.Nifti1Image, "a.mgz": nib.MGHImage}.get(name, nib.Nifti1Pair)
+    nib.save(kind(np.asarray(volume.dataobj, np.int16), volume.affine.astype("f4")), path)
+    if name == "a.nii.gz":
+        path.write_bytes(shipped.read_bytes())
+    whole, true, refused = path.read_bytes(), read_label_volume(path), 0
+    for place in random.integers(8 * len(whole), size=flips):
+        damaged = bytearray(whole)
+        damaged[place // 8] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        try:
+            found = read_label_volume(path)
+        except InputError as error:
+            refused += Facts(path) == error
+        else:
+            assert np.array_equal(found.labels, true.labels)
+            assert np.array_equal(found.affine, true.affine)
+    # a few bits have no meaning
+    assert refused > 0.3 * flips
+
+
+def test_further_members_and_bytes_of_gzip_are_taken_as_gzip_does(tmp_path, labels, caplog):
+    labels = np.pad(labels, 10)
+    whole = gzip.decompress(saved(tmp_path / "a.nii.gz", labels).read_bytes())
+    (tmp_path / "b.nii.gz").write_bytes(gzip.compress(whole[:400]) + gzip.compress(whole[400:]) + b"\0further")
+    assert np.array_equal(read_label_volume(tmp_path / "b.nii.gz").labels, labels)
+    assert [record.getMessage() for record in caplog.records] == [Facts(tmp_path / "b.nii.gz")]
+
+
 @pytest.mark.fault(6, 13, 43)
 @pytest.mark.parametrize(
     ("name", "make", "facts"),
@@ -110,7 +170,8 @@ def with_values(path, labels, value):
         ("a.img", lambda path, labels: nib.save(nib.Spm2AnalyzeImage(labels, None), path), ["Analyze", "NIfTI"]),
         ("a.nii", lambda path, _: saved(path, np.zeros((3, 3, 3, 2), np.int16)), ["(3, 3, 3, 2)"]),
         ("a.nii", lambda path, _: saved(path, np.zeros((3, 3), np.int16)), ["(3, 3)"]),
-        ("a.nii", lambda path, labels: with_values(path, labels, 0.4), [3, 0.4]),
+        ("a.nii", lambda path, labels: with_values(path, labels, 0.4), [3, 0.4, 0.05, "nearest neighbour", "segment"]),
+        ("a.nii", lambda path, labels: with_slope(path, labels, 0.3, np.uint8), [2, 6.9]),
         ("a.nii", lambda path, labels: with_values(path, labels, np.nan), [3, "NaN"]),
         ("a.nii", lambda path, labels: with_values(path, labels, np.inf), [3, "NaN"]),
     ],

@@ -3,14 +3,17 @@
 import os
 import sys
 
+import pytest
+from configurations import touched
 from facts import Facts
 from processes import ran
 
 from gyriflow.code_hash import code_hash
+from gyriflow.io.files import files_in
 
 SNAKEFILE = """
 from pathlib import Path
-from gyriflow.running.reruns import benchmark_patterns, rerun_on_changes
+from gyriflow.running.reruns import benchmark_patterns, remove_stale, rerun_on_changes
 
 rule target:
     input: "made-a"
@@ -23,22 +26,25 @@ rule copy:
     script: "scripts/copy.py"
 
 rule coded:
-    output: "coded"
+    output: "tables/coded.csv"
     params: code="own"
     shell: "touch {output}"
 
 rerun_on_changes(workflow.rules, {"given": Path("given").read_text()}, Path("scripts").absolute())
+remove_stale(workflow.rules, "tables", "none")
 print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
 """
 SCRIPT = "import shutil\nfrom gyriflow.units import ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
 
 
+@pytest.mark.fault(68)
 def test_jobs_run_again_after_a_change_of_code_or_where_an_older_file_takes_the_place_of_their_input(tmp_path):
     script, given = tmp_path / "scripts" / "copy.py", tmp_path / "given"
     script.parent.mkdir()
     (tmp_path / "Snakefile").write_text(SNAKEFILE)
     script.write_text(SCRIPT)
     given.write_text("one")
+    touched(tmp_path / "tables", "coded.csv", "volumes.csv", "figures/volumes.png", "study.json")
     snakemake = [sys.executable, "-m", "snakemake", "--cores", "1"]
     first = ran(*snakemake, cwd=tmp_path)
     assert first.returncode == 0, first.stderr
@@ -48,3 +54,5 @@ def test_jobs_run_again_after_a_change_of_code_or_where_an_older_file_takes_the_
     os.utime(given, ns=(0, 0))
     again = ran(*snakemake, "-n", cwd=tmp_path)
     assert again.stdout + again.stderr == Facts("two")
+    # tables and figures that no rule makes any more have been removed
+    assert [path.name for path in files_in(tmp_path / "tables")] == ["coded.csv", "study.json"]
