@@ -20,7 +20,7 @@ CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
 # limit of the ratio between left and right of cortex over white matter
 MAX_IMBALANCE = 4.0
 # share of the contacts of sided labels that are with the other side; 0.11 or less in 15 brains, 0.69 or more if mixed
-MAX_ACROSS = 0.4
+MAX_BETWEEN = 0.4
 HOLE = -1
 """Value for unlabelled voxels enclosed by labels, which are neither inside nor outside."""
 
@@ -85,9 +85,10 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
         share = contact_share(tissue, cerebrum & ~cortex)
         if share > MAX_OUTSIDE and layout.count[tissue].sum() > SMALL * size:
             yield f"{with_numbers(tissue, name)} would lie inside: {share:.0%} of its neighbours are there"
-    sided, across = layout.contact[np.ix_(left | right, cerebrum)].sum(), layout.contact[np.ix_(left, right)].sum()
-    if 2 * across > MAX_ACROSS * sided:
-        yield f"left and right would be mixed: {2 * across / sided:.0%} of their contacts are with the other side"
+    between = 2 * layout.contact[np.ix_(left, right)].sum()
+    contacts = layout.contact[np.ix_(left | right, cerebrum)].sum()
+    if between > MAX_BETWEEN * contacts:
+        yield f"left and right would be mixed: {between / contacts:.0%} of their contacts are with the other side"
     (a, b), (c, d) = ([layout.count[tissue & side].sum() for side in (left, right)] for tissue in (cortex, white))
     # a hemisphere may be small or missing, but with all of its tissues
     is_unequal = (a > 0) != (c > 0) or (b > 0) != (d > 0) or max(a * d, b * c) > MAX_IMBALANCE * min(a * d, b * c)

@@ -22,6 +22,7 @@ from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.status import format_duration
+from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
@@ -53,7 +54,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
 
     InputError for a configuration that is not valid, with all its problems.
     """
-    config = load(read_keys(path), path.resolve().parent)
+    config = load(read_keys(path), folder_of(path))
     study = resolve(config)
     yield f"{path}: {_contents(study)}", False
     problems = list(input_problems(config))
@@ -90,7 +91,7 @@ def work_of(
     for reason, rules in rules_by_reason.items():
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
-    study = resolve(load(read_keys(path), path.resolve().parent))
+    study = resolve(load(read_keys(path), folder_of(path)))
     yield from _needs(jobs, study, directory, cores)
 
 
@@ -114,7 +115,7 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     logger.addFilter(take)
     # it also changes the working directory
     with chdir(Path.cwd()):
-        options = ["--configfile", str(config.resolve()), "--directory", str(directory.resolve())]
+        options = ["--configfile", str(config.absolute()), "--directory", str(directory.resolve())]
         code = launch([*options, "--dry-run", *further])
     logger.removeFilter(take)
     if made and made[0].exists():

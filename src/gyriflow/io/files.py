@@ -34,13 +34,13 @@ PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
 
 
-def files_behind(path: AnyPath) -> list[str]:
+def companion_files(path: AnyPath) -> list[str]:
     """Return the further files that readers open with a file: the second of a pair, the external data of GIFTI."""
     name, names = Path(path).name, set[bytes]()
     if pair := PAIR.search(name):
         return [str(Path(path).with_name(name[: pair.start()] + end + (pair[1] or ""))) for end in PAIR_ENDINGS]
     if name.lower().endswith((".gii", ".gii.gz")):
-        opener = gzip.open if name.lower().endswith(".gz") else Path.open
+        opener: Any = gzip.open if name.lower().endswith(".gz") else Path.open
         # damaged files are reported by their readers
         with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
             names = set(EXTERNAL.findall(file.read()))
@@ -63,8 +63,8 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
     try:
         yield
     except Exception as error:  # readers raise whatever a file leads them into
-        for behind in files_behind(path):
-            require_content(behind)
+        for companion in companion_files(path):
+            require_content(companion)
         if isinstance(error, InputError):
             raise
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
@@ -219,7 +219,7 @@ def sha256_of(path: AnyPath) -> str:
 
 
 def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return for each file that can be read, and the files behind it, its SHA-256, size, times and `files_behind`.
+    """Return for each file that can be read, and for its companions, its SHA-256, size, times and `companion_files`.
 
     A file whose size (bytes) and times of writing and any change (ns, of the epoch) are those in `earlier`, an answer
     from before, is not read again.
@@ -232,8 +232,8 @@ def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, 
             # one that takes another's place keeps its date, but has been renamed
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
             found = earlier.get(path, [])
-            by_path[path] = found if found[1:-1] == current else [sha256_of(path), *current, files_behind(path)]
-            waiting += [behind for behind in by_path[path][-1] if behind not in waiting]
+            by_path[path] = found if found[1:-1] == current else [sha256_of(path), *current, companion_files(path)]
+            waiting += [companion for companion in by_path[path][-1] if companion not in waiting]
     return by_path
 
 

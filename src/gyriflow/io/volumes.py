@@ -188,16 +188,16 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
 
 def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
     """Return the values of an image, with compressed files read to their ends, where their checksums are."""
-    files = {part: holder.filename for part, holder in image.file_map.items()}
+    streams: dict[str, Any] = {}
     with ExitStack() as opened:
-        # nibabel's own reader of gzip may be one that checks nothing
-        streams = {
-            part: opened.enter_context((gzip.open if file.lower().endswith(GZIP_SUFFIXES) else ImageOpener)(file))
-            for part, file in files.items()
-            if file.lower().endswith(PACKED_SUFFIXES)
-        }
+        for part, holder in image.file_map.items():
+            name = str(holder.filename).lower()
+            if name.endswith(PACKED_SUFFIXES):
+                # nibabel's own reader of gzip may be one that checks nothing
+                opener: Any = gzip.open if name.endswith(GZIP_SUFFIXES) else ImageOpener
+                streams[part] = opened.enter_context(opener(holder.filename))
         holders = {part: FileHolder(fileobj=stream) for part, stream in streams.items()}
-        values = np.asanyarray(type(image).from_file_map(image.file_map | holders).dataobj)
+        values = np.asanyarray(type(image).from_file_map({**image.file_map, **holders}).dataobj)
         for stream in streams.values():
             try:
                 while stream.read(2**20):

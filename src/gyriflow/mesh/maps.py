@@ -82,6 +82,7 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
             path=path,
             found=f"{int(undefined.sum())} vertices at voxels that are NaN or infinite",
             expected=expected,
+            remedy="Fill these voxels, and a voxel or two around the brain, as with the nearest values.",
         )
     return values
 

@@ -73,7 +73,7 @@ def texts_in(value: Any) -> list[str]:
 def input_contents(
     directory: Path, config: Config, checksums: Mapping[str, tuple[str, str]], record: bool
 ) -> dict[str, str]:
-    """Return the SHA-256 of each input file of a study and of the files behind it, by path.
+    """Return the SHA-256 of each input file of a study and of its companions, by path.
 
     For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
     the results with sizes and times, so that unchanged files are not read again.

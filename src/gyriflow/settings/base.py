@@ -165,7 +165,7 @@ def located(folder: Path | str, path: str) -> Path:
 
 
 def own_name(path: Path) -> Path:
-    """Return an absolute path without links, except that a link to a file keeps its name, which tells the format."""
+    """Return an absolute path without links, except that a link to a file keeps its name, which gives the format."""
     return path.resolve() if path.is_dir() else path.parent.resolve() / path.name
 
 
