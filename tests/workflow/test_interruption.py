@@ -71,3 +71,37 @@ def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on
     summary = read_json(workflow.directory / SUMMARY)
     assert summary["resumed_after_step"] >= 12
     assert summary["steps"] == 42
+
+
+STUBBORN = """
+rule slow:
+    output: "slow.txt"
+    shell: "mpiexec -n 2 sleep 600 & (trap '' TERM INT HUP; touch begun; sleep 600); wait"
+"""
+
+
+@pytest.mark.fault(79)
+@pytest.mark.parametrize(
+    ("number", "send"), [(signal.SIGTERM, os.kill), (signal.SIGTERM, os.killpg), (signal.SIGHUP, os.kill)]
+)
+def test_a_signal_to_the_launcher_stops_its_jobs(workflow, number, send):
+    (workflow.directory / "Snakefile").write_text(STUBBORN)
+    process = subprocess.Popen(
+        workflow.command("--cores", "2", "slow.txt"),
+        cwd=workflow.directory, env=workflow.environment, start_new_session=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not (workflow.directory / "begun").exists() or len(below(process.pid)) < 5:
+        assert time.monotonic() < deadline, "the job did not begin"
+        time.sleep(0.1)
+    jobs, sent = below(process.pid), time.monotonic()
+    send(process.pid, number)
+    printed, _ = process.communicate(timeout=60)
+    assert time.monotonic() - sent < 10
+    assert process.returncode == 128 + number, printed
+    assert printed == Facts("interrupted", "same command", "resume")
+    assert "failed" not in printed
+    # what ignores the signal loses its parent before the launcher can list it, if all get the signal at once
+    assert send is os.killpg or all_end(jobs)

@@ -1,13 +1,18 @@
 """What `./run snakemake` does around Snakemake, locks and exit codes, and the commands of gyriflow."""
 
+import errno
 import re
 import subprocess
 import sys
 
 import pytest
 from facts import Facts
+from mpi4py import MPI
 from processes import ran
 
+from gyriflow.folding.__main__ import locked
+from gyriflow.folding.compilation import form_compiler
+from gyriflow.io import locks
 from gyriflow.running.launch import clear_stale_lock
 
 from .conftest import SMALL_STUDY
@@ -68,6 +73,24 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
         assert workflow.jobs("surface")
     finally:
         holder.communicate("\n")
+
+
+@pytest.mark.fault(75)
+@pytest.mark.promise(10)
+def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_path, monkeypatch, capsys):
+    def no_locks(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(locks.fcntl, "flock", no_locks)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    locks.UNLOCKABLE.clear()
+    lock = stale(tmp_path)
+    clear_stale_lock(tmp_path)
+    assert lock.exists()
+    with locked(tmp_path / "folding"), form_compiler(MPI.COMM_SELF):
+        warned = capsys.readouterr().err
+    assert warned == Facts("gyriflow: warning:", tmp_path / ".snakemake" / "gyriflow.lock", "No locks available")
+    assert warned.count("\n") == 1
 
 
 @pytest.mark.fault(36)

@@ -2,13 +2,13 @@
 
 import logging
 import math
-import os
 import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import chdir
+from contextlib import chdir, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import fill
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from ..io.volumes import names_unit, read_label_volume
 from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
+from ..running.machine import available_cores, available_memory_mib
 from ..running.status import format_duration
 from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
@@ -54,31 +55,40 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
 
     InputError for a configuration that is not valid, with all its problems.
     """
-    config = load(read_keys(path), folder_of(path))
-    study = resolve(config)
+    with _inside(directory, path) as file:
+        config = load(read_keys(file), folder_of(file))
+        study, problems = resolve(config), list(input_problems(config))
+        valid = not any(bad for _, bad in problems)
+        volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
+        unnamed = sum(not names_unit(volume) for volume in volumes) if valid else 0
+        missing = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
-    problems = list(input_problems(config))
     yield from ((f"  {line}", bad) for line, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
-    volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
-    if not any(bad for _, bad in problems) and (unnamed := sum(not names_unit(volume) for volume in volumes)):
-        yield (
-            f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm",
-            False,
-        )
-    if count := sum(len(atlas.missing) for atlas in used_atlases(config)):
-        yield f"  {count} atlas file{'s are' if count > 1 else ' is'} missing and will be downloaded", False
-    if not any(bad for _, bad in problems):
+    if unnamed:
+        yield f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm", False
+    if missing:
+        yield f"  {missing} atlas file{'s are' if missing > 1 else ' is'} missing and will be downloaded", False
+    if valid:
         yield "  input files: all are readable and fit their label schemes", False
-        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages])
+        yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
+
+
+@contextmanager
+def _inside(directory: Path, path: Path) -> Iterator[Path]:
+    """Change to a working directory, if it exists, as paths may be relative to it; yield a path as an absolute one."""
+    path = path.absolute()
+    with chdir(directory if directory.is_dir() else Path()):
+        yield path
 
 
 def work_of(
-    path: Path, directory: Path, cores: int, further: Sequence[str], *, show: bool = False
+    path: Path, directory: Path, cores: int, further: Sequence[str], study: Study | None = None, *, show: bool = False
 ) -> Iterator[tuple[str, bool]]:
     """Yield lines about the jobs that would run and their needs, each with whether these exceed what is available.
 
-    `further` are arguments for Snakemake. With `show`, Snakemake lists every job on the terminal first.
+    The study is read from `path` unless given. `further` are arguments for Snakemake. With `show`, it lists every job on
+    the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
     if not jobs:
@@ -91,7 +101,9 @@ def work_of(
     for reason, rules in rules_by_reason.items():
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
-    study = resolve(load(read_keys(path), folder_of(path)))
+    if study is None:
+        with _inside(directory, path) as file:
+            study = resolve(load(read_keys(file), folder_of(file)))
     yield from _needs(jobs, study, directory, cores)
 
 
@@ -108,18 +120,14 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
             jobs.append(PlannedJob(job["rule_name"], dict(job["wildcards"] or {}), job["threads"], job["reason"]))
         return show or record.levelno >= logging.ERROR
 
-    # Snakemake makes folders even in a dry run
-    state = directory.resolve() / ".snakemake"
-    made = [path for path in (*reversed(state.parents), state) if not path.exists()]
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(take)
-    # it also changes the working directory
-    with chdir(Path.cwd()):
-        options = ["--configfile", str(config.absolute()), "--directory", str(directory.resolve())]
+    # Snakemake makes the working directory, even in a dry run, and changes to it
+    with chdir(Path.cwd()), TemporaryDirectory() as empty:
+        place = directory.resolve() if directory.is_dir() else empty
+        options = ["--configfile", str(config.absolute()), "--directory", str(place)]
         code = launch([*options, "--dry-run", *further])
     logger.removeFilter(take)
-    if made and made[0].exists():
-        shutil.rmtree(made[0])
     if code:
         sys.exit(code)
     return jobs
@@ -188,9 +196,9 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
 
 
 def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:
-    memory = surface_memory_mib(volume, brain.week)
-    if memory > max(_memory_mib(), MIN_SURFACE_MIB):
-        yield f"needs about {_gib(memory)} of memory, {_gib(_memory_mib())} are here: resample it to larger voxels"
+    memory, available = surface_memory_mib(volume, brain.week), available_memory_mib()
+    if memory > max(available, MIN_SURFACE_MIB):
+        yield f"needs about {_gib(memory)} of memory, {_gib(available)} are here: resample it to larger voxels"
     read = read_label_volume(volume, brain.affine_from, cropped=True)
     # the wall of a hemisphere that is alone may have no cortex
     whole = brain.hemisphere is None
@@ -225,8 +233,8 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
     disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
     # the memory of this machine does not limit a cluster
-    here = cores <= (os.cpu_count() or 1)
-    yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, _memory_mib() if here else None)
+    here = cores <= available_cores()
+    yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, available_memory_mib() if here else None)
     folder = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
     yield from _fits("disk", disk, shutil.disk_usage(folder).free / 2**20)
 
@@ -237,10 +245,6 @@ def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str,
     else:
         bad = mib > there_mib
         yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} available{', which is too little' if bad else ''}", bad
-
-
-def _memory_mib() -> float:
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**20
 
 
 def _gib(mib: float) -> str:

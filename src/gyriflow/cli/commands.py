@@ -25,11 +25,19 @@ REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 EXISTING_DIR = click.Path(exists=True, file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def _available_cores() -> int:
+    from ..running.machine import available_cores
+
+    return available_cores()
+
+
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
 cores_option = click.option(
-    "-c", "--cores", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="all", help="Cores to use."
+    "-c", "--cores", type=click.IntRange(1), default=_available_cores, show_default="all", help="Cores to use."
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")

@@ -1,7 +1,6 @@
 """The folding program: `mpiexec -n N python -m gyriflow.folding MESH --params params.yaml --out DIR`."""
 
 import argparse
-import fcntl
 import shutil
 import sys
 import traceback
@@ -15,6 +14,7 @@ from mpi4py import MPI
 from ..errors import GyriflowError, StorageError
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..io.files import write_json
+from ..io.locks import lock_file
 from ..io.tetmeshes import read_maps, read_tetrahedral_mesh
 from ..io.yaml_files import read_yaml
 from ..settings.folding import FoldingParameters, parameters_from, require_maps
@@ -54,10 +54,8 @@ def locked(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise StorageError(f"cannot be written: {error}", path=folder) from None
     with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise StorageError("another folding run is using this folder", path=folder) from None
+        if not lock_file(file):
+            raise StorageError("another folding run is using this folder", path=folder)
         yield
 
 

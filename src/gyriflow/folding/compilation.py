@@ -1,6 +1,5 @@
 """Compilation of forms and C code. Each kind of processor has a cache, in which one process compiles at a time."""
 
-import fcntl
 import hashlib
 import os
 import platform
@@ -14,9 +13,12 @@ from typing import Any
 import cffi
 from mpi4py import MPI
 
+from ..io.locks import lock_file
+
 # lets the compiler reorder sums, a fifth faster; all of -ffast-math would break checks for NaN
 REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
-COMPILER_ARGUMENTS = ["-O3", "-march=native", *REORDERED_SUMS]
+NATIVE = "-march=native"
+COMPILER_ARGUMENTS = ["-O3", NATIVE, *REORDERED_SUMS]
 
 
 def processor() -> str:
@@ -31,16 +33,18 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     """Yield the options of the form compiler, for all ranks to compile forms within the block.
 
     Rank 0 locks the cache during the block, since concurrent runs share it, and removes what a killed compilation has
-    left there: later ones would wait for it to finish.
+    left there: later ones would wait for it to finish. For ranks on different processors, code uses what all have.
     """
-    kind = hashlib.sha256(processor().encode()).hexdigest()[:8]
+    native, *others = sorted(set(comm.allgather(processor())))
+    kind = platform.machine() if others else hashlib.sha256(native.encode()).hexdigest()[:8]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
-    options = {"cffi_extra_compile_args": COMPILER_ARGUMENTS, "cache_dir": str(cache)}
+    arguments = [argument for argument in COMPILER_ARGUMENTS if not others or argument != NATIVE]
+    options = {"cffi_extra_compile_args": arguments, "cache_dir": str(cache)}
     with ExitStack() as stack:
         if comm.rank == 0:
             cache.mkdir(parents=True, exist_ok=True)
-            fcntl.flock(stack.enter_context((cache / "lock").open("w")), fcntl.LOCK_EX)
+            lock_file(stack.enter_context((cache / "lock").open("w")), wait=True)
             remove_incomplete_entries(cache)
         comm.barrier()
         yield options
@@ -55,7 +59,7 @@ def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, An
     with form_compiler(comm) as options:
         library = Path(options["cache_dir"]) / f"{name}.so"
         if comm.rank == 0 and not library.exists():
-            interface.set_source(name, code, extra_compile_args=COMPILER_ARGUMENTS)
+            interface.set_source(name, code, extra_compile_args=options["cffi_extra_compile_args"])
             with TemporaryDirectory(dir=library.parent) as folder:
                 Path(interface.compile(tmpdir=folder)).rename(library)
     return interface, interface.dlopen(str(library))

@@ -5,7 +5,6 @@ failed step. The terminal shows a progress bar, warnings and failures; everythin
 `--quiet`, `--printshellcmds` and `--logger` bring back Snakemake's own messages. All other options are Snakemake's.
 """
 
-import fcntl
 import logging
 import os
 import re
@@ -14,19 +13,24 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory, gettempdir
 from types import FrameType
-from typing import IO
+from typing import IO, Any
+from unittest.mock import patch
+
+import psutil
 
 from ..errors import GyriflowError, InputError, StorageError
 from ..io.files import read_json, write_json
+from ..io.locks import UNLOCKABLE, lock_file
 from ..io.yaml_files import read_keys
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
-from ..step import EXIT_FILE, INTERRUPTED, recorded_exit_code
+from ..step import EXIT_FILE, recorded_exit_code
 
 ENVIRONMENT_VARIABLES = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
@@ -40,6 +44,10 @@ ENVIRONMENT_VARIABLES = {
 """Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
 MAX_WAIT_S = 3.0
 """Time to wait for a run that is about to end."""
+GRACE_S = 4.0
+"""Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
+SIGNALLED = 128
+"""Added to the number of the signal that stopped a run, in its exit code."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 READ_ONLY_OPTIONS = (
     "dryrun",
@@ -84,9 +92,7 @@ def hold_lock(directory: Path) -> IO[str] | None:
         file = path.open("a")
     except OSError as error:
         raise StorageError("the working directory cannot be written", path=directory, found=error.strerror) from error
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    if not lock_file(file):
         file.close()
         return None
     _held_locks.append(file)
@@ -107,7 +113,8 @@ def clear_stale_lock(directory: Path) -> None:
             raise StorageError(problem, path=directory.resolve(), remedy=remedy)
         time.sleep(0.2)
     with file:
-        stale = list((directory / ".snakemake" / "locks").glob("*.lock"))
+        # without locks, those of Snakemake may be of a live run; it tells how to remove them
+        stale = [] if file.name in UNLOCKABLE else list((directory / ".snakemake" / "locks").glob("*.lock"))
         for lock in stale:
             lock.unlink()
     if stale:
@@ -169,24 +176,50 @@ def failed_brains(directory: Path, since_s: float) -> dict[str, str]:
     return dict(errors.drop_duplicates("subject")[["subject", "message"]].to_numpy())
 
 
-def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> None:
+def stop_jobs() -> None:
+    """Stop all processes below this one, MPI ranks included. Simulations keep their last checkpoint."""
+    jobs: set[psutil.Process] = set()
+    for stop in (psutil.Process.terminate, psutil.Process.kill):
+        # a job that ends may leave its own processes behind
+        jobs.update(psutil.Process().children(recursive=True))
+        for job in jobs:
+            with suppress(psutil.Error):
+                stop(job)
+        deadline = time.monotonic() + GRACE_S
+        # waiting for them by psutil would take their exit codes from Snakemake
+        while any(map(_is_running, jobs)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+
+
+def _is_running(process: psutil.Process) -> bool:
+    with suppress(psutil.Error):
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    return False
+
+
+def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> int:
     """Run the same call again without the refused brains, so that the others get their tables and figures.
 
-    Nothing is run if the call asks for files of a refused brain.
+    Nothing is run if the call asks for files of a refused brain. Return the exit code of an interrupted run, or else 0.
     """
     if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
-        return
+        return 0
     path = directory.absolute() / ".snakemake" / f"gyriflow-refused-{os.getpid()}.json"
     write_json(path, refused)
     # release the locks of the Snakemake run that has just ended
     while _held_locks:
         _held_locks.pop().close()
-    # an interrupted second pass is resumed by the same command
-    with suppress(KeyboardInterrupt):
-        again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
-        environment = os.environ | {REFUSED_FILE_VAR: str(path)}
-        subprocess.run(again, env=environment, stdout=sys.stdout, stderr=sys.stderr, check=False)
-    path.unlink(missing_ok=True)
+    again = [sys.executable, "-m", "gyriflow.running.launch", *arguments]
+    environment = os.environ | {REFUSED_FILE_VAR: str(path)}
+    process = subprocess.Popen(again, env=environment, stdout=sys.stdout, stderr=sys.stderr)
+    try:
+        process.wait()
+    except KeyboardInterrupt:
+        stop_jobs()
+        return process.wait()
+    finally:
+        path.unlink(missing_ok=True)
+    return 0
 
 
 def exit_code(code: int, recorded: int | None, directory: Path) -> int:
@@ -210,15 +243,30 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
     os.environ[EXIT_FILE] = str(exit_file)
 
 
+@contextmanager
+def unwritten_state(directory: Path) -> Iterator[None]:
+    """Let Snakemake read the records of a directory, which may be read-only, and write elsewhere."""
+    from snakemake import workflow
+    from snakemake.persistence.file import FilePersistence
+
+    with TemporaryDirectory() as scratch:
+        for record in (directory / ".snakemake").glob("*"):
+            Path(scratch, record.name).symlink_to(record.resolve())
+        with patch.object(workflow, "FilePersistence", lambda **kw: FilePersistence(**kw | {"path": Path(scratch)})):
+            yield
+
+
 def call_snakemake(arguments: Sequence[str]) -> int:
-    """Run Snakemake in this process; return its exit code, or `INTERRUPTED` after an interrupt.
+    """Run Snakemake in this process; return its exit code, or `SIGNALLED` and the number of the signal that stopped it.
 
     InputError if a target does not exist.
     """
     from snakemake import cli
+    from snakemake.executors.local import Executor
+    from snakemake.scheduling.job_scheduler import JobScheduler
 
     unknown_targets: list[str] = []
-    interrupts: list[int] = []
+    signals: list[int] = []
 
     def is_shown(record: logging.LogRecord) -> bool:
         names = NO_RULE.findall(record.getMessage())
@@ -226,10 +274,22 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         return not names
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        interrupts.append(number)
-        signal.default_int_handler(number, frame)
+        signals.append(number)
+        # a closed terminal sends several
+        if len(signals) == 1 or number == signal.SIGINT:
+            raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, interrupt)
+    def cancel(executor: Any) -> None:
+        stop_jobs()
+        executor.shutdown()
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        # `nohup` has SIGHUP ignored
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, interrupt)
+    # by itself, Snakemake waits for running jobs: at SIGTERM, and unless a signal reaches these too
+    JobScheduler.exit_gracefully = lambda _, number, frame: interrupt(number, frame)
+    Executor.cancel = cancel
     logging.getLogger("snakemake.logging").addFilter(is_shown)
     try:
         cli.main(arguments)
@@ -237,10 +297,10 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
-        return INTERRUPTED
+        code = 1
     if unknown_targets:
         raise unknown_target_error(unknown_targets[0])
-    return INTERRUPTED if code and interrupts else code
+    return SIGNALLED + signals[0] if code and signals else code
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -257,8 +317,10 @@ def main(arguments: Sequence[str]) -> int:
     dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
     if not dry_run:
         clear_stale_lock(directory)
+    runs_nothing = dry_run and not options.nolock
     # in the working directory, where jobs on other machines of a cluster find it too
-    exit_file = directory.absolute() / ".snakemake" / f"gyriflow-exit-{os.getpid()}"
+    folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
+    exit_file = folder / f"gyriflow-exit-{os.getpid()}"
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
     has_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
     complete = [*([] if has_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]
@@ -268,17 +330,19 @@ def main(arguments: Sequence[str]) -> int:
         redirect_output(details)
     began_s = time.time()
     try:
-        code = call_snakemake(complete)
+        with unwritten_state(directory) if runs_nothing else nullcontext():
+            code = call_snakemake(complete)
     finally:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)
-    if code == INTERRUPTED:
+    if code > SIGNALLED:
         print("gyriflow: interrupted; run the same command again to resume", file=sys.stderr)
-        return INTERRUPTED
+        return code
     can_finish = options.keep_going and not dry_run and REFUSED_FILE_VAR not in os.environ
-    if code and can_finish and (brains := failed_brains(directory, began_s)):
-        finish_without(brains, arguments, directory)
-    return exit_code(code, recorded, directory)
+    brains = failed_brains(directory, began_s) if code and can_finish else {}
+    if brains and (interrupted := finish_without(brains, arguments, directory)):
+        return interrupted
+    return (recorded or code) if runs_nothing else exit_code(code, recorded, directory)
 
 
 if __name__ == "__main__":

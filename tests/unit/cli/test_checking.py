@@ -10,6 +10,7 @@ from shapes import hemisphere
 
 from gyriflow.cli import check as checking
 from gyriflow.cli.check import check_study, coarse_cortices, input_problems, plan, work_of
+from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.running.cost import (
@@ -110,6 +111,29 @@ def test_a_look_leaves_nothing_behind(tmp_path):
     ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert not any(character.isdigit() for character in said)
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+
+
+@pytest.mark.fault(76)
+@pytest.mark.parametrize("directory", ["", "/proc/self", "a.yaml/below"])
+def test_a_look_needs_no_folder_to_write_in(tmp_path, directory):
+    config = tmp_path / "a.yaml"
+    config.write_text("brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\n")
+    (tmp_path / ".snakemake").touch()
+    assert plan(config, tmp_path / directory, ["surface"])
+
+
+@pytest.mark.fault(78)
+def test_a_study_is_checked_from_its_working_directory(tmp_path):
+    folder = tmp_path / "l'étude 100% {wk} #1"
+    folder.mkdir()
+    write_label_volume(folder / "l.nii.gz", LabelVolume(np.ones((45, 45, 40), np.int32), 1.7 * np.eye(4)))
+    (folder / "gyriflow.yaml").write_text("brains: [{id: a, week: 38, labels: l.nii.gz, scheme: binary}]\n")
+    lines = list(check_study(folder / "gyriflow.yaml", folder, 1, ["surface"]))
+    assert "to run: 1 step" in [line for line, _ in lines]
+    assert not any(bad for _, bad in lines)
+    # the path of its labels from elsewhere has braces
+    with pytest.raises(InputError, check=Facts("brains[0].labels", folder / "l.nii.gz")):
+        list(check_study(folder / "gyriflow.yaml", tmp_path, 1, ["surface"]))
 
 
 STUDY = {

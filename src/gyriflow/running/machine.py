@@ -1,0 +1,43 @@
+"""Cores and memory that a run may use: those of the machine, within the limits of a container and of a Slurm job."""
+
+import os
+import resource
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+CGROUPS, OWN_CGROUPS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+
+
+def available_cores() -> int:
+    """Return the number of cores that affinity, a container's quota and a Slurm job allow."""
+    import joblib  # takes a third of a second
+
+    per_task = _slurm("CPUS_PER_TASK") * (_slurm("NTASKS") or 1)
+    return min(filter(None, (joblib.cpu_count(), _slurm("CPUS_ON_NODE"), per_task)))
+
+
+def available_memory_mib(cgroups: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
+    """Return the memory (MiB) that the machine, control groups, a Slurm job and the shell's limit allow."""
+    process, _ = resource.getrlimit(resource.RLIMIT_AS)
+    limits = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), *_cgroup_limits(cgroups, own)]
+    limits += [2**20 * _slurm("MEM_PER_NODE"), 2**20 * _slurm("MEM_PER_CPU") * _slurm("CPUS_ON_NODE")]
+    limits += [process] if process != resource.RLIM_INFINITY else []
+    return min(filter(None, limits)) / 2**20
+
+
+def _slurm(name: str) -> int:
+    value = os.environ.get(f"SLURM_{name}", "")
+    return int(value) if value.isdecimal() else 0
+
+
+def _cgroup_limits(cgroups: Path, own: Path) -> Iterator[int]:
+    # version 2 has one tree, version 1 one for each kind of limit; inside a container, its own group is the root
+    groups = [line.split(":", 2) for line in own.read_text().splitlines()] if own.exists() else []
+    for _, controllers, name in groups:
+        group = cgroups / (controllers or ".") / name.lstrip("/")
+        for folder in (group, *group.parents):
+            for limit in ("memory.max", "memory.limit_in_bytes"):
+                # without a limit, version 2 says "max", version 1 a number larger than any memory
+                with suppress(OSError, ValueError):
+                    yield int((folder / limit).read_text())
