@@ -27,18 +27,28 @@ SUMMARY = "results/runs/reference/a/folding/summary.json"
 LOG = "results/runs/reference/a/logs/simulate.log"
 
 
-def started(workflow, until):
-    """Start the folding and return its process when the log has a line with `until`."""
-    process = subprocess.Popen(
-        workflow.command("--cores", "2", SUMMARY, "--configfile", "study.yaml"),
+def launched(workflow, *arguments):
+    return subprocess.Popen(
+        workflow.command("--cores", "2", *arguments),
         cwd=workflow.directory, env=workflow.environment, start_new_session=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        # which a background shell may have ignored
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
     )  # fmt: skip
-    log, deadline = workflow.directory / LOG, time.monotonic() + 90
-    while not (log.exists() and until in log.read_text()):
+
+
+def wait_until(condition, process):
+    deadline = time.monotonic() + 90
+    while not condition():
         assert process.poll() is None, process.communicate()[0]
-        assert time.monotonic() < deadline, "the folding did not begin"
+        assert time.monotonic() < deadline, "the job did not begin"
         time.sleep(0.02)
+
+
+def started(workflow, until):
+    """Start the folding and return its process when the log has a line with `until`."""
+    process, log = launched(workflow, SUMMARY, "--configfile", "study.yaml"), workflow.directory / LOG
+    wait_until(lambda: log.exists() and until in log.read_text(), process)
     return process
 
 
@@ -81,21 +91,11 @@ rule slow:
 
 
 @pytest.mark.fault(79)
-@pytest.mark.parametrize(
-    ("number", "send"), [(signal.SIGTERM, os.kill), (signal.SIGTERM, os.killpg), (signal.SIGHUP, os.kill)]
-)
-def test_a_signal_to_the_launcher_stops_its_jobs(workflow, number, send):
+@pytest.mark.parametrize(("name", "send"), [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)])
+def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     (workflow.directory / "Snakefile").write_text(STUBBORN)
-    process = subprocess.Popen(
-        workflow.command("--cores", "2", "slow.txt"),
-        cwd=workflow.directory, env=workflow.environment, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
-    )  # fmt: skip
-    deadline = time.monotonic() + 60
-    while not (workflow.directory / "begun").exists() or len(below(process.pid)) < 5:
-        assert time.monotonic() < deadline, "the job did not begin"
-        time.sleep(0.1)
+    process, number = launched(workflow, "slow.txt"), signal.Signals[name]
+    wait_until(lambda: (workflow.directory / "begun").exists() and len(below(process.pid)) >= 5, process)
     jobs, sent = below(process.pid), time.monotonic()
     send(process.pid, number)
     printed, _ = process.communicate(timeout=60)
@@ -103,5 +103,5 @@ def test_a_signal_to_the_launcher_stops_its_jobs(workflow, number, send):
     assert process.returncode == 128 + number, printed
     assert printed == Facts("interrupted", "same command", "resume")
     assert "failed" not in printed
-    # what ignores the signal loses its parent before the launcher can list it, if all get the signal at once
+    # if all get the signal at once, what ignores it may have no parent by which the launcher finds it
     assert send is os.killpg or all_end(jobs)

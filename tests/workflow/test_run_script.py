@@ -169,6 +169,15 @@ def test_two_at_once_make_one_environment(outside, tmp_path):
     assert sum("create" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
 
 
+@pytest.mark.fault(75)
+def test_an_environment_is_made_without_locks(outside, tmp_path):
+    (tmp_path / "programs" / "flock").write_text("#!/bin/sh\nexit 71\n")
+    (tmp_path / "programs" / "flock").chmod(0o755)
+    done = run("tool", "1", env=outside)
+    assert done.stdout == "from the environment: 1\n"
+    assert done.stderr == Facts(f"{tmp_path / 'cache'} has no locks")
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -9)])
 def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_path, number, code):
     process = start("tool", "first", env=outside | {"SECONDS_TO_CREATE": OWN})

@@ -87,8 +87,8 @@ def work_of(
 ) -> Iterator[tuple[str, bool]]:
     """Yield lines about the jobs that would run and their needs, each with whether these exceed what is available.
 
-    The study is read from `path` unless given. `further` are arguments for Snakemake. With `show`, it lists every job on
-    the terminal first.
+    The study is read from `path` unless given. `further` are arguments for Snakemake. With `show`, it lists every job
+    on the terminal first.
     """
     jobs = plan(path, directory, further, show=show)
     if not jobs:

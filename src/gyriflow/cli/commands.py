@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
+from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED
 
 LEVELS = ("participant", "group")
@@ -25,19 +26,11 @@ REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 EXISTING_DIR = click.Path(exists=True, file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
-
-
-def _available_cores() -> int:
-    from ..running.machine import available_cores
-
-    return available_cores()
-
-
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
 cores_option = click.option(
-    "-c", "--cores", type=click.IntRange(1), default=_available_cores, show_default="all", help="Cores to use."
+    "-c", "--cores", type=click.IntRange(1), default=available_cores, show_default="all", help="Cores to use."
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")

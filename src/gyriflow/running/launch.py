@@ -46,19 +46,9 @@ MAX_WAIT_S = 3.0
 """Time to wait for a run that is about to end."""
 GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
-SIGNALLED = 128
-"""Added to the number of the signal that stopped a run, in its exit code."""
 SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 READ_ONLY_OPTIONS = (
-    "dryrun",
-    "nolock",
-    "summary",
-    "detailed_summary",
-    "rulegraph",
-    "dag",
-    "filegraph",
-    "list_rules",
-    "lint",
+    *("dryrun", "nolock", "summary", "detailed_summary", "rulegraph", "dag", "filegraph", "list_rules", "lint"),
 )
 """Options with which Snakemake runs nothing and takes no lock."""
 VERBOSE_OPTIONS = (
@@ -113,7 +103,7 @@ def clear_stale_lock(directory: Path) -> None:
             raise StorageError(problem, path=directory.resolve(), remedy=remedy)
         time.sleep(0.2)
     with file:
-        # without locks, those of Snakemake may be of a live run; it tells how to remove them
+        # without locks of files, those of Snakemake may be of a live run
         stale = [] if file.name in UNLOCKABLE else list((directory / ".snakemake" / "locks").glob("*.lock"))
         for lock in stale:
             lock.unlink()
@@ -257,7 +247,7 @@ def unwritten_state(directory: Path) -> Iterator[None]:
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
-    """Run Snakemake in this process; return its exit code, or `SIGNALLED` and the number of the signal that stopped it.
+    """Run Snakemake in this process; return its exit code, or 128 plus the number of the signal that stopped it.
 
     InputError if a target does not exist.
     """
@@ -300,7 +290,7 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         code = 1
     if unknown_targets:
         raise unknown_target_error(unknown_targets[0])
-    return SIGNALLED + signals[0] if code and signals else code
+    return 128 + signals[0] if code and signals else code
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -335,7 +325,7 @@ def main(arguments: Sequence[str]) -> int:
     finally:
         recorded = recorded_exit_code(exit_file)
         exit_file.unlink(missing_ok=True)
-    if code > SIGNALLED:
+    if code > 128:
         print("gyriflow: interrupted; run the same command again to resume", file=sys.stderr)
         return code
     can_finish = options.keep_going and not dry_run and REFUSED_FILE_VAR not in os.environ

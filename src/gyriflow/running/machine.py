@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-CGROUPS, OWN_CGROUPS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
-
 
 def available_cores() -> int:
     """Return the number of cores that affinity, a container's quota and a Slurm job allow."""
@@ -17,7 +15,7 @@ def available_cores() -> int:
     return min(filter(None, (joblib.cpu_count(), _slurm("CPUS_ON_NODE"), per_task)))
 
 
-def available_memory_mib(cgroups: Path = CGROUPS, own: Path = OWN_CGROUPS) -> float:
+def available_memory_mib(cgroups: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> float:
     """Return the memory (MiB) that the machine, control groups, a Slurm job and the shell's limit allow."""
     process, _ = resource.getrlimit(resource.RLIMIT_AS)
     limits = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), *_cgroup_limits(cgroups, own)]
@@ -38,6 +36,6 @@ def _cgroup_limits(cgroups: Path, own: Path) -> Iterator[int]:
         group = cgroups / (controllers or ".") / name.lstrip("/")
         for folder in (group, *group.parents):
             for limit in ("memory.max", "memory.limit_in_bytes"):
-                # without a limit, version 2 says "max", version 1 a number larger than any memory
+                # without a limit: "max" in version 2, a number larger than any memory in version 1
                 with suppress(OSError, ValueError):
                     yield int((folder / limit).read_text())
