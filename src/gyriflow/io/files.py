@@ -1,5 +1,6 @@
 """Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and what a file was."""
 
+import csv
 import gzip
 import hashlib
 import html
@@ -9,7 +10,6 @@ import os
 import re
 import shutil
 import uuid
-import warnings
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -149,23 +149,35 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
         table.to_csv(temporary, index=False, float_format="%.10g")
 
 
-def read_tab_separated(path: AnyPath) -> list[dict[str, str]]:
-    """Return the rows of a tab-separated table with a heading, as texts by column; InputError where it is none."""
-    import pandas as pd  # takes half a second, as h5py does below, which most readers need not wait for
+def read_text_table(path: AnyPath) -> list[dict[str, str]]:
+    """Return the rows of a table with a heading, as texts by column; separated by tabs, semicolons or commas.
 
-    with reading(path, "a tab-separated table", remedy=None):
-        texts: dict[str, Any] = {"sep": "\t", "dtype": str, "keep_default_na": False, "encoding": "utf-8-sig"}
-        table = pd.read_csv(path, **texts)
-        # rows that are longer than the heading have names before it, as R writes them, or tabs at their end
-        if (table.iloc[:, -table.index.nlevels :] == "").all(axis=None) and not isinstance(table.index, pd.RangeIndex):
-            with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):
-                table = pd.read_csv(path, **texts, index_col=False)
-    rows = [{str(name).strip(): value.strip() for name, value in row.items()} for row in table.to_dict("records")]
-    for number, row in enumerate(rows, start=2):
-        for name, value in row.items():
+    InputError where it is none, or where a column occurs twice with different values.
+    """
+    with reading(path, "a table of text", remedy=None):
+        text = Path(path).read_text(encoding="utf-8-sig")
+        separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
+        lines = csv.reader(text.splitlines(keepends=True), delimiter=separator)
+        head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]
+    # names of the rows without a heading, as R writes them
+    named = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)
+    rows = []
+    for number, cells in enumerate((cells[named:] for cells in body), start=2):
+        if any(cells[len(head) :]):
+            found, expected = f"{len(cells)} cells in row {number}", f"{len(head)}, as in the heading"
+            raise InputError("has a row that is longer than its heading", path=path, found=found, expected=expected)
+        row: dict[str, str] = {}
+        # each of a heading that occurs twice
+        spelled: dict[str, str] = {}
+        for name, value in zip(head, [*cells, *[""] * len(head)], strict=False):
             if not value.isprintable():
                 problem = f"has a line break or another character that is not printed in row {number}, {name}"
                 raise InputError(problem, path=path, found=repr(value), expected="one line of text in each cell")
+            first = spelled.setdefault(name.lower(), name)
+            if row.setdefault(first, value) != value:
+                found = f"{row[first]} and {value} in row {number}"
+                raise InputError(f"has two columns {name}", path=path, found=found, expected="one value")
+        rows.append(row)
     if not rows:
         raise InputError("has no rows", path=path, expected="a heading and a row for each brain")
     return rows
@@ -263,7 +275,8 @@ def files_below(folder: AnyPath) -> list[Path]:
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
-        files = [here / name for name in names if (here / name).is_file() or absent_content(here / name)]
-        found += files if real not in entered else []
+        # links whose target is missing are named when they are read
+        files = (here / name for name in names if real not in entered)
+        found += [file for file in files if file.is_file() or not file.exists()]
         entered.add(real)
     return sorted(found)

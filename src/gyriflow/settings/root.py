@@ -44,6 +44,7 @@ class Config(Settings):
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
+    _age_sources: dict[str, str] = PrivateAttr(default_factory=dict)
 
     @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])
     @classmethod
@@ -61,6 +62,11 @@ class Config(Settings):
     def left_out(self) -> dict[str, dict[str, Any]]:
         """The rows of `participants` that can't be used, by id: their week, if it is known, and the cause."""
         return self._left_out
+
+    @property
+    def age_sources(self) -> dict[str, str]:
+        """The table and column of the ages of brains from `participants`, by id."""
+        return self._age_sources
 
     @property
     def measured_only(self) -> "Config":

@@ -1,6 +1,7 @@
 """Validation of a configuration from plain dictionaries, with all problems reported together."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     atlases, problems = _atlases(plain.get("atlas"), folder)
     # None: the ids of brains are incomplete, so checks skip them
     plain["atlas"] = None if problems else [used.settings for used in atlases]
-    entries, left_out = _participants(plain.get("participants"), folder, problems)
+    entries, left_out, sources = _participants(plain.get("participants"), folder, problems)
     if further := [*(entry for used in atlases for entry in atlas_brains(used)), *entries]:
         plain["brains"] = [*(plain.get("brains") or ()), *further]
     if not (keep_going and plain.get("brains")):
@@ -65,6 +66,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
         problems += _lines([(problem.key, problem.text) for problem in problems_between(config)])
     if not problems:
         config.left_out.update(left_out)
+        config.age_sources.update(sources)
         return config
     if left_out and not keep_going:
         hints.append("use --keep-going to leave out rows that cannot be used")
@@ -74,19 +76,15 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
 
 def _participants(
     section: Any, folder: Path, problems: list[str]
-) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
-    if section is None:
-        return [], {}
-    try:
-        entries, left_out, wrong = participants_brains(ParticipantsSettings.model_validate(section), folder)
-    except ValidationError:
-        # reported with all other keys
-        return [], {}
-    except InputError as error:
-        problems.append(f"participants.file: {error}")
-        return [], {}
-    problems += wrong
-    return entries, left_out
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], dict[str, str]]:
+    # an invalid section is reported with all other keys
+    with suppress(ValidationError):
+        if section is not None:
+            try:
+                return participants_brains(ParticipantsSettings.model_validate(section), folder)
+            except InputError as error:
+                problems.append(f"participants.file: {error}")
+    return [], {}, {}
 
 
 def _plain(value: Any) -> Any:

@@ -1,131 +1,232 @@
-"""Tables of participants and their sessions in the format of BIDS."""
+"""Tables of participants and their sessions in the format of BIDS, and the facts that they give about a scan."""
 
 import difflib
+import os
 import re
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..formats import is_volume
-from ..io.files import read_json, read_tab_separated
+from ..io.files import read_json, read_text_table
 from ..settings.base import located, path_in
 from ..settings.brains import SOURCES
-from ..settings.participants import ParticipantsSettings
-from ..settings.varying import WEEK_RANGE
+from ..settings.participants import ParticipantsSettings, WeekNotation
+from .ages import (
+    EXPECTED_AGE,
+    EXPECTED_COLUMNS,
+    MISSING_VALUES,
+    AgeColumn,
+    GivenAge,
+    ScanAge,
+    age_columns,
+    choose_age,
+    column_key,
+    may_be_days,
+)
 
 IDS = ("participant_id", "id")
 """Possible names of the column of participants."""
-SESSION = "session_id"
-AGE = "age"
-UNIT_OF_AGE = {
-    **dict.fromkeys(("gestational_age", "week", "gestational_age_weeks", "age_weeks"), "weeks"),
-    **dict.fromkeys(("gestational_age_days", "age_days"), "days"),
-}
-"""Possible names of the column of gestational age, and units; `age` needs a unit in the table's sidecar."""
-UNITS = ("weeks", "days")
-MISSING_VALUES = frozenset(("", "n/a"))
-"""Missing values in BIDS."""
-SUBJECT_NAME = re.compile(r"sub-[A-Za-z0-9]{1,100}")
-WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d)")
-NUMBER = re.compile(r"\d+(?:\.\d+)?")
+SESSIONS = ("session_id", "session", "ses", "visit", "visit_id", "session_label")
+"""Possible names of the column of sessions; the first one of a table counts."""
+SUBJECT_FOLDER = re.compile(r"sub-[A-Za-z0-9]+")
+TABLE_NAME = re.compile(r"participants\.(tsv|csv)|(?:(sub-[A-Za-z0-9]+)_)?sessions\.(tsv|csv)", re.IGNORECASE)
+POSTNATAL = re.compile(r"birth|natal|chronolog|correct|concept|pna", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Scan:
-    """A row of a table of participants, or of one of their sessions.
+class Row:
+    """A row of a table: its place for messages, subject and session without `sub-` and `ses-`, and texts by column."""
 
-    The subject is the participant; the session is None if the row has none. The week is None if the age cannot be used;
-    `cause` gives the reason. Values are the row's texts by column; the age was read from the column `age_column`.
-    """
-
-    id: str
-    subject: str
+    place: str
+    name: str
     session: str | None
-    week: float | None
-    cause: str
     values: Mapping[str, str]
-    age_column: str
+
+    @property
+    def subject(self) -> str:
+        return self.name.removeprefix("sub-")
 
 
 @dataclass(frozen=True)
-class _Table:
-    path: Path
-    rows: list[dict[str, str]]
-    column: str
-    unit: str
+class Table:
+    """A table of participants or sessions.
 
-
-def read_scans(path: Path, further: Mapping[str, str] | None = None) -> list[Scan]:
-    """Return the scans of a participants.tsv, and of its participants' sessions, `sub-01/sub-01_sessions.tsv`.
-
-    A participant with sessions has a scan for each, whose id is `sub-01_ses-1`. `further` are values for all rows;
-    `{id}`, `{subject}` and `{session}` in them are replaced by the row's. InputError if a table cannot be read, or has
-    no column of ids or gestational ages.
+    It holds for the files in the folder `scope`, with a `subject` for those of the subject only. A table that cannot be
+    read has a `problem`.
     """
-    table = _read(path)
-    ids = next((name for name in IDS if name in table.rows[0]), None)
-    if ids is None:
-        raise _lacks(table, "ids", IDS)
-    scans = []
-    for row in table.rows:
-        name, place = row[ids], path.parent / row[ids]
-        file = place / f"{name}_sessions.tsv"
-        # other names could be paths out of the folder
-        sessions = _read(file) if SUBJECT_NAME.fullmatch(name) and file.is_file() else None
-        # a table of sessions without ages does not help
-        ages = sessions if sessions is not None and sessions.column else table
-        if not ages.column:
-            raise _lacks(ages, "gestational ages", (*UNIT_OF_AGE, f"{AGE} with Units in {path.stem}.json"))
-        for session in ages.rows if ages is sessions else [row]:
-            scans.append(_scan(name, dict(further or {}) | row | session, ages, further or {}))
-    return scans
+
+    path: Path
+    scope: Path
+    subject: str | None
+    rows: Sequence[Row] = ()
+    columns: Sequence[str] = ()
+    ages: Sequence[AgeColumn] = ()
+    problem: str = ""
+
+    def ages_in(self, row: Row) -> Iterator[GivenAge]:
+        """Yield the ages that one of its rows gives."""
+        kind = next((name for name in self.columns if column_key(name) == "age_type"), "")
+        postnatal = POSTNATAL.search(row.values.get(kind, ""))
+        for column in self.ages:
+            if postnatal and column_key(column.name).startswith("age"):
+                problem = f"is not a gestational age: {kind} is {row.values[kind]}"
+                column = replace(column, problem=problem)
+            yield GivenAge(row.place, column, row.values[column.name], row.session is not None)
+
+    @property
+    def no_ages(self) -> str:
+        """Why its columns give no age, or ""."""
+        if not self.ages:
+            expected = f"{EXPECTED_COLUMNS} {self.path.stem}.json"
+            return f"has no column of gestational ages; found {', '.join(self.columns)}; expected {expected}"
+        problems = [f"{column.name}: {column.problem}" for column in self.ages if column.problem]
+        columns = f"found the columns {', '.join(self.columns)}; instead, name the age gestational_age or scan_age"
+        return f"{problems[0]}; {columns}" if len(problems) == len(self.ages) else ""
 
 
-def _scan(name: str, values: dict[str, str], table: _Table, further: Mapping[str, str]) -> Scan:
-    label = values.get(SESSION, "n/a")
-    session = None if label in MISSING_VALUES else label if label.startswith("ses-") else f"ses-{label}"
-    own_id = f"{name}_{session}" if session else name
-    for key, text in further.items():
-        if values[key] == text:
-            values[key] = text.replace("{id}", own_id).replace("{subject}", name).replace("{session}", session or label)
-    week, cause = read_week(values.get(table.column, ""), table.unit)
-    cause = cause and f"{table.column}: {cause}"
-    return Scan(own_id, name, session, week, cause, values, table.column)
+@dataclass(frozen=True)
+class ScanFacts:
+    """What tables say of a scan: its age, and its values by column."""
+
+    age: ScanAge
+    values: Mapping[str, str]
 
 
-def read_week(text: str, unit: str = "weeks") -> tuple[float | None, str]:
-    """Return a gestational age in weeks, rounded to the two decimals of file names, and the problem with it, or ''."""
-    if whole := WEEKS_AND_DAYS.fullmatch(text):
-        week = int(whole[1]) + int(whole[2] or whole[3]) / 7
-    elif NUMBER.fullmatch(text):
-        week = float(text) / (7 if unit == "days" else 1)
-    else:
-        return None, f"found {text or 'n/a'}; expected the gestational age in weeks, such as 24.3, 24+2 or 24w2d"
-    if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
-        return None, f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
-    return round(week, 2), ""
+def read_table_of_scans(path: Path) -> Table:
+    """Return a table of participants or sessions; InputError if it cannot be read or has no ids.
+
+    A table in a folder `sub-…` holds for the folder around it, another one for its own.
+    """
+    empty = _empty_table(path)
+    texts = read_text_table(path)
+    columns = list(texts[0])
+    names = {column_key(name): name for name in columns}
+    ids = next((names[key] for key in IDS if key in names), None)
+    if ids is None and empty.subject is None:
+        expected = " or ".join(IDS)
+        raise InputError("has no column of ids", path=path, found=", ".join(columns), expected=expected)
+    session = next((names[key] for key in SESSIONS if key in names), None)
+    rows = []
+    for number, values in enumerate(texts, start=2):
+        label = values[session] if session is not None else ""
+        rows.append(
+            Row(
+                f"{path.name} row {number}",
+                values[ids] if ids is not None else empty.subject or "",
+                None if label in MISSING_VALUES else label.removeprefix("ses-"),
+                {name: text for name, text in values.items() if name not in (ids, session)},
+            )
+        )
+    ages = age_columns(columns, _sidecar(path), f"{path.stem}.json")
+    return replace(empty, rows=rows, columns=columns, ages=ages)
 
 
-def _read(path: Path) -> _Table:
-    rows = read_tab_separated(path)
-    units = {name: unit for name, unit in UNIT_OF_AGE.items() if name in rows[0]}
-    places = (path.with_suffix(".json"), path.parents[1] / f"{path.stem.rpartition('_')[2]}.json")
-    sidecar: Any = next((read_json(place) for place in places if place.is_file()), {})
-    for name in (*units, *(name for name in (AGE,) if name in rows[0])):
-        described = sidecar.get(name) if isinstance(sidecar, dict) else None
-        unit = str(described.get("Units", "")).lower() if isinstance(described, dict) else ""
-        if unit in UNITS:
-            units[name] = unit
-    column = next(iter(units), "")
-    return _Table(path, rows, column, units.get(column, ""))
+def _empty_table(path: Path) -> Table:
+    named, folder = TABLE_NAME.fullmatch(path.name), SUBJECT_FOLDER.fullmatch(path.parent.name)
+    subject = named[2] if named and named[2] else folder[0] if folder else None
+    scope = path.parent.parent if folder else path.parent
+    return Table(path, scope, subject.removeprefix("sub-") if subject else None)
 
 
-def _lacks(table: _Table, what: str, names: Sequence[str]) -> InputError:
-    columns, expected = ", ".join(table.rows[0]), " or ".join(names)
-    return InputError(f"has no column of {what}", path=table.path, found=columns, expected=expected)
+def _sidecar(path: Path) -> Any:
+    name = path.stem.rpartition("_")[2] + ".json"
+    places = (path.with_suffix(".json"), path.parent / name, path.parent.parent / name)
+    return next((read_json(place) for place in places if os.path.lexists(place)), {})
+
+
+class ScanTables:
+    """The tables of participants and sessions of a data set; `notation` is that of ages such as 24.3, if known."""
+
+    def __init__(self, paths: Iterable[Path], notation: WeekNotation | None = None) -> None:
+        self.tables: list[Table] = []
+        self.notation = notation
+        for path in paths:
+            try:
+                self.tables.append(read_table_of_scans(path))
+            except InputError as error:
+                self.tables.append(replace(_empty_table(path), problem=str(error)))
+
+    @cached_property
+    def ambiguity(self) -> str:
+        """The problem that all ages may be decimals or weeks and days, or ""."""
+        ages = [age for table in self.tables for row in table.rows for age in table.ages_in(row)]
+        kinds = {age.column.kind for age in ages}
+        first = "scan" if "scan" in kinds else "gestational" if "gestational" in kinds else "age"
+        texts = [age.text for age in ages if age.column.kind == first and age.column.unit == "weeks"]
+        if self.notation is None and (examples := may_be_days(texts)):
+            choice = "--decimal-weeks or --weeks-days (in a configuration, participants.ages: decimal or days)"
+            return f"ages such as {', '.join(examples)} may be decimals, or weeks and days; choose {choice}"
+        return ""
+
+    def rows_of(self, subject: str, place: Path | None = None) -> list[tuple[Table, Row]]:
+        """Return the rows of a subject in the tables that hold for a place (default: in all), with their tables."""
+        tables = [table for table in self.tables if place is None or place.is_relative_to(table.scope)]
+        return [(table, row) for table in tables for row in table.rows if row.subject == subject]
+
+    def facts(
+        self, subject: str, session: str | None, is_only_scan: bool = True, place: Path | None = None
+    ) -> ScanFacts | None:
+        """Return what the tables that hold for a place say of a scan, or None if they have no row of its subject.
+
+        A row without a session is of a subject's only scan.
+        """
+        own = self.rows_of(subject, place)
+        torn = [
+            table.problem
+            for table in self.tables
+            if table.problem
+            and table.subject in (None, subject)
+            and (place is None or place.is_relative_to(table.scope))
+        ]
+        if not own and not torn:
+            return None
+        sessions = list(dict.fromkeys(row.session for _, row in own if row.session is not None))
+        if session is None and len(sessions) == 1 and is_only_scan:
+            (session,) = sessions
+        elif session is None and sessions:
+            rows = ", ".join(f"{row.place} ({row.session})" for _, row in own if row.session is not None)
+            cause = f"its name has no session; found {rows}; expected ses-… in the name, as in session_id"
+            return ScanFacts(ScanAge(None, cause=cause), {})
+        exact = [(table, row) for table, row in own if session is not None and row.session == session]
+        general = [(table, row) for table, row in own if row.session is None]
+        for table in self.tables:
+            for rows in (exact, general):
+                if difference := _difference([row for other, row in rows if other is table]):
+                    return ScanFacts(ScanAge(None, cause=difference), {})
+        given = [age for table, row in exact for age in table.ages_in(row)]
+        of_subject = [age for table, row in general for age in table.ages_in(row)]
+        is_only_scan &= len({*sessions, session} - {None}) < 2
+        age = choose_age([*given, *(of_subject if is_only_scan else ())], self.notation)
+        if torn and not (given and age.week is not None):
+            # it may have the age of exactly this scan
+            age = ScanAge(None, cause=torn[0])
+        elif age.week is None and not age.cause:
+            age = ScanAge(None, cause=_missing_age(own, [*given, *of_subject], session, sessions))
+        elif age.week is not None and self.ambiguity:
+            age = ScanAge(None, cause=self.ambiguity)
+        values = {key: text for _, row in (*general, *exact) for key, text in row.values.items()}
+        return ScanFacts(age, {key: text for key, text in values.items() if key not in age.columns})
+
+
+def _missing_age(
+    own: Sequence[tuple[Table, Row]], ages: Sequence[GivenAge], session: str | None, sessions: Sequence[str]
+) -> str:
+    table = own[0][0]
+    named = [age for age in ages if age.text not in MISSING_VALUES]
+    if session is not None and sessions and session not in sessions:
+        found = ", ".join(f"{row.session} ({row.place})" for _, row in own if row.session is not None)
+        return f"no row of its session; found {found}; expected {session}"
+    if named:
+        found = f"{named[0].column.name} {named[0].text} ({named[0].place})"
+        expected = f"a row with session_id {session}" if session is not None else "a row for each, with session_id"
+        return f"one age is given for several sessions; found {found}; expected {expected}"
+    if ages:
+        return f"{ages[0].column.name}: found n/a; expected {EXPECTED_AGE} ({ages[0].place})"
+    return f"{table.path}: {table.no_ages}"
 
 
 # brains of a configuration
@@ -136,51 +237,86 @@ BRAIN_KEYS = (*PATHS, "population", "subject", "scheme", "affine_from", "coordin
 """All columns that are keys of brains, except ids and age."""
 FILES, SIDE = "files", "side"
 """Columns of files of any source, and of their hemisphere."""
-FIELDS = {*IDS, SESSION, *UNIT_OF_AGE, AGE, FILES, SIDE, *BRAIN_KEYS}
+KNOWN_COLUMNS = (*IDS, *SESSIONS, "gestational_age", "scan_age", "week", "age", FILES, SIDE, *BRAIN_KEYS)
 MIN_SIMILARITY = 0.85
 """Minimum similarity of an unknown column to a known one to be reported as mistyped."""
 
 
 def participants_brains(
     settings: ParticipantsSettings, folder: Path
-) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], list[str]]:
-    """Return the entries of `brains` made from a table, the rows that cannot be used by id, and problems.
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]], dict[str, str]]:
+    """Return the entries of `brains` made from a table, the rows that cannot be used by id, and the sources of ages.
 
-    Each unusable row has `week`, its age if it is known, and `cause`, the reason. A problem is an unusable row with the
-    id of another row. `folder` is the configuration's. InputError if the table cannot be read or lacks a column that
-    every row needs.
+    Each unusable row has `week`, its age if it is known, and `cause`, the reason. `folder` is the configuration's.
+    InputError if the table cannot be read or lacks a column that every row needs.
     """
     path = located(folder, settings.file)
-    scans = read_scans(path, settings.columns)
-    for column in scans[0].values:
-        if column not in FIELDS and (near := difflib.get_close_matches(column, FIELDS, n=1, cutoff=MIN_SIMILARITY)):
+    table = read_table_of_scans(path)
+    for column in table.columns:
+        near = difflib.get_close_matches(column, KNOWN_COLUMNS, n=1, cutoff=MIN_SIMILARITY)
+        if near and column_key(column) not in KNOWN_COLUMNS and column not in {age.name for age in table.ages}:
             raise InputError("has a column whose name seems mistyped", path=path, found=column, expected=near[0])
-    counts = Counter(scan.id for scan in scans)
+    tables = ScanTables([path, *_session_tables(table)], settings.ages)
+    if all(each.no_ages for each in tables.tables):
+        raise InputError(table.no_ages, path=path)
+    if tables.ambiguity:
+        raise InputError(tables.ambiguity, path=path)
     entries: list[dict[str, Any]] = []
     left_out: dict[str, dict[str, Any]] = {}
-    problems: list[str] = []
-    for scan in scans:
-        entry, problem = _entry(scan, path.parent)
-        text = f"{path}: {scan.id}: {scan.cause or problem}"
-        if not (scan.cause or problem):
-            entries.append(entry)
-        elif counts[scan.id] > 1 and scan.id not in MISSING_VALUES:
-            problems.append(f"{text} ({counts[scan.id]} rows have this id; ids must be unique)")
-        else:
-            left_out[scan.id] = {"week": scan.week, "cause": text}
-    return entries, left_out, problems
+    sources: dict[str, str] = {}
+    for name in dict.fromkeys(row.name for row in table.rows):
+        subject = name.removeprefix("sub-")
+        named = dict.fromkeys(row.session for _, row in tables.rows_of(subject) if row.session is not None)
+        for session in named or [None]:
+            scan = name if session is None else f"{name}_ses-{session}"
+            facts = tables.facts(subject, session, len(named) < 2)
+            assert facts is not None
+            entry, problem = _entry(scan, name, session, facts, settings.columns, path.parent)
+            if problem := facts.age.cause or problem:
+                left_out[scan] = {"week": facts.age.week, "cause": f"{path}: {scan}: {problem}"}
+            else:
+                entries.append(entry)
+                sources[scan] = facts.age.source
+    return entries, left_out, sources
 
 
-def covariates(scan: Scan) -> dict[str, dict[str, str]]:
-    """Return the key `covariates` of a scan's brain: the columns of its table without another meaning."""
-    keys = {*IDS, SESSION, FILES, SIDE, *BRAIN_KEYS, scan.age_column}
-    values = {key: value for key, value in scan.values.items() if key not in keys and value not in MISSING_VALUES}
+def _session_tables(table: Table) -> Iterator[Path]:
+    folder = table.path.parent
+    names = (f"{name}/{name}_sessions.tsv" for name in dict.fromkeys(row.name for row in table.rows))
+    # other names could be paths out of the folder
+    for name in ("sessions.tsv", *(name for name in names if SUBJECT_FOLDER.match(name))):
+        if os.path.lexists(folder / name):
+            yield folder / name
+
+
+def _difference(rows: Sequence[Row]) -> str:
+    """Return how several rows of one scan differ, or ""."""
+    for row in rows[1:]:
+        for column, text in row.values.items():
+            if text != rows[0].values[column]:
+                values = f"{column} {rows[0].values[column]} ({rows[0].place}) and {text} ({row.place})"
+                return f"several rows have this id; found {values}; expected one row for each scan, with its session_id"
+    return ""
+
+
+def covariates(facts: ScanFacts) -> dict[str, dict[str, str]]:
+    """Return the key `covariates` of a scan's brain: the columns of its tables without another meaning."""
+    keys = {FILES, SIDE, *BRAIN_KEYS}
+    values = {key: text for key, text in facts.values.items() if key not in keys and text not in MISSING_VALUES}
     return {"covariates": values} if values else {}
 
 
-def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
-    values = {key: value for key, value in scan.values.items() if value not in MISSING_VALUES}
-    entry: dict[str, Any] = {"id": scan.id, "week": scan.week, "subject": scan.subject} | covariates(scan)
+def _entry(
+    scan: str, name: str, session: str | None, facts: ScanFacts, columns: Mapping[str, str], folder: Path
+) -> tuple[dict[str, Any], str]:
+    names = {"id": scan, "subject": name, "session": f"ses-{session}" if session else "n/a"}
+    texts = dict(facts.values)
+    for key, text in columns.items():
+        if key not in texts:
+            texts[key] = re.sub(r"\{(id|subject|session)\}", lambda match: names[match[1]], text)
+    values = {key: value for key, value in texts.items() if value not in MISSING_VALUES}
+    entry: dict[str, Any] = {"id": scan, "week": facts.age.week, "subject": name}
+    entry |= covariates(replace(facts, values=values))
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)
         most, expected = (2, "at most a left and a right hemisphere") if side is None else (1, "the file of this side")
@@ -193,7 +329,7 @@ def _entry(scan: Scan, folder: Path) -> tuple[dict[str, Any], str]:
         value: Any = values[column]
         if column in PATHS:
             parts = value.split(";") if column == "white" else [value]
-            places = [path_in(folder, part.strip()).resolve() for part in parts]
+            places = [path_in(folder, part.strip()).absolute() for part in parts]
             if lost := [place for place in places if not place.is_file()]:
                 return {}, f"{column}: no such file: {lost[0]}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))

@@ -13,7 +13,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
-from gyriflow.io.files import atomic_write, contents, files_below, read_json, read_tab_separated, write_json
+from gyriflow.io.files import atomic_write, contents, files_below, read_json, read_text_table, write_json
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
@@ -81,7 +81,7 @@ def test_json_unwraps_numpy_and_has_no_nan(tmp_path):
 def test_cells_stay_below_their_heading(tmp_path, rows):
     path = tmp_path / "participants.tsv"
     path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
-    assert read_tab_separated(path) == [{"id": "s1", "age": "24", "file": "a"}, {"id": "s2", "age": "25", "file": "b"}]
+    assert read_text_table(path) == [{"id": "s1", "age": "24", "file": "a"}, {"id": "s2", "age": "25", "file": "b"}]
 
 
 def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):

@@ -18,7 +18,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.files import read_json, read_tab_separated, read_table
+from gyriflow.io.files import read_json, read_text_table, read_table
 from gyriflow.io.surfaces import (
     read_surface,
     read_vertex_labels,
@@ -80,7 +80,7 @@ def wholes(tmp_path_factory):
         ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.vtk", read_surface, 200),
         ("a.vtp", read_surface, 1000), ("a.label.gii", read_vertex_labels, 800),
         ("a.shape.gii", read_vertex_maps, 800), ("a.h5", read_maps, 200), ("a.json", read_json, None),
-        ("participants.tsv", read_tab_separated, None), ("participants.tsv", read_table, None),
+        ("participants.tsv", read_text_table, None), ("participants.tsv", read_table, None),
         ("study.yaml", read_yaml, None),
     ],
 )  # fmt: skip
@@ -94,7 +94,7 @@ def test_damaged_files_give_something_sound_or_are_refused(tmp_path, wholes, nam
         assert 0 <= found.faces.min() <= found.faces.max() < len(found.vertices)
     elif isinstance(found, LabelVolume | ScalarVolume):
         assert abs(np.linalg.det(found.affine)) > 0
-    elif read is read_tab_separated and found is not None:
+    elif read is read_text_table and found is not None:
         assert all(isinstance(value, str) for row in found for value in row.values())
 
 

@@ -1,0 +1,194 @@
+"""Gestational ages of scans: the columns that give them, their units, and ages written in cells and file names."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ..settings.participants import WeekNotation
+from ..settings.varying import WEEK_RANGE
+
+MISSING_VALUES = frozenset(("", "n/a"))
+"""Missing values in BIDS."""
+UNITS = {
+    **dict.fromkeys(("weeks", "week", "wks", "wk", "w", "gw", "gestational weeks"), "weeks"),
+    **dict.fromkeys(("days", "day", "d"), "days"),
+}
+UNIT_ENDING = re.compile(r"(?<=[a-z])_(?:in_)?(weeks?|wks?|w|days?|d|months?|mo|years?|yrs?|y)$")
+_AGE = r"(?:age|ga|pma|gestational_age|post_?menstrual_age)"
+_SCAN = r"(?:scan|mri|mr|imaging|acquisition|session|visit|exam)"
+AT_SCAN = re.compile(rf"{_SCAN}_{_AGE}|{_AGE}_(?:at_)?{_SCAN}|pma|post_?menstrual_age")
+GESTATIONAL = re.compile(r"gestational_age|gest_age|gestation|ga|gw|weeks?|gestational_weeks?")
+OTHER_AGE = re.compile(
+    r".*(birth|delivery).*|(post_?natal|chronological|corrected|(?:post_?)?concept\w*)(?:_age)?|pna|pca"
+)
+"""Ages that are not gestational ages at the scan."""
+OTHER_REFERENCE = re.compile(r"birth|deliver|born|natal|chronolog|correct|concept", re.IGNORECASE)
+EXPECTED_COLUMNS = "scan_age, gestational_age, ga, pma or week, or age with Units weeks or days in"
+EXPECTED_AGE = "the gestational age in weeks, such as 24.3, 24+2 or 24w2d"
+WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d?)")
+NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
+TENTHS = re.compile(r"\d{2}[.,]([0-9])")
+MIN_AMBIGUOUS_AGES = 3
+"""With fewer ages in tenths of a week, digits from 0 to 6 only are no sign of days."""
+MAX_DIFFERENCE_WEEKS = 0.1
+"""Two ages of a scan agree if they differ by rounding."""
+WEEK_NAME = re.compile(
+    r"(?<![A-Za-z])(?:weeks?|wk|ga|gw)[-_]?(?P<age>\d{2}(?:\.\d+|\+[0-6]|w[0-6]d)?)(?!\d)(?P<more>\w*(?:[+-]\w+)*)",
+    re.IGNORECASE,
+)
+AMBIGUOUS_ENDING = re.compile(r"[_+-]?[wdp]?\d+[dw]?(?![A-Za-z0-9])|[+-]\d", re.IGNORECASE)
+"""What may follow the weeks in a name and be days, a decimal or another week."""
+
+
+@dataclass(frozen=True)
+class AgeColumn:
+    """A column of ages, `scan` at the scan, `gestational` or plain `age`, with its unit and why it cannot be used."""
+
+    name: str
+    kind: Literal["scan", "gestational", "age"]
+    unit: str
+    problem: str
+
+
+@dataclass(frozen=True)
+class GivenAge:
+    """An age that a place gives: table and row, the column, and the text of the cell."""
+
+    place: str
+    column: AgeColumn
+    text: str
+    of_session: bool
+
+
+@dataclass(frozen=True)
+class ScanAge:
+    """The age of a scan in weeks, None if unknown, with where it is from or the cause, and the columns it is from."""
+
+    week: float | None
+    source: str = ""
+    cause: str = ""
+    columns: frozenset[str] = frozenset()
+
+
+def column_key(name: str) -> str:
+    """Return the name of a column in lower case, with _ between its words."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+
+
+def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[AgeColumn]:
+    """Return the columns with ages of scans; `sidecar` is the content of the table's JSON file.
+
+    Ages at birth and ages since birth or conception are not ages of scans: they have a problem if they are named like
+    one, and otherwise are not returned.
+    """
+    described = {column_key(str(key)): value for key, value in sidecar.items()} if isinstance(sidecar, dict) else {}
+    columns = []
+    for name in names:
+        key = column_key(name)
+        ending = UNIT_ENDING.search(key)
+        base = key[: ending.start()] if ending else key
+        if OTHER_AGE.fullmatch(base):
+            continue
+        kind: Literal["scan", "gestational", "age"] | None = None
+        if AT_SCAN.fullmatch(base):
+            kind = "scan"
+        elif GESTATIONAL.fullmatch(base) or (base == "age" and ending):
+            kind = "gestational"
+        elif base == "age":
+            kind = "age"
+        if kind:
+            facts = described.get(key)
+            unit, problem = _unit(
+                kind, ending[1] if ending else "", facts if isinstance(facts, dict) else {}, sidecar_name
+            )
+            columns.append(AgeColumn(name, kind, unit, problem))
+    return columns
+
+
+def _unit(kind: str, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str]:
+    unit = str(described.get("Units", "")).strip().lower()
+    named = [text for text in (ending, unit) if text]
+    units = {UNITS.get(text) for text in named} or {None if kind == "age" else "weeks"}
+    text = " ".join(str(described.get(key, "")) for key in ("LongName", "Description"))
+    reference = str(described.get("AgeReference", "")) or ("" if re.search("scan|MRI|imaging", text) else text)
+    if len(units) > 1 or None in units:
+        found = f"found the unit {' and '.join(named)}" if named else "has no unit"
+        return "weeks", f"{found}; expected Units weeks or days in {sidecar_name}"
+    if OTHER_REFERENCE.search(reference):
+        return "weeks", f"is not a gestational age at the scan: {sidecar_name} says {reference.strip()!r}"
+    return str(units.pop()), ""
+
+
+def choose_age(given: Sequence[GivenAge], notation: WeekNotation | None) -> ScanAge:
+    """Return the age of a scan from all places that name it.
+
+    Ages named as at the scan come first, since a gestational age beside them is the one at birth; then those of the
+    scan's own session. Without a value, or with two that differ, there is none, and a cause.
+    """
+    given = [age for age in given if age.text not in MISSING_VALUES]
+    if not given:
+        return ScanAge(None)
+    kind = next(kind for kind in ("scan", "gestational", "age") if any(age.column.kind == kind for age in given))
+    chosen = [age for age in given if age.column.kind == kind]
+    if kind != "scan" and any(age.of_session for age in chosen):
+        chosen = [age for age in chosen if age.of_session]
+    weeks = []
+    for age in chosen:
+        week, problem = read_week(age.text, age.column.unit, notation)
+        if problem := age.column.problem or problem:
+            return ScanAge(None, cause=f"{age.column.name}: {problem} ({age.place})")
+        weeks.append(week or 0.0)
+    if max(weeks) - min(weeks) > MAX_DIFFERENCE_WEEKS:
+        values = " and ".join(f"{age.text} ({age.place}, {age.column.name})" for age in chosen)
+        remedy = " Give each scan a row with its session_id." if len({age.place for age in chosen}) > 1 else ""
+        return ScanAge(None, cause=f"found two ages, {values}; expected one.{remedy}")
+    unused = [f"{age.column.name} {age.text}" for age in given if age.column.kind == "gestational" and kind == "scan"]
+    source = f"{chosen[0].place.partition(' row')[0]}, {chosen[0].column.name}"
+    source += f" ({', '.join(dict.fromkeys(unused))} is at birth)" if unused else ""
+    return ScanAge(weeks[0], source, columns=frozenset(age.column.name for age in chosen))
+
+
+def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = None) -> tuple[float | None, str]:
+    """Return a gestational age in weeks, rounded to the two decimals of file names, and the problem with it, or ''.
+
+    `notation` says whether 24.3 is a decimal (default) or three days after 24 weeks.
+    """
+    tenths = TENTHS.fullmatch(text)
+    if whole := WEEKS_AND_DAYS.fullmatch(text):
+        week = int(whole[1]) + int(whole[2] or whole[3]) / 7
+    elif notation == "days" and unit == "weeks" and NUMBER.fullmatch(text) and not text.isdigit():
+        if tenths is None or int(tenths[1]) > 6:
+            return None, f"found {text}; expected weeks and 0 to 6 days, such as 24.3"
+        week = int(text[:2]) + int(tenths[1]) / 7
+    elif NUMBER.fullmatch(text):
+        week = float(text.replace(",", ".")) / (7 if unit == "days" else 1)
+    else:
+        return None, f"found {text or 'n/a'}; expected {EXPECTED_AGE}"
+    if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
+        return None, f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
+    return round(week, 2), ""
+
+
+def may_be_days(texts: Iterable[str]) -> list[str]:
+    """Return examples if the decimals of all ages in weeks may be days: tenths from 0 to 6, not only halves."""
+    decimals = [(text, TENTHS.fullmatch(text)) for text in texts if re.search("[.,]", text)]
+    tenths = [(text, match[1]) for text, match in decimals if match and match[1] in "0123456"]
+    several = len({digit for _, digit in tenths} - {"0"}) > 1
+    return [text for text, _ in tenths[:3]] if len(decimals) == len(tenths) >= MIN_AMBIGUOUS_AGES and several else []
+
+
+def week_in_name(parts: Sequence[str]) -> ScanAge:
+    """Return the age that a file's name or else its folders give, such as week24, GA24.3, week24+3 or GA24w3d."""
+    for part in reversed(parts):
+        matches = list(WEEK_NAME.finditer(part))
+        for match in matches:
+            if AMBIGUOUS_ENDING.match(match["more"]):
+                cause = f"the name gives an ambiguous age: found {match[0]}; expected one such as week24.4 or week24+3"
+                return ScanAge(None, cause=cause)
+        weeks = {match["age"]: read_week(match["age"].lower()) for match in matches}
+        if len({week for week, _ in weeks.values()}) > 1:
+            return ScanAge(None, cause=f"the name gives two ages: found {' and '.join(weeks)}; expected one")
+        for text, (week, problem) in weeks.items():
+            return ScanAge(week, f"name ({text})", f"the name: {problem}" if problem else "")
+    return ScanAge(None)
