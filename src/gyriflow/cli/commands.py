@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -15,6 +15,9 @@ from click.core import ParameterSource
 from ..errors import GyriflowError, InputError
 from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED
+
+if TYPE_CHECKING:
+    from .recognition import Recognised
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
@@ -34,6 +37,10 @@ cores_option = click.option(
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
+files_option = click.option("--files", help="Pattern of the paths to use if a scan has several files.")
+notation_option = click.option(
+    "--decimal-weeks/--weeks-days", "decimal_weeks", default=None, help="Whether an age of 24.3 is decimal, or 24+3."
+)
 dry_run_option = click.option("-n", "--dry-run", is_flag=True, help="Only show what would run, and why.")
 
 
@@ -123,18 +130,42 @@ def main() -> None:
 @click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help=f"[default: FOLDER/{CONFIG}]")
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @scheme_option
-def init(folder: Path, output: Path | None, force: bool, scheme: str | None) -> None:
+@files_option
+@notation_option
+def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> None:
     """Write a configuration for the brains in a FOLDER.
 
-    It recognises tissue label volumes (and their label scheme), hemisphere surfaces, and ages in participants.tsv or
-    in names such as week21 or GA21.
+    It recognises tissue label volumes (and their label scheme), surfaces, and ages in participants.tsv, sessions.tsv
+    or in names such as week21 or GA21. Files that cannot be used are listed with the cause; the exit code is then 2.
     """
     from .init import write_configuration
 
     path = output or folder / CONFIG
-    for line in write_configuration(folder, path, force, scheme=scheme):
-        click.echo(line)
+    found = _recognise(folder, **selection)
+    write_configuration(found, folder, path, force=force)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
+    sys.exit(_show_scans(found))
+
+
+def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any) -> "Recognised":
+    from .recognition import recognise, scheme_reasons
+
+    notation: Any = {None: None, True: "decimal", False: "days"}[decimal_weeks]
+    found = recognise(folder, files or "*", notation=notation, **selection)
+    for line in scheme_reasons(found.brains):
+        click.echo(line)
+    return found
+
+
+def _show_scans(found: "Recognised", measured: dict[str, tuple[str, str]] | None = None) -> int:
+    """Print the table of scans and the unused files; return the exit code."""
+    from .scans import found_rows, scan_lines
+
+    for file, reason in found.unused.items():
+        click.echo(f"not used: {file} ({reason})")
+    for line in scan_lines(found_rows(found, measured)):
+        click.echo(line)
+    return InputError.exit_code if any(brain.problem or brain.contradiction for brain in found.brains) else 0
 
 
 @main.command()
@@ -197,27 +228,33 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
 
 @main.command()
 @click.argument("data", type=click.Path(exists=True, path_type=Path), metavar="FOLDER|CONFIG")
+@scheme_option
+@files_option
+@notation_option
 @directory_option
 @cores_option
 @dry_run_option
-def measure(data: Path, directory: Path, cores: int, dry_run: bool) -> None:
+def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection: Any) -> None:
     """Measure brains and write the report, without simulations.
 
     The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
-    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished.
+    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished, and the exit code
+    is that of the first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
     from .init import write_configuration
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
+    refused = 0
     with TemporaryDirectory() as scratch:
         if not config.exists():
             config = Path(scratch) / CONFIG if dry_run else config
-            for line in write_configuration(data, config, force=False, fold=False):
-                click.echo(line)
+            found = _recognise(data, **selection)
+            write_configuration(found, data, config, only_measured=True)
+            refused = _show_scans(found, {})
         code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")
-    sys.exit(code)
+    sys.exit(code or refused)
 
 
 @main.command()
@@ -258,7 +295,8 @@ def predict(
 @click.argument("level", type=click.Choice(LEVELS))
 @click.option(*BIDS_LABEL_OPTIONS[:2], "participants", multiple=True, help="Only these participants.")
 @click.option(*BIDS_LABEL_OPTIONS[2:], "sessions", multiple=True, help="Only these sessions.")
-@click.option("--files", help="Pattern of the paths to use if a scan has several files.")
+@files_option
+@notation_option
 @scheme_option
 @click.option(
     "--settings",
@@ -278,17 +316,22 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     """
     from ..io.exports import publish_derivatives
     from .init import store_options, with_earlier_options, write_bids
+    from .scans import measured_verdicts
 
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
     options = work / "bids.json"
     if level == "group":
         selection = with_earlier_options(options, selection)
-    brains, reasons = write_bids(data, config, **selection)
+    how = {key: selection[key] for key in ("settings", "fold")}
+    which = {key: value for key, value in selection.items() if key not in how}
+    for entity, key in (("sub-", "participants"), ("ses-", "sessions")):
+        which[key] = [label.removeprefix(entity) for label in selection[key] or ()]
+    found = _recognise(data, **which)
+    brains = write_bids(found, data, config, **how)
     if level == "participant" and not dry_run:
         store_options(options, selection)
     work_to_do = "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"
-    click.echo("\n".join(reasons))
     click.echo(f"{len(brains)} scan{'s' if len(brains) > 1 else ''} to {work_to_do}: {', '.join(brains)}")
     click.echo(f"configuration: {config}")
     targets = ["quality", "export"] if level == "participant" else ["all", "export"]
@@ -296,7 +339,8 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     if not dry_run and (exported / "dataset_description.json").is_file():
         publish_derivatives(exported, out, data, brains, whole=level == "group")
         click.echo(f"derivatives: {out}")
-    sys.exit(code)
+    refused = _show_scans(found, {} if dry_run else measured_verdicts(work))
+    sys.exit(code or refused)
 
 
 @main.command()

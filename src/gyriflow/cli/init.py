@@ -1,6 +1,6 @@
 """Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
 from ..study.loading import FOLDING_SECTIONS, load
 from ..study.series import unmatched_reason
-from .recognition import SUBJECT_AND_SESSION, UNSET, FoundBrain, recognise, recognise_labels, scheme_reasons
+from .recognition import UNSET, FoundBrain, Recognised, recognise_labels
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -49,35 +49,39 @@ QUICK: dict[str, Any] = {
 
 
 def write_configuration(
-    folder: Path, path: Path, force: bool, fold: bool = True, scheme: str | None = None
-) -> Iterator[str]:
-    """Write a configuration for the brains of a folder; yield lines about the recognised brains.
+    found: Recognised, folder: Path, path: Path, *, force: bool = False, only_measured: bool = False
+) -> None:
+    """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
 
-    With `fold`, one of them is folded. InputError if nothing is recognised, or if the configuration already exists and
-    `force` is not set.
+    By default, one of them is folded, and values may be left to fill in. InputError if no scan can be used, or if the
+    configuration already exists and `force` is not set.
     """
     if path.exists() and not force:
         raise InputError("already exists", path=path, remedy="Choose another file with --output, or add --force.")
-    brains = recognise(folder, scheme=scheme)
     inside = path.resolve().parent == folder.resolve()
+    usable = [brain for brain in found.brains if not (brain.causes if only_measured else brain.problem)]
+    if not usable:
+        raise InputError("no scan can be used", path=folder, found="".join(_causes(found.brains)))
     lines = []
-    for brain in brains:
+    for brain in found.brains:
         entry = brain.entry if inside else _absolute(brain.entry, folder)
         text = yaml.safe_dump(entry, default_flow_style=True, sort_keys=False, width=10_000, allow_unicode=True).strip()
-        lines.append(f"  - {text}" + "".join(f"  # {note}" for note in brain.notes) + "\n")
+        notes = [" ".join(note.split()) for note in (*brain.causes, *brain.warnings)]
+        notes += [f"week: {brain.age_source}"] if brain.age_source else []
+        lines.append(f"  {'-' if brain in usable else '# -'} {text}" + "".join(f"  # {note}" for note in notes) + "\n")
     # the start is a brain with later scans of its subject or atlas, if any
-    by_subject = _by_subject(brains).values()
-    series = next((ids for ids in by_subject if len(_weeks(ids)) > 1), brains)
-    weeks, several = _weeks(series), series is not brains
+    by_subject = _by_subject(usable).values()
+    series = next((scans for scans in by_subject if len(_weeks(scans)) > 1), usable)
+    weeks, several = _weeks(series), series is not usable
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    measured_run = MEASURED_RUN if fold and several and _gives_shapes(series, folder) else ""
-    rest = REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
-    write_text(path, HEAD + "".join(lines) + (rest if fold else ""))
+    measured_run = MEASURED_RUN if several and not only_measured and _gives_shapes(series, folder) else ""
+    rest = "" if only_measured else REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
+    write_text(path, HEAD + "".join(lines) + rest)
+
+
+def _causes(brains: Iterable[FoundBrain]) -> Iterator[str]:
     for brain in brains:
-        kind = f"labels, {brain.entry['scheme']}" if "labels" in brain.entry else "surfaces"
-        yield f"{brain.entry['id']}: {kind}, week {brain.entry['week']}"
-        yield from (f"  fill in: {note}" for note in brain.notes)
-    yield from scheme_reasons(brains)
+        yield from (f"\n  {brain.entry['id']}: {cause}" for cause in brain.causes)
 
 
 def write_prediction(
@@ -147,38 +151,23 @@ def store_options(path: Path, options: dict[str, Any]) -> None:
 
 
 def write_bids(
-    folder: Path,
-    path: Path,
-    *,
-    participants: Sequence[str] | None = None,
-    sessions: Sequence[str] | None = None,
-    files: str | None = None,
-    settings: str | None = None,
-    fold: bool | None = None,
-    scheme: str | None = None,
-) -> tuple[list[str], list[str]]:
-    """Write a configuration for the scans of a BIDS data set; return their ids and the reasons for label schemes.
+    found: Recognised, folder: Path, path: Path, *, settings: str | None = None, fold: bool | None = None
+) -> list[str]:
+    """Write a configuration for the scans of a BIDS data set that can be used; return their ids.
 
-    Only participants and sessions with these labels (default: all) and files whose paths match the pattern `files` are
-    used. `settings` is a configuration without brains; other keys are as in `init`. The scans are measured; with `fold`
-    the first of several scans of a subject is also folded. InputError if a scan has several files, no age or no scheme,
-    or if nothing is found.
+    `settings` is a configuration without brains. The scans are measured; with `fold` the first of several scans of a
+    subject is also folded. Scans without `sub-` in their path become unused. InputError if no scan can be used.
     """
-    subjects = {f"sub-{label.removeprefix('sub-')}" for label in participants or ()}
-    own_sessions = {f"ses-{label.removeprefix('ses-')}" for label in sessions or ()}
-    brains = []
-    for brain in recognise(folder, files or "*", scheme):
-        entities = SUBJECT_AND_SESSION.match(brain.entry["id"])
-        if entities and (not subjects or entities[1] in subjects) and (not own_sessions or entities[2] in own_sessions):
-            brains.append(brain)
+    for brain in found.brains:
+        if not brain.entry["id"].startswith("sub-"):
+            found.unused[brain.files] = "no sub-… in its path"
+    found.brains = [brain for brain in found.brains if brain.entry["id"].startswith("sub-")]
+    brains = [brain for brain in found.brains if not brain.causes]
     if not brains:
-        expected = " ".join(sorted(subjects | own_sessions)) or "files named sub-…"
-        raise InputError("has no such participants and sessions", path=folder, expected=expected)
-    if problems := [f"\n  {brain.entry['id']}: {note}" for brain in brains for note in brain.notes]:
-        remedy = (
-            "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'; --scheme names labels."
-        )
-        raise InputError("cannot be run", path=folder, found="".join(problems), remedy=remedy)
+        several = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'; "
+        remedy = f"{several}--scheme names labels."
+        causes = "".join(_causes(found.brains)) or "no files named sub-…"
+        raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     followed = [scans for scans in _by_subject(brains).values() if len(_weeks(scans)) > 1]
@@ -195,7 +184,7 @@ def write_bids(
         text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
     write_text(path, yaml.safe_dump(text, sort_keys=False))
-    return [brain.entry["id"] for brain in brains], list(scheme_reasons(brains))
+    return [brain.entry["id"] for brain in brains]
 
 
 def _by_subject(brains: Sequence[FoundBrain]) -> dict[str, list[FoundBrain]]:

@@ -1,8 +1,8 @@
-"""Recognise the brains of a folder by file names, labels and the table of participants."""
+"""Recognise the scans of a folder by file names, labels, and the tables of participants and sessions."""
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
@@ -14,72 +14,408 @@ from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES
-from ..io.files import files_in, read_json
+from ..io.files import files_in, read_json, reading
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean
-from ..study.participants import Scan, covariates, read_scans
+from ..settings.participants import WeekNotation
+from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
+from ..study.participants import TABLE_NAME, ScanTables, covariates
 
-LABEL_NAME = re.compile(r"label|seg|parcellation|tissue", re.IGNORECASE)
-SIDE_NAME = re.compile(r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L)|(right|rh|hemi-R))(?=[._-])", re.IGNORECASE)
+LABEL_NAME = re.compile(r"label|(?<!prob)seg|parcellation|tissue", re.IGNORECASE)
+SIDE_NAME = re.compile(
+    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=\.)L(?=\.))|(right|rh|hemi-R|(?<=\.)R(?=\.)))(?=[._-])", re.IGNORECASE
+)
 LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
-WEEK_NAME = re.compile(r"(?<![A-Za-z])(?:week|ga)[-_]?(\d{2}(?:\.\d+)?)(?!\d)", re.IGNORECASE)
-_SUFFIX_WORDS = sorted({word for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES) for word in suffix[1:].split(".")})
-SUFFIXES = re.compile(
-    rf"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|{'|'.join(_SUFFIX_WORDS)})(?=[._-]|$)",
+NO_BRAIN_NAME = re.compile(
+    r"sphere|inflated|midthickness|flat|graymid|smoothwm|orig|cerebell|stem|skull|scalp|head|hull|ventric|white|wm",
     re.IGNORECASE,
 )
-SUBJECT_AND_SESSION = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)(?:[_/](?:.*[_/])?(ses-[A-Za-z0-9]+))?")
-"""The entities of BIDS in a path."""
-HIDDEN = ("results", "resources", "derivatives-gyriflow")
+"""Surfaces without a side that are not pial surfaces of a whole brain."""
+RESAMPLED_NAME = re.compile(r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[._]|$)", re.IGNORECASE)
+SPACE_NAME = re.compile(r"(?<![A-Za-z0-9])space-([A-Za-z0-9]+)")
+NATIVE_SPACES = ("orig", "native", "individual", "subject", "anat", "scanner", "acpc", "t1w", "t2w")
+TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage.*")
+GENERIC_FOLDERS = (
+    "surf",
+    "mri",
+    "anat",
+    "label",
+    "labels",
+    "seg",
+    "segmentation",
+    "native",
+    "t1w",
+    "t2w",
+    "derivatives",
+)
+"""Folders that do not name a subject."""
+_SUFFIX_WORDS = sorted({word for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES) for word in suffix[1:].split(".")})
+SUFFIXES = re.compile(
+    r"[._-]?(?<![A-Za-z0-9])(?:labels?|dseg|seg|parcellation|tissue|surf|native"
+    rf"|{'|'.join(_SUFFIX_WORDS)})(?=[._-]|$)",
+    re.IGNORECASE,
+)
+ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([A-Za-z0-9]+)")
+WHOLE_BRAIN_ML = (15.0, 700.0)
+"""Volumes of closed surfaces whose names do not say what they are."""
 UNSET = "CHOOSE"
 """Placeholder for values that the files do not give; `gyriflow check` then asks for them."""
 
 
 @dataclass
 class FoundBrain:
-    """A recognised brain: its entry of `brains`, and notes about values to fill in."""
+    """A recognised scan: its entry of `brains`, where its age is from, and what is wrong with it.
+
+    `problem` is why its files cannot be used, `contradiction` why its age cannot; `notes` are values to fill in.
+    """
 
     entry: dict[str, Any]
+    subject: str | None = None
+    session: str | None = None
+    age_source: str = ""
+    problem: str = ""
+    contradiction: str = ""
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     fits: dict[str, str] | None = None
     """Of labels what `scheme_fits` returns."""
 
+    @property
+    def causes(self) -> list[str]:
+        """Why the scan cannot be used as it is."""
+        return [cause for cause in (self.problem, self.contradiction, *self.notes) if cause]
 
-def recognise(folder: Path, pattern: str = "*", scheme: str | None = None) -> list[FoundBrain]:
-    """Return the brains of a folder and those in it, the youngest first, from files whose paths match a pattern.
+    @property
+    def files(self) -> str:
+        """Its files."""
+        source = self.entry.get("labels") or self.entry.get("pial") or self.entry.get("hemisphere", {}).get("file")
+        return str(source or ", ".join(self.entry["hemispheres"].values()))
 
-    Data sets that gyriflow itself has made are left out. All labels are of the `scheme`, where one is named.
-    InputError where there are none.
+
+@dataclass
+class Recognised:
+    """The scans of a folder, the youngest first, and files that are not used, with the reasons."""
+
+    brains: list[FoundBrain]
+    unused: dict[str, str]
+
+
+@dataclass
+class _Candidate:
+    """Files that may be a scan: the one that names it, its entry's source, and its space, "" if it is the subject's."""
+
+    file: Path
+    source: dict[str, Any]
+    space: str = ""
+    problem: str = ""
+
+    @property
+    def entities(self) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {"sub": set(), "ses": set()}
+        for entity, label in ENTITY.findall(self.file.as_posix()):
+            found[entity].add(label)
+        return found
+
+    def label(self, entity: str) -> str | None:
+        # a path that gives several is refused
+        return next(iter(sorted(self.entities[entity])), None)
+
+    @property
+    def scan(self) -> str:
+        subject, session = self.label("sub"), self.label("ses")
+        if subject:
+            return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
+        name = re.sub(r"\.T[12]$", "", self.file.name)
+        name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", SIDE_NAME.sub("", name))))
+        folders = [part for part in self.file.parts[:-1] if part.lower() not in GENERIC_FOLDERS]
+        if folders and not re.search(r"\d", name):
+            name = folders[-1]
+        return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
+
+
+def recognise(
+    folder: Path,
+    pattern: str = "*",
+    scheme: str | None = None,
+    notation: WeekNotation | None = None,
+    participants: Collection[str] = (),
+    sessions: Collection[str] = (),
+) -> Recognised:
+    """Return the scans of a folder and those in it, from files whose paths match a pattern.
+
+    Results and data sets that gyriflow itself has made are left out. All labels are of the `scheme`, where one is
+    named. With labels of `participants` or `sessions`, files of others are not read. InputError where no scan is found,
+    or none of a named participant or session.
     """
-    files = [path.relative_to(folder) for path in files_in(folder, *HIDDEN)]
-    exports = [file.parent for file in files if file.name == "dataset_description.json" and _is_own(folder / file)]
-    files = [file for file in files if fnmatch(str(file), pattern) and not any(map(file.is_relative_to, exports))]
-    scans, no_ages = [], "its name does not give the week"
-    try:
-        scans = read_scans(folder / "participants.tsv")
-    except InputError as error:
-        if (folder / "participants.tsv").is_file():
-            no_ages = str(error)
-    brains = [*_hemispheres(files, scans), *_volumes(folder, files, scans)]
-    if not brains:
-        expected = "tissue label volumes (.nii.gz), or pairs of surfaces with left and right in their names"
-        raise InputError("no brain was recognised", path=folder, found=f"{len(files)} files", expected=expected)
-    seen: Counter[str] = Counter()
-    counts = Counter(brain.entry["id"] for brain in brains)
-    for brain in brains:
-        name = brain.entry["id"]
-        seen[name] += 1
-        if brain.entry["week"] == UNSET and not brain.notes:
-            brain.notes.append(f"week: {no_ages}")
-        # several files of one scan do not make a series
-        if counts[name] > 1:
-            brain.entry.pop("subject", None)
-            brain.notes.append(f"{counts[name]} files are of {name}: keep one")
-        if seen[name] > 1:
-            brain.entry["id"] = f"{name}-{seen[name]}"
+    every = [path.relative_to(folder) for path in files_in(folder)]
+    own = [file.parent for file in every if file.name == "dataset_description.json" and _is_own(folder / file)]
+    own += [file.parents[1] for file in every if file.parts[-2:] == ("study", "study.json")]
+    own += [results.parent / "resources" for results in own]
+    files = [file for file in every if not any(map(file.is_relative_to, own))]
+    tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
+    candidates = [*_hemispheres(folder, files), *_whole_surfaces(files), *_volumes(files)]
+    found: dict[str, list[_Candidate]] = defaultdict(list)
+    for candidate in candidates:
+        if fnmatch(str(candidate.file), pattern):
+            found[candidate.scan].append(candidate)
+    if not found:
+        expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
+        looked = f"{len(files)} files" + "".join(f"\n  {file}" for file in files[:10]) + ("\n  …" * (len(files) > 10))
+        raise InputError("no brain was recognised", path=folder, found=looked, expected=expected)
+    scans: dict[str | None, set[str | None]] = defaultdict(set)
+    for candidate in candidates:
+        scans[candidate.label("sub")].add(candidate.label("ses"))
+    selected = {
+        name: group
+        for name, group in found.items()
+        if (not participants or group[0].label("sub") in participants)
+        and (not sessions or group[0].label("ses") in sessions)
+    }
+    for entity, labels in (("sub", participants), ("ses", sessions)):
+        there = {candidate.label(entity) for group in found.values() for candidate in group}
+        if lost := sorted(set(labels) - there):
+            names = ", ".join(sorted(f"{entity}-{label}" for label in there if label)[:20]) or "none"
+            problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in lost)}"
+            raise InputError(
+                problem, path=folder, found=names, remedy="Labels must be equal, with their zeros and case."
+            )
+    if not selected:
+        raise InputError("has no scan of these participants in these sessions", path=folder)
+    unused: dict[str, str] = {}
+    brains = []
+    for name, group in selected.items():
+        chosen = _of_the_subject(group, unused)
+        for number, candidate in enumerate(chosen, start=1):
+            brain = _found_brain(folder, candidate, tables, scans, name if number == 1 else f"{name}-{number}")
+            brains.append(brain)
+            if len(chosen) > 1:
+                # several files of one scan do not make a series
+                brain.entry.pop("subject", None)
+                brain.notes.append(f"{len(chosen)} files are of {name}: keep one")
+    _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
-    return sorted(brains, key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
+    brains.sort(key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
+    return Recognised(brains, unused)
+
+
+def _is_own(description: Path) -> bool:
+    try:
+        described = read_json(description)
+    except InputError:
+        return False
+    tools = described.get("GeneratedBy") if isinstance(described, dict) else None
+    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
+
+
+def _of_the_subject(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:
+    """Return the files of a scan in the subject's own space, or if there are none its resampled ones, or others."""
+    native = [candidate for candidate in group if not candidate.space]
+    resampled = [candidate for candidate in group if candidate.space == RESAMPLED]
+    chosen = native or resampled or list(group)
+    surfaces = [candidate for candidate in chosen if candidate.file.parent.name == "surf"]
+    if surfaces and len(chosen) > len(surfaces):
+        # volumes of a FreeSurfer subject beside its surfaces
+        subject = surfaces[0].file.parents[1]
+        chosen = [candidate for candidate in chosen if candidate.file.parent != subject / "mri"]
+    for candidate in group:
+        if candidate not in chosen:
+            reason = f"in the space {candidate.space}" if candidate.space else "a volume beside surfaces"
+            unused[str(candidate.file)] = "resampled" if candidate.space == RESAMPLED else reason
+    return chosen
+
+
+def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
+    weeks = Counter((brain.entry.get("subject"), brain.entry["week"]) for brain in brains)
+    for brain in brains:
+        subject, week = brain.entry.get("subject"), brain.entry["week"]
+        if subject and week != UNSET and weeks[subject, week] > 1:
+            scans = ", ".join(
+                f"{each.entry['id']} ({each.age_source})" for each in brains if each.subject == brain.subject
+            )
+            brain.contradiction = f"scans of one subject have the same age, {week:g}; found {scans}; expected one"
+
+
+RESAMPLED = "resampled"
+
+
+def _space(file: Path, *, surface: bool) -> str:
+    """Return the space of a file, "" for the subject's own; a subject's surface on a template's mesh is resampled."""
+    if folders := [part for part in file.parts if TEMPLATE_FOLDER.fullmatch(part)]:
+        return "of a template, " + folders[0]
+    space = SPACE_NAME.search(file.name)
+    if surface and RESAMPLED_NAME.search(file.name) and not (space and space[1].startswith("MNI")):
+        return RESAMPLED
+    return space[1] if space and space[1].lower() not in NATIVE_SPACES else ""
+
+
+def _hemispheres(folder: Path, files: Sequence[Path]) -> Iterator[_Candidate]:
+    surfaces: dict[tuple[str, str], dict[str, Path]] = {}
+    sides_of: dict[tuple[Path, str], dict[str, Path]] = defaultdict(dict)
+    names = set(files)
+    for file in files:
+        side = SIDE_NAME.search(file.name)
+        if side is None:
+            continue
+        sides_of[file.parent, file.name[: side.start()]].setdefault("left" if side[1] else "right", file)
+        # FreeSurfer's lh.pial is often a link to lh.pial.T1
+        plain = re.sub(r"\.T[12]$", "", file.name)
+        kind = LAYER_NAME.search(plain)
+        is_double = plain != file.name and file.with_name(plain) in names
+        if kind and plain.lower().endswith(SURFACE_SUFFIXES) and not is_double:
+            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", plain)))
+            sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
+            sides["left" if side[1] else "right"] = file
+    for (rest, layer), sides in surfaces.items():
+        pair = {name: str(sides[name]) for name in ("left", "right") if name in sides}
+        name, first = next(iter(pair.items()))
+        file = Path(first)
+        if layer == "white":
+            if (rest, "pial") not in surfaces:
+                source = {"hemispheres": pair}
+                yield _Candidate(file, source, _space(file, surface=True), "white surfaces alone; pial ones are needed")
+            continue
+        side = SIDE_NAME.search(file.name)
+        traces = sides_of[file.parent, file.name[: side.start()] if side else ""]
+        white = surfaces.get((rest, "white"), {})
+        source: dict[str, Any] = {"hemispheres": pair}
+        if len(pair) == 1:
+            source = {"hemisphere": {"file": first, "side": name}}
+        elif len(white) == 2:
+            source["white"] = [str(white["left"]), str(white["right"])]
+        problem = ""
+        if len(pair) < len(traces):
+            lost = next(iter({"left", "right"} - set(pair)))
+            problem = (
+                f"has no pial surface of the {lost} hemisphere; found {traces[lost]}; expected both or no {lost} file"
+            )
+        elif len(white) == 1 and len(pair) == 2:
+            problem = f"has one white surface, {next(iter(white.values()))}; expected both or none"
+        for surface in (*sides.values(), *white.values()):
+            problem = problem or _unreadable(folder / surface)
+        yield _Candidate(file, source, _space(file, surface=True), problem)
+
+
+def _unreadable(path: Path) -> str:
+    """Return why a file cannot be opened, or ""."""
+    try:
+        with reading(path, "a surface"), path.open("rb") as file:
+            return "" if file.read(1) else f"{path}: is empty"
+    except InputError as error:
+        return str(error)
+
+
+def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
+    for file in files:
+        name = file.name.lower()
+        layer = LAYER_NAME.search(name)
+        is_named = bool(layer and layer[1])
+        has_no_side = not SIDE_NAME.search(name) and not NO_BRAIN_NAME.search(name)
+        # GIFTI files may have other data than surfaces
+        if name.endswith(SURFACE_SUFFIXES) and has_no_side and (is_named or not name.endswith((".gii", ".gii.gz"))):
+            yield _Candidate(file, {"pial": str(file)}, _space(file, surface=True))
+
+
+def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
+    volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
+    images: dict[Path, list[str]] = defaultdict(list)
+    for file in volumes:
+        if "_T2w." in file.name:
+            images[file.parent].append(str(file))
+    for file in volumes:
+        if LABEL_NAME.search(file.name):
+            image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
+            yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, surface=False))
+
+
+def _found_brain(
+    folder: Path,
+    candidate: _Candidate,
+    tables: ScanTables,
+    scans: dict[str | None, set[str | None]],
+    name: str,
+) -> FoundBrain:
+    subject, session = candidate.label("sub"), candidate.label("ses")
+    facts, owner = None, subject
+    if subject is not None:
+        facts = tables.facts(subject, session, len(scans[subject]) < 2, folder / candidate.file)
+        missing = "" if facts else _equal_but_for_zeros(subject, tables)
+    else:
+        owners = _owners(candidate, tables)
+        owner, missing = (owners[0] if owners else None), ""
+        if len(owners) > 1:
+            missing = f"several rows may be of this scan: found {', '.join(owners)}; expected one id in its path"
+        elif owner is not None:
+            facts = tables.facts(owner, session, place=folder / candidate.file)
+    age, named = facts.age if facts else ScanAge(None, cause=missing), week_in_name(candidate.file.parts)
+    if age.week is not None and named.week is not None and not _agree(age.week, named):
+        age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
+    elif age.week is None and not age.cause:
+        age = named
+    names = {
+        f"{entity}-{label}" for entity, labels in candidate.entities.items() for label in labels if len(labels) > 1
+    }
+    label = f"sub-{subject}" if subject else owner
+    entry = {"id": name, "week": UNSET if age.week is None else age.week} | ({"subject": label} if label else {})
+    brain = FoundBrain(entry | (covariates(facts) if facts else {}) | candidate.source, owner, session, age.source)
+    if age.week is None:
+        brain.contradiction = age.cause
+        brain.notes += [] if age.cause else ["week: its name does not give the week, and no table has it"]
+    brain.problem = candidate.problem
+    if names:
+        brain.problem = f"its path names several scans: found {', '.join(sorted(names))}; expected one"
+    elif candidate.space and candidate.space != RESAMPLED:
+        brain.problem = f"is in the space {candidate.space}; expected the subject's own"
+    elif candidate.space:
+        brain.warnings.append("a surface on a template's mesh is used, since there is no native one")
+    if brain.problem:
+        return brain
+    try:
+        if "labels" in candidate.source:
+            brain.fits = scheme_fits(read_label_volume(folder / candidate.file).labels)
+        elif "pial" in candidate.source:
+            _require_brain(folder / candidate.file)
+    except InputError as error:
+        brain.problem = str(error)
+    return brain
+
+
+def _require_brain(path: Path) -> None:
+    # imports that label volumes need not wait for
+    from ..geometry.triangles import volume_ml
+    from ..io.surfaces import read_surface
+
+    if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(read_surface(path)))) < WHOLE_BRAIN_ML[1]:
+        expected = f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to {WHOLE_BRAIN_ML[1]:g} mL"
+        raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
+
+
+def _agree(week: float, named: ScanAge) -> bool:
+    # names may give whole weeks, completed or rounded
+    assert named.week is not None
+    is_whole = named.week == int(named.week)
+    return abs(week - named.week) <= MAX_DIFFERENCE_WEEKS or (is_whole and -0.5 <= week - named.week < 1.0)
+
+
+def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
+    """Return the subjects of tables whose ids are whole parts of a path without `sub-`: of the name or of a folder."""
+    name = re.split(r"[._]", candidate.file.name)
+    beginnings = {"_".join(name[:number]) for number in range(1, len(name) + 1)} | {candidate.scan}
+    ids = dict.fromkeys(row.subject for table in tables.tables for row in table.rows)
+    named = [subject for subject in ids if subject in beginnings]
+    if named:
+        return [max(named, key=len)]
+    return [subject for subject in ids if subject in candidate.file.parts[:-1]]
+
+
+def _equal_but_for_zeros(subject: str, tables: ScanTables) -> str:
+    """Return what tables have instead of a subject: ids that differ in zeros or case, or else all; "" without tables."""
+    ids = {row.subject: row.place for table in tables.tables for row in table.rows}
+    near = [other for other in ids if other.lower().lstrip("0") == subject.lower().lstrip("0")]
+    if not ids:
+        return ""
+    found = ", ".join(f"{other} ({ids[other]})" for other in near) or ", ".join([*list(ids)[:5], "…"])
+    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case"
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
@@ -100,7 +436,10 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of one label volume: its id, file and scheme; InputError where that is unknown or not one."""
     if scheme not in (None, *SCHEMES):
         raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
-    entry, fits = {"id": _id(file), "labels": str(file), "scheme": UNSET}, scheme_fits(read_label_volume(file).labels)
+    entry, fits = (
+        {"id": _Candidate(file, {}).scan, "labels": str(file), "scheme": UNSET},
+        scheme_fits(read_label_volume(file).labels),
+    )
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:
         problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
@@ -147,74 +486,3 @@ def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
             causes = {fitted: cause for schemes in fits for fitted, cause in schemes.items() if cause}
             yield f"scheme {name}: {number} label volume{'s' if number > 1 else ''}"
             yield from (f"  {'but' if fitted == name else f'not {fitted}:'} {causes[fitted]}" for fitted in causes)
-
-
-def _is_own(description: Path) -> bool:
-    described = read_json(description)
-    tools = described.get("GeneratedBy") if isinstance(described, dict) else None
-    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
-
-
-def _hemispheres(files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[FoundBrain]:
-    surfaces: dict[tuple[str, str], dict[str, Path]] = {}
-    for file in files:
-        kind, side = LAYER_NAME.search(file.name), SIDE_NAME.search(file.name)
-        if kind and side and file.name.lower().endswith(SURFACE_SUFFIXES):
-            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", file.name)))
-            sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
-            sides["left" if side[1] else "right"] = file
-    for (rest, layer), sides in surfaces.items():
-        if layer == "white":
-            continue
-        pair: dict[str, Any] = {name: str(sides[name]) for name in ("left", "right") if name in sides}
-        first, file = next(iter(pair.items()))
-        white = surfaces.get((rest, "white"), {})
-        source: dict[str, Any] = {"hemispheres": pair}
-        if len(pair) == 1:
-            source = {"hemisphere": {"file": file, "side": first}}
-        elif len(white) == 2:
-            source["white"] = [str(white["left"]), str(white["right"])]
-        yield _found_brain(Path(file), scans, source)
-
-
-def _volumes(folder: Path, files: Sequence[Path], scans: Sequence[Scan]) -> Iterator[FoundBrain]:
-    volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
-    for file in volumes:
-        if LABEL_NAME.search(file.name):
-            try:
-                labels = read_label_volume(folder / file).labels
-            except InputError:
-                continue
-            images = [str(path) for path in volumes if path.parent == file.parent and "_T2w." in path.name]
-            image = {"image": images[0]} if len(images) == 1 else {}
-            brain = _found_brain(file, scans, {"labels": str(file), "scheme": UNSET} | image)
-            brain.fits = scheme_fits(labels)
-            yield brain
-
-
-def _found_brain(file: Path, scans: Sequence[Scan], source: dict[str, Any]) -> FoundBrain:
-    entities = SUBJECT_AND_SESSION.search(file.as_posix())
-    named = [scan for scan in scans if _names(file, scan.subject) and _names(file, scan.session)]
-    # a participant's row holds for its sessions too, but the session's own comes first
-    scan = max(named, key=lambda scan: scan.session is not None, default=None)
-    weeks = [match[1] for part in reversed(file.parts) if (match := WEEK_NAME.search(part))]
-    week = float(weeks[0]) if weeks and scan is None else UNSET
-    if scan is not None and scan.week is not None:
-        week = scan.week
-    subject = entities[1] if entities else scan.subject if scan else None
-    entry = {"id": _id(file), "week": week} | ({"subject": subject} if subject else {})
-    further = covariates(scan) if scan else {}
-    return FoundBrain(entry | further | source, [f"week: {scan.cause}"] if scan and scan.cause else [])
-
-
-def _names(file: Path, part: str | None) -> bool:
-    return part is None or bool(re.search(rf"(?<![A-Za-z0-9]){re.escape(part)}(?![A-Za-z0-9])", file.as_posix()))
-
-
-def _id(file: Path) -> str:
-    if entities := SUBJECT_AND_SESSION.search(file.as_posix()):
-        return "_".join(filter(None, entities.groups()))
-    name = SUFFIXES.sub("", LAYER_NAME.sub("", SIDE_NAME.sub("", file.name)))
-    if len(file.parts) > 1 and not re.search(r"\d", name):
-        name = file.parts[-2]
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"

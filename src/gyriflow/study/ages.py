@@ -34,7 +34,7 @@ MIN_AMBIGUOUS_AGES = 3
 MAX_DIFFERENCE_WEEKS = 0.1
 """Two ages of a scan agree if they differ by rounding."""
 WEEK_NAME = re.compile(
-    r"(?<![A-Za-z])(?:weeks?|wk|ga|gw)[-_]?(?P<age>\d{2}(?:\.\d+|\+[0-6]|w[0-6]d)?)(?!\d)(?P<more>\w*(?:[+-]\w+)*)",
+    r"(?<![A-Za-z])(?:weeks?|wk|ga|gw)[-_]?(?P<age>\d{2}(?:\.\d+|\+[0-6]|w[0-6]d)?)(?!\d)(?=(?P<more>.*))",
     re.IGNORECASE,
 )
 AMBIGUOUS_ENDING = re.compile(r"[_+-]?[wdp]?\d+[dw]?(?![A-Za-z0-9])|[+-]\d", re.IGNORECASE)
@@ -129,10 +129,12 @@ def choose_age(given: Sequence[GivenAge], notation: WeekNotation | None) -> Scan
     given = [age for age in given if age.text not in MISSING_VALUES]
     if not given:
         return ScanAge(None)
-    kind = next(kind for kind in ("scan", "gestational", "age") if any(age.column.kind == kind for age in given))
-    chosen = [age for age in given if age.column.kind == kind]
-    if kind != "scan" and any(age.of_session for age in chosen):
-        chosen = [age for age in chosen if age.of_session]
+    chosen = [age for age in given if age.column.kind == "scan"]
+    if not chosen:
+        chosen = [age for age in given if age.of_session] or list(given)
+        # a plain age beside a gestational one may be the mother's
+        chosen = [age for age in chosen if age.column.kind == "gestational"] or chosen
+    kind = chosen[0].column.kind
     weeks = []
     for age in chosen:
         week, problem = read_week(age.text, age.column.unit, notation)
@@ -183,8 +185,9 @@ def week_in_name(parts: Sequence[str]) -> ScanAge:
     for part in reversed(parts):
         matches = list(WEEK_NAME.finditer(part))
         for match in matches:
-            if AMBIGUOUS_ENDING.match(match["more"]):
-                cause = f"the name gives an ambiguous age: found {match[0]}; expected one such as week24.4 or week24+3"
+            if ending := AMBIGUOUS_ENDING.match(match["more"]):
+                found = f"found {match[0]}{ending[0]}; expected one such as week24.4 or week24+3"
+                cause = f"the name gives an ambiguous age: {found}"
                 return ScanAge(None, cause=cause)
         weeks = {match["age"]: read_week(match["age"].lower()) for match in matches}
         if len({week for week, _ in weeks.values()}) > 1:

@@ -9,6 +9,7 @@ import yaml
 from click.testing import CliRunner
 from configurations import touched
 from facts import Facts
+from scan_trees import make_tree
 from shapes import sphere
 
 from gyriflow.cli.commands import main
@@ -81,17 +82,17 @@ def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
     either = np.array([0, 3, 3, 0, 0, 2, 3, 0, 3])[labels]
     # one volume alone could be of two, with another one it cannot
     saved(tmp_path / "whole", a=either, b=renumbered(labels, "feta-7"))
-    assert {brain.entry["scheme"] for brain in recognise(tmp_path / "whole")} == {"feta-7"}
+    assert {brain.entry["scheme"] for brain in recognise(tmp_path / "whole").brains} == {"feta-7"}
     saved(tmp_path / "two", a=either)
-    (brain,) = recognise(tmp_path / "two")
+    (brain,) = recognise(tmp_path / "two").brains
     assert brain.entry["scheme"] == UNSET
     assert brain.notes == [Facts("scheme:", "drawem-9", "feta-7")]
-    (brain,) = recognise(tmp_path / "two", scheme="feta-7")
+    (brain,) = recognise(tmp_path / "two", scheme="feta-7").brains
     assert (brain.entry["scheme"], brain.notes) == ("feta-7", [])
     # a folder may hold two data sets, but a subject is of one
     mixed = {"sub-01_ses-1": labels, "sub-01_ses-2": sided(labels), "sub-02_ses-1": labels}
     saved(tmp_path / "mixed", **mixed)
-    first, second, other = sorted(recognise(tmp_path / "mixed"), key=lambda brain: brain.entry["id"])
+    first, second, other = sorted(recognise(tmp_path / "mixed").brains, key=lambda brain: brain.entry["id"])
     assert first.notes == second.notes == [Facts("scheme:", "sub-01", "dhcp-19", "spina-bifida-atlas")]
     assert (first.entry["scheme"], other.entry["scheme"], other.notes) == (UNSET, "spina-bifida-atlas", [])
 
@@ -99,19 +100,17 @@ def test_a_scheme_is_that_of_the_data_set_or_asked_for(tmp_path):
 def configured(folder):
     """Return the configuration that is written for a folder, in it."""
     path = folder / "gyriflow.yaml"
-    list(write_configuration(folder, path, force=False))
+    write_configuration(recognise(folder), folder, path)
     return load(yaml.safe_load(path.read_text()), folder)
 
 
 def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
-    for side in ("left", "right"):
-        touched(
-            tmp_path, *(f"fetal.week22.{side}.{kind}.surf.gii" for kind in ("pial", "wm", "sphere", "midthickness"))
-        )
-    touched(tmp_path, "fetal.week23.left.pial.surf.gii")
-    touched(tmp_path, *(f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white")))
+    kinds = ("pial", "wm", "sphere", "midthickness")
+    surfaces = [f"fetal.week22.{side}.{kind}.surf.gii" for side in ("left", "right") for kind in kinds]
+    surfaces += [f"sub-07/surf/{side}.{kind}" for side in ("lh", "rh") for kind in ("pial", "white", "pial.T1")]
+    make_tree(tmp_path, surfaces=[*surfaces, "fetal.week23.left.pial.surf.gii"])
     (tmp_path / "participants.tsv").write_text("participant_id\tsex\tweek\nsub-07\tF\t27.3\nsub-08\tM\tn/a\n")
-    first, alone, second = (brain.entry for brain in recognise(tmp_path))
+    first, alone, second = (brain.entry for brain in recognise(tmp_path).brains)
     assert first == {
         "id": "fetal.week22",
         "week": 22.0,
@@ -127,7 +126,8 @@ def test_an_age_is_read_from_a_name_that_says_week_or_ga(tmp_path):
     names = ("week21_dseg", "sub-01_ga-26.4_dseg", "sub-21_dseg", "image24_dseg", "AGA23_dseg")
     for name in names:
         (tmp_path / f"{name}.nii.gz").write_bytes(LABELS.read_bytes())
-    weeks = {Path(brain.entry["labels"]).name.split(".nii")[0]: brain.entry["week"] for brain in recognise(tmp_path)}
+    brains = recognise(tmp_path).brains
+    weeks = {Path(brain.entry["labels"]).name.split(".nii")[0]: brain.entry["week"] for brain in brains}
     assert weeks == {**dict.fromkeys(names, UNSET), "week21_dseg": 21.0, "sub-01_ga-26.4_dseg": 26.4}
 
 
@@ -136,17 +136,20 @@ def test_a_configuration_is_written_that_is_valid(tmp_path):
         (tmp_path / name).mkdir()
         (tmp_path / name / "parcellation.nii.gz").write_bytes(LABELS.read_bytes())
     path = tmp_path / "gyriflow.yaml"
-    said = list(write_configuration(tmp_path, path, force=False))
-    assert said[:2] == [Facts(f"{name}:", "spina-bifida-atlas", int(name[2:])) for name in ("GA21", "GA22")]
-    assert said[2] == Facts("spina-bifida-atlas", 2)
+    done = CliRunner().invoke(main, ["init", str(tmp_path)])
+    assert done.exit_code == 0
+    assert [line for line in done.output.splitlines() if line.startswith("GA")] == [
+        Facts(f"GA{week}", week, f"name ({week})", "parcellation.nii.gz", "spina-bifida-atlas", "ok")
+        for week in (21, 22)
+    ]
+    assert done.output == Facts("spina-bifida-atlas: 2", "2 scans")
     config = load(yaml.safe_load(path.read_text()), tmp_path)
     assert [(brain.id, brain.week) for brain in config.brains] == [("GA21", 21.0), ("GA22", 22.0)]
     assert config.start == "GA21"
     assert list(config.runs) == ["reference", "measured"]
     assert config.mesh.order == 2
     with pytest.raises(InputError, check=Facts(path, "--force")):
-        list(write_configuration(tmp_path, path, force=False))
-    assert list(write_configuration(tmp_path, path, force=True)) == said
+        write_configuration(recognise(tmp_path), tmp_path, path)
     done = CliRunner().invoke(main, ["init", str(tmp_path), "--force", "--scheme", "feta-7"])
     assert Facts("feta-7", 2) in done.output.splitlines()
     written = yaml.safe_load(path.read_text())
@@ -189,7 +192,7 @@ def test_sessions_of_bids_are_scans_of_their_subject(tmp_path):
     (own / "sub-01").mkdir(parents=True)
     (own / "sub-01" / "sub-01_desc-x_dseg.nii.gz").write_bytes(LABELS.read_bytes())
     (own / "dataset_description.json").write_text('{"GeneratedBy": [{"Name": "gyriflow"}]}')
-    first, second = (brain.entry for brain in recognise(tmp_path))
+    first, second = (brain.entry for brain in recognise(tmp_path).brains)
     assert (first["id"], first["week"], first["subject"]) == ("sub-01_ses-1", 21.29, "sub-01")
     assert (second["id"], second["week"], second["subject"]) == ("sub-01_ses-2", 24.43, "sub-01")
     assert first["covariates"] == {"sex": "F", "tesla": "3.0"}
@@ -240,7 +243,15 @@ def test_a_bids_app_measures_and_folds_the_first_of_several_scans_where_told(app
 
 def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     (tmp_path / "own.yaml").write_text("{mesh: {order: 1}, runs: {mine: {}}, folding: {poisson_ratio: 0.4}}")
-    options = ("--participant-label", "02", "01", "--session-label", "ses-2", "--settings", str(tmp_path / "own.yaml"))
+    options = (
+        "--participant-label",
+        "01",
+        "sub-01",
+        "--session-label",
+        "ses-2",
+        "--settings",
+        str(tmp_path / "own.yaml"),
+    )
     _, written = app("participant", *options, "--fold")
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-2"]
     assert (written["start"], written["runs"], written["mesh"]) == ("sub-01_ses-2", {"mine": {}}, {"order": 1})
