@@ -238,8 +238,8 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
     """Measure brains and write the report, without simulations.
 
     The brains are those of a folder or a configuration. In a FOLDER without gyriflow.yaml, one is written, as by
-    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished, and the exit code
-    is that of the first failure.
+    `gyriflow init`. It needs neither `start` nor `folding`. If a brain fails, the others are finished; the exit code is
+    that of the first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
     from .init import write_configuration

@@ -22,7 +22,7 @@ from ..settings.participants import WeekNotation
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
 from ..study.participants import TABLE_NAME, ScanTables, covariates
 
-LABEL_NAME = re.compile(r"label|(?<!prob)seg|parcellation|tissue", re.IGNORECASE)
+LABEL_NAME = re.compile(r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE)
 SIDE_NAME = re.compile(
     r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=\.)L(?=\.))|(right|rh|hemi-R|(?<=\.)R(?=\.)))(?=[._-])", re.IGNORECASE
 )
@@ -35,7 +35,7 @@ NO_BRAIN_NAME = re.compile(
 RESAMPLED_NAME = re.compile(r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[._]|$)", re.IGNORECASE)
 SPACE_NAME = re.compile(r"(?<![A-Za-z0-9])space-([A-Za-z0-9]+)")
 NATIVE_SPACES = ("orig", "native", "individual", "subject", "anat", "scanner", "acpc", "t1w", "t2w")
-TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage.*")
+TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage(?!_LR).*")
 GENERIC_FOLDERS = (
     "surf",
     "mri",
@@ -68,6 +68,7 @@ class FoundBrain:
     """A recognised scan: its entry of `brains`, where its age is from, and what is wrong with it.
 
     `problem` is why its files cannot be used, `contradiction` why its age cannot; `notes` are values to fill in.
+    `unreadable` files are damaged or missing.
     """
 
     entry: dict[str, Any]
@@ -75,6 +76,7 @@ class FoundBrain:
     session: str | None = None
     age_source: str = ""
     problem: str = ""
+    unreadable: bool = False
     contradiction: str = ""
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -291,18 +293,13 @@ def _hemispheres(folder: Path, files: Sequence[Path]) -> Iterator[_Candidate]:
             )
         elif len(white) == 1 and len(pair) == 2:
             problem = f"has one white surface, {next(iter(white.values()))}; expected both or none"
-        for surface in (*sides.values(), *white.values()):
-            problem = problem or _unreadable(folder / surface)
         yield _Candidate(file, source, _space(file, surface=True), problem)
 
 
-def _unreadable(path: Path) -> str:
-    """Return why a file cannot be opened, or ""."""
-    try:
-        with reading(path, "a surface"), path.open("rb") as file:
-            return "" if file.read(1) else f"{path}: is empty"
-    except InputError as error:
-        return str(error)
+def _require_content(path: Path) -> None:
+    with reading(path, "a surface"), path.open("rb") as file:
+        if not file.read(1):
+            raise InputError("is empty", path=path, expected="a surface")
 
 
 def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
@@ -323,7 +320,7 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
         if "_T2w." in file.name:
             images[file.parent].append(str(file))
     for file in volumes:
-        if LABEL_NAME.search(file.name):
+        if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
             yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, surface=False))
 
@@ -372,11 +369,14 @@ def _found_brain(
         return brain
     try:
         if "labels" in candidate.source:
-            brain.fits = scheme_fits(read_label_volume(folder / candidate.file).labels)
+            brain.fits = scheme_fits(read_label_volume(folder / candidate.file, cropped=True).labels)
         elif "pial" in candidate.source:
             _require_brain(folder / candidate.file)
+        else:
+            for file in (*brain.files.split(", "), *candidate.source.get("white", ())):
+                _require_content(folder / file)
     except InputError as error:
-        brain.problem = str(error)
+        brain.problem, brain.unreadable = str(error), True
     return brain
 
 
@@ -409,7 +409,7 @@ def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
 
 
 def _equal_but_for_zeros(subject: str, tables: ScanTables) -> str:
-    """Return what tables have instead of a subject: ids that differ in zeros or case, or else all; "" without tables."""
+    """Return which ids tables have instead of a subject: those that differ in zeros or case, or some of all."""
     ids = {row.subject: row.place for table in tables.tables for row in table.rows}
     near = [other for other in ids if other.lower().lstrip("0") == subject.lower().lstrip("0")]
     if not ids:
@@ -438,7 +438,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
     entry, fits = (
         {"id": _Candidate(file, {}).scan, "labels": str(file), "scheme": UNSET},
-        scheme_fits(read_label_volume(file).labels),
+        scheme_fits(read_label_volume(file, cropped=True).labels),
     )
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:

@@ -61,7 +61,8 @@ def _row(brain: FoundBrain, measured: tuple[str, str] | None) -> ScanRow:
     entry = brain.entry
     week, scheme = entry["week"], entry.get("scheme", "–")
     reasons = [*brain.causes, *brain.warnings]
-    verdict = "not read" if brain.problem else "refused" if brain.contradiction else "fill in" if brain.notes else "ok"
+    verdict = "not read" if brain.unreadable else "refused" if brain.problem or brain.contradiction else "ok"
+    verdict = "fill in" if verdict == "ok" and brain.notes else verdict
     if measured and verdict == "ok":
         verdict, cause = measured
         reasons += [cause] if cause else []

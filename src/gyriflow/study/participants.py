@@ -200,6 +200,9 @@ class ScanTables:
         given = [age for table, row in exact for age in table.ages_in(row)]
         of_subject = [age for table, row in general for age in table.ages_in(row)]
         is_only_scan &= len({*sessions, session} - {None}) < 2
+        if any(age.column.kind == "scan" and age.text not in MISSING_VALUES for age in given) and not is_only_scan:
+            # only to say that it is the age at birth
+            given += [age for age in of_subject if age.column.kind == "gestational"]
         age = choose_age([*given, *(of_subject if is_only_scan else ())], self.notation)
         if torn and not (given and age.week is not None):
             # it may have the age of exactly this scan

@@ -64,9 +64,22 @@ WEEKS = {"gestational_age": {"Units": "weeks"}}
                 {},
                 {"sub-01": 29.4},
             )
-            for column in ("scan_age", "pma", "ga_at_scan", "age_at_mri", "PMA", "postmenstrual_age_at_scan", "scan_ga_weeks")
+            for column in (
+                "scan_age",
+                "pma",
+                "ga_at_scan",
+                "age_at_mri",
+                "PMA",
+                "postmenstrual_age_at_scan",
+                "scan_ga_weeks",
+            )
         ),
-        ([LONE], {TABLE: ["participant_id birth_age scan_age", "sub-01 33.1 n/a"]}, {}, {"sub-01": Facts("scan_age", "n/a")}),
+        (
+            [LONE],
+            {TABLE: ["participant_id birth_age scan_age", "sub-01 33.1 n/a"]},
+            {},
+            {"sub-01": Facts("scan_age", "n/a")},
+        ),
         # postnatal ages
         (
             [LONE],
@@ -86,7 +99,12 @@ WEEKS = {"gestational_age": {"Units": "weeks"}}
             {SIDECAR: {"gestational_age": {"Units": "weeks", "Description": "gestational age at birth"}}},
             {"sub-01": Facts("at birth")},
         ),
-        ([LONE], {TABLE: ["participant_id postnatal_age_weeks", "sub-01 24"]}, {}, {"sub-01": Facts("postnatal_age_weeks", "scan_age")}),
+        (
+            [LONE],
+            {TABLE: ["participant_id postnatal_age_weeks", "sub-01 24"]},
+            {},
+            {"sub-01": Facts("postnatal_age_weeks", "scan_age")},
+        ),
         # units
         (
             [LONE],
@@ -137,7 +155,12 @@ WEEKS = {"gestational_age": {"Units": "weeks"}}
         ([LONE], {TABLE: ["participant_id ga week", "sub-01 22 28"]}, {}, {"sub-01": Facts("ga", 22, "week", 28)}),
         ([LONE], {TABLE: ["participant_id ga ga", "sub-01 22 28"]}, {}, {"sub-01": Facts("ga", 22, 28)}),
         ([LONE], {TABLE: ["participant_id ga GA", "sub-01 22 22"]}, {}, {"sub-01": 22.0}),
-        ([LONE], {TABLE: ["participant_id sex ga", "sub-01 F 22", "sub-01 M 22"]}, {}, {"sub-01": Facts("sex", "F", "M")}),
+        (
+            [LONE],
+            {TABLE: ["participant_id sex ga", "sub-01 F 22", "sub-01 M 22"]},
+            {},
+            {"sub-01": Facts("sex", "F", "M")},
+        ),
         # tables of sessions
         (
             [FIRST],
@@ -159,12 +182,20 @@ WEEKS = {"gestational_age": {"Units": "weeks"}}
         ),
         (
             [FIRST],
-            {SESSIONS: ["session_id scan_age", "1 22"], "sessions.tsv": ["participant_id session_id scan_age", "01 1 28"]},
+            {
+                SESSIONS: ["session_id scan_age", "1 22"],
+                "sessions.tsv": ["participant_id session_id scan_age", "01 1 28"],
+            },
             {},
             {"sub-01_ses-1": Facts(22, 28, "sub-01_sessions.tsv", "sessions.tsv")},
         ),
         # formats
-        ([LONE], {"participants.csv": ["participant_id;Gestational;Age", "sub-01;24;x"]}, {}, {"sub-01": Facts("participants.csv")}),
+        (
+            [LONE],
+            {"participants.csv": ["participant_id;Gestational;Age", "sub-01;24;x"]},
+            {},
+            {"sub-01": Facts("participants.csv")},
+        ),
         # the name of the file and the table
         (["sub-01_GA-26_dseg.nii.gz"], {TABLE: ["participant_id ga", "sub-01 26.4"]}, {}, {"sub-01": 26.4}),
         (
@@ -174,7 +205,7 @@ WEEKS = {"gestational_age": {"Units": "weeks"}}
             {"sub-01": Facts(28, "26", "participants.tsv")},
         ),
     ],
-)  # fmt: skip
+)
 def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, sidecars, expected):
     assert ages(make_tree(tmp_path, labels=labels, tables=tables, json=sidecars)) == expected
 

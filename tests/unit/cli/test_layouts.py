@@ -1,0 +1,215 @@
+"""Scans, ages and files of folders as public data sets and pipelines have them, and files that cannot be used."""
+
+import pytest
+from facts import Facts
+from scan_trees import make_tree
+from shapes import cerebrum_surface, phantom
+
+from gyriflow.cli.recognition import recognise
+from gyriflow.errors import InputError
+from gyriflow.io.surfaces import write_surface
+
+
+def both(pattern):
+    """Return the paths of both sides, L and R or lh and rh for @."""
+    return [pattern.replace("@", side) for side in (("lh", "rh") if "/@." in pattern else ("L", "R"))]
+
+
+def brains(folder, **options):
+    """Return week, files and causes of each scan by id."""
+    found = recognise(folder, **options).brains
+    return {brain.entry["id"]: (brain.entry["week"], brain.files, " ".join(brain.causes)) for brain in found}
+
+
+NIBABIES = "derivatives/nibabies/sub-01/ses-1/anat/sub-01_ses-1"
+DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
+HCP = "100307/{}/100307.@.{}"
+
+
+@pytest.mark.parametrize(
+    ("contents", "expected"),
+    [
+        # FeTA 2.x
+        (
+            {
+                "labels": [f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz" for n in (26, 27)],
+                "text": {
+                    "participants.tsv": "participant_id\tPathology\tGestational age\nsub-026\tNeurotypical\t23.3\n"
+                    "sub-027\tPathological\t26.9"
+                },
+            },
+            {
+                f"sub-0{n}": (week, f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz", "")
+                for n, week in ((26, 23.3), (27, 26.9))
+            },
+        ),
+        # dHCP: several kinds of one scan are asked for, with ages at the scan of sessions
+        (
+            {
+                "labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"],
+                "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
+                "tables": {
+                    "participants.tsv": ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
+                    "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv": ["session_id scan_age", "3530 29.71"],
+                },
+            },
+            {
+                "sub-CC00856XX15_ses-3530": (
+                    29.71,
+                    ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")),
+                    Facts("2 files", "keep one"),
+                ),
+                "sub-CC00856XX15_ses-3530-2": (29.71, f"{DHCP}_desc-drawem9_dseg.nii.gz", Facts("2 files", "keep one")),
+            },
+        ),
+        # fetpype's derivatives
+        (
+            {
+                "labels": [
+                    "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
+                ],
+                "tables": {"participants.tsv": ["participant_id session_id ga", "sub-01 ses-01 24+3"]},
+            },
+            {"sub-01_ses-01": (24.43, Facts("sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"), "")},
+        ),
+        # NiBabies: a template's space and meshes beside the subject's own
+        (
+            {
+                "labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
+                "surfaces": [
+                    *both(f"{NIBABIES}_hemi-@_pial.surf.gii"),
+                    *both(f"{NIBABIES}_hemi-@_white.surf.gii"),
+                    *both(f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii"),
+                ],
+                "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
+                "tables": {"participants.tsv": ["participant_id pma", "sub-01 41.2"]},
+            },
+            {"sub-01_ses-1": (41.2, ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")), "")},
+        ),
+        # FreeSurfer, with its template
+        (
+            {
+                "surfaces": [
+                    *both("subjects/sub-01/surf/@.pial"),
+                    *both("subjects/sub-01/surf/@.pial.T1"),
+                    *both("subjects/sub-01/surf/@.white"),
+                    *both("subjects/sub-01/surf/@.sphere"),
+                    *both("subjects/sub-02/surf/@.pial.T1"),
+                    *both("subjects/fsaverage/surf/@.pial"),
+                ],
+                "labels": ["subjects/sub-01/mri/aseg.mgz", "subjects/sub-01/mri/aparc+aseg.mgz"],
+                "tables": {"subjects/participants.tsv": ["participant_id week", "sub-01 36", "sub-02 37"]},
+            },
+            {
+                "sub-01": (36.0, "subjects/sub-01/surf/lh.pial, subjects/sub-01/surf/rh.pial", ""),
+                "sub-02": (37.0, "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1", ""),
+                "fsaverage": ("CHOOSE", Facts("fsaverage/surf/lh.pial"), Facts("of a template, fsaverage")),
+            },
+        ),
+        # Infant FreeSurfer, without sub-
+        (
+            {
+                "surfaces": [*both("case7/surf/@.pial"), *both("case8/surf/@.pial")],
+                "labels": ["case7/mri/aseg.mgz"],
+                "tables": {"participants.tsv": ["participant_id week", "case7 36", "case8 37"]},
+            },
+            {f"case{n}": (29.0 + n, f"case{n}/surf/lh.pial, case{n}/surf/rh.pial", "") for n in (7, 8)},
+        ),
+        # HCP
+        (
+            {
+                "surfaces": [
+                    *both(HCP.format("T1w/Native", "pial.native.surf.gii")),
+                    *both(HCP.format("T1w/Native", "white.native.surf.gii")),
+                    *both(HCP.format("T1w/fsaverage_LR32k", "pial.32k_fs_LR.surf.gii")),
+                    *both(HCP.format("MNINonLinear/Native", "pial.native.surf.gii")),
+                ],
+                "tables": {"participants.tsv": ["participant_id week", "100307 36"]},
+            },
+            {"100307": (36.0, ", ".join(both(HCP.format("T1w/Native", "pial.native.surf.gii"))), "")},
+        ),
+        # a clone of git-annex with and without contents
+        (
+            {
+                "lost": ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/@.pial")],
+                "labels": ["sub-03_week26_dseg.nii.gz"],
+            },
+            {
+                "sub-01": (24.0, "sub-01_week24_dseg.nii.gz", Facts("sub-01_week24_dseg.nii.gz")),
+                "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
+                "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", ""),
+            },
+        ),
+    ],
+    ids=["FeTA", "dHCP", "fetpype", "NiBabies", "FreeSurfer", "Infant FreeSurfer", "HCP", "git-annex"],
+)
+@pytest.mark.fault(84)
+def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
+    assert brains(make_tree(tmp_path, **contents)) == expected
+
+
+WEEK = "sub-01_week24"
+
+
+@pytest.mark.fault(85)
+@pytest.mark.parametrize(
+    ("contents", "cause"),
+    [
+        ({"labels": [f"{WEEK}_space-MNI152NLin6Asym_dseg.nii.gz"]}, Facts("MNI152NLin6Asym")),
+        ({"labels": [f"{WEEK}_space-dhcpSym_dseg.nii.gz"]}, Facts("dhcpSym")),
+        ({"labels": [f"{WEEK}_space-T2w_dseg.nii.gz"]}, ""),
+        ({"labels": [f"tpl-x/{WEEK}_dseg.nii.gz"]}, Facts("tpl-x")),
+        ({"labels": [f"sub-02/{WEEK}_dseg.nii.gz"]}, Facts("sub-01", "sub-02")),
+        ({"text": {f"{WEEK}_dseg.nii.gz": "no labels"}}, Facts(f"{WEEK}_dseg.nii.gz")),
+        ({"surfaces": both(f"{WEEK}/@.white")}, Facts("white", "pial")),
+        ({"surfaces": both(f"{WEEK}/@.pial")}, ""),
+        ({"surfaces": [f"{WEEK}/lh.pial"]}, ""),
+        ({"surfaces": [f"{WEEK}/lh.pial", f"{WEEK}/rh.sphere"]}, Facts("right", "rh.sphere")),
+        ({"surfaces": [f"{WEEK}/lh.pial"], "lost": [f"{WEEK}/rh.pial"]}, Facts("rh.pial")),
+        ({"surfaces": [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"]}, Facts("white", "lh.white")),
+        ({"surfaces": [*both(f"{WEEK}/@.pial"), f"{WEEK}/lh.white"], "lost": [f"{WEEK}/rh.white"]}, Facts("rh.white")),
+        ({"surfaces": [f"{WEEK}/lh.pial"], "text": {f"{WEEK}/rh.pial": ""}}, ""),
+        ({"surfaces": both(f"{WEEK}_hemi-@_space-fsLR_den-32k_pial.surf.gii")}, ""),
+    ],
+)  # fmt: skip
+def test_files_that_cannot_be_used_are_named(tmp_path, contents, cause):
+    ((_, _, found),) = brains(make_tree(tmp_path, **contents)).values()
+    assert found == cause
+
+
+def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
+    make_tree(tmp_path, surfaces=both("sub-01_hemi-@_space-fsLR_den-32k_pial.surf.gii"))
+    (brain,) = recognise(tmp_path).brains
+    assert (len(brain.warnings), brain.problem) == (1, "")
+
+
+@pytest.mark.fault(86)
+def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
+    brain = cerebrum_surface(*phantom(24.0, 2.0))
+    write_surface(tmp_path / "24.stl", brain)
+    write_surface(tmp_path / "week25.ply", brain)
+    write_surface(tmp_path / "skull.stl", brain)
+    write_surface(tmp_path / "nut.stl", type(brain)(0.1 * brain.vertices, brain.faces))
+    assert brains(tmp_path) == {
+        "week25": (25.0, "week25.ply", ""),
+        "24": ("CHOOSE", "24.stl", Facts("week")),
+        "nut": ("CHOOSE", "nut.stl", Facts("nut.stl", "mL", 15, 700)),
+    }
+
+
+def test_only_results_of_gyriflow_are_passed_over(tmp_path):
+    make_tree(
+        tmp_path,
+        labels=["results/week24_dseg.nii.gz", "own/results/brains/a/week25_dseg.nii.gz"],
+        text={"own/results/study/study.json": "{}"},
+    )
+    assert list(brains(tmp_path)) == ["week24"]
+    with pytest.raises(InputError, check=Facts(tmp_path / "own")):
+        recognise(tmp_path / "own")
+
+
+def test_labels_of_other_participants_are_not_read(tmp_path, monkeypatch):
+    make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"], text={"sub-02_week25_dseg.nii.gz": "torn"})
+    assert list(brains(tmp_path, participants=["01"])) == ["sub-01"]
+    ((_, _, cause),) = brains(tmp_path, participants=["02"]).values()
+    assert cause == Facts("sub-02_week25_dseg.nii.gz")
