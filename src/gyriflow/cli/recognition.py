@@ -19,6 +19,7 @@ from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean
 from ..settings.participants import WeekNotation
+from ..settings.terms import SIDES, Side
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
 from ..study.participants import TABLE_NAME, ScanTables, covariates
 
@@ -156,7 +157,7 @@ def recognise(
     own += [results.parent / "resources" for results in own]
     files = [file for file in every if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
-    candidates = [*_hemispheres(folder, files), *_whole_surfaces(files), *_volumes(files)]
+    candidates = [*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)]
     found: dict[str, list[_Candidate]] = defaultdict(list)
     for candidate in candidates:
         if fnmatch(str(candidate.file), pattern):
@@ -241,25 +242,25 @@ def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
 RESAMPLED = "resampled"
 
 
-def _space(file: Path, *, surface: bool) -> str:
+def _space(file: Path, *, is_surface: bool) -> str:
     """Return the space of a file, "" for the subject's own; a subject's surface on a template's mesh is resampled."""
     if folders := [part for part in file.parts if TEMPLATE_FOLDER.fullmatch(part)]:
         return "of a template, " + folders[0]
     space = SPACE_NAME.search(file.name)
-    if surface and RESAMPLED_NAME.search(file.name) and not (space and space[1].startswith("MNI")):
+    if is_surface and RESAMPLED_NAME.search(file.name) and not (space and space[1].startswith("MNI")):
         return RESAMPLED
     return space[1] if space and space[1].lower() not in NATIVE_SPACES else ""
 
 
-def _hemispheres(folder: Path, files: Sequence[Path]) -> Iterator[_Candidate]:
-    surfaces: dict[tuple[str, str], dict[str, Path]] = {}
-    sides_of: dict[tuple[Path, str], dict[str, Path]] = defaultdict(dict)
+def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
+    surfaces: dict[tuple[str, str], dict[Side, Path]] = {}
+    traces_of: dict[tuple[Path, str], dict[Side, Path]] = defaultdict(dict)
     names = set(files)
     for file in files:
         side = SIDE_NAME.search(file.name)
         if side is None:
             continue
-        sides_of[file.parent, file.name[: side.start()]].setdefault("left" if side[1] else "right", file)
+        traces_of[file.parent, file.name[: side.start()]].setdefault("left" if side[1] else "right", file)
         # FreeSurfer's lh.pial is often a link to lh.pial.T1
         plain = re.sub(r"\.T[12]$", "", file.name)
         kind = LAYER_NAME.search(plain)
@@ -269,31 +270,27 @@ def _hemispheres(folder: Path, files: Sequence[Path]) -> Iterator[_Candidate]:
             sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
             sides["left" if side[1] else "right"] = file
     for (rest, layer), sides in surfaces.items():
-        pair = {name: str(sides[name]) for name in ("left", "right") if name in sides}
-        name, first = next(iter(pair.items()))
-        file = Path(first)
-        if layer == "white":
-            if (rest, "pial") not in surfaces:
-                source = {"hemispheres": pair}
-                yield _Candidate(file, source, _space(file, surface=True), "white surfaces alone; pial ones are needed")
-            continue
-        side = SIDE_NAME.search(file.name)
-        traces = sides_of[file.parent, file.name[: side.start()] if side else ""]
-        white = surfaces.get((rest, "white"), {})
-        source: dict[str, Any] = {"hemispheres": pair}
-        if len(pair) == 1:
-            source = {"hemisphere": {"file": first, "side": name}}
-        elif len(white) == 2:
-            source["white"] = [str(white["left"]), str(white["right"])]
+        pair = {name: str(sides[name]) for name in SIDES if name in sides}
+        first = next(iter(pair))
+        file, white = sides[first], surfaces.get((rest, "white"), {})
         problem = ""
-        if len(pair) < len(traces):
-            lost = next(iter({"left", "right"} - set(pair)))
-            problem = (
-                f"has no pial surface of the {lost} hemisphere; found {traces[lost]}; expected both or no {lost} file"
-            )
-        elif len(white) == 1 and len(pair) == 2:
-            problem = f"has one white surface, {next(iter(white.values()))}; expected both or none"
-        yield _Candidate(file, source, _space(file, surface=True), problem)
+        source: dict[str, Any] = {"hemispheres": pair}
+        if layer == "white":
+            if (rest, "pial") in surfaces:
+                continue
+            problem = "white surfaces alone; pial ones are needed"
+        elif len(pair) == 1:
+            source = {"hemisphere": {"file": str(file), "side": first}}
+            side = SIDE_NAME.search(file.name)
+            traces = traces_of[file.parent, file.name[: side.start()] if side else ""]
+            for lost in set(traces) - {first}:
+                found = f"found {traces[lost]}; expected both sides, or no file of the {lost} one"
+                problem = f"has no pial surface of the {lost} hemisphere; {found}"
+        elif len(white) == 1:
+            problem = f"has one white surface; found {next(iter(white.values()))}; expected both or none"
+        elif white:
+            source["white"] = [str(white[name]) for name in SIDES]
+        yield _Candidate(file, source, _space(file, is_surface=True), problem)
 
 
 def _require_content(path: Path) -> None:
@@ -310,7 +307,7 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
         has_no_side = not SIDE_NAME.search(name) and not NO_BRAIN_NAME.search(name)
         # GIFTI files may have other data than surfaces
         if name.endswith(SURFACE_SUFFIXES) and has_no_side and (is_named or not name.endswith((".gii", ".gii.gz"))):
-            yield _Candidate(file, {"pial": str(file)}, _space(file, surface=True))
+            yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True))
 
 
 def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
@@ -322,7 +319,7 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
-            yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, surface=False))
+            yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
 
 
 def _found_brain(

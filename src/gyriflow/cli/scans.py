@@ -24,7 +24,7 @@ class ScanRow(NamedTuple):
 
 def scan_lines(rows: Sequence[ScanRow]) -> Iterator[str]:
     """Yield the lines of a table of scans, and at the end how many of them can be used."""
-    table = [HEADINGS, *(row[: len(HEADINGS)] for row in rows)]
+    table: list[Sequence[str]] = [HEADINGS, *([str(text) for text in row[: len(HEADINGS)]] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]
     yield lines[0]

@@ -53,12 +53,17 @@ class AgeColumn:
 
 @dataclass(frozen=True)
 class GivenAge:
-    """An age that a place gives: table and row, the column, and the text of the cell."""
+    """An age that a table gives: its place (table and row), column and text.
+
+    `of_session` is whether the row names a session, `of_subject` whether the subject has other scans too, so that the
+    age is that of none.
+    """
 
     place: str
     column: AgeColumn
     text: str
     of_session: bool
+    of_subject: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,11 +132,12 @@ def choose_age(given: Sequence[GivenAge], notation: WeekNotation | None) -> Scan
     scan's own session. Without a value, or with two that differ, there is none, and a cause.
     """
     given = [age for age in given if age.text not in MISSING_VALUES]
-    if not given:
+    own = [age for age in given if not age.of_subject]
+    if not own:
         return ScanAge(None)
-    chosen = [age for age in given if age.column.kind == "scan"]
+    chosen = [age for age in own if age.column.kind == "scan"]
     if not chosen:
-        chosen = [age for age in given if age.of_session] or list(given)
+        chosen = [age for age in own if age.of_session] or own
         # a plain age beside a gestational one may be the mother's
         chosen = [age for age in chosen if age.column.kind == "gestational"] or chosen
     kind = chosen[0].column.kind

@@ -164,8 +164,10 @@ class ScanTables:
 
     def rows_of(self, subject: str, place: Path | None = None) -> list[tuple[Table, Row]]:
         """Return the rows of a subject in the tables that hold for a place (default: in all), with their tables."""
-        tables = [table for table in self.tables if place is None or place.is_relative_to(table.scope)]
-        return [(table, row) for table in tables for row in table.rows if row.subject == subject]
+        return [(table, row) for table in self._holding_for(place) for row in table.rows if row.subject == subject]
+
+    def _holding_for(self, place: Path | None) -> list[Table]:
+        return [table for table in self.tables if place is None or place.is_relative_to(table.scope)]
 
     def facts(
         self, subject: str, session: str | None, is_only_scan: bool = True, place: Path | None = None
@@ -175,13 +177,8 @@ class ScanTables:
         A row without a session is of a subject's only scan.
         """
         own = self.rows_of(subject, place)
-        torn = [
-            table.problem
-            for table in self.tables
-            if table.problem
-            and table.subject in (None, subject)
-            and (place is None or place.is_relative_to(table.scope))
-        ]
+        torn = [table.problem for table in self._holding_for(place) if table.subject in (None, subject)]
+        torn = [problem for problem in torn if problem]
         if not own and not torn:
             return None
         sessions = list(dict.fromkeys(row.session for _, row in own if row.session is not None))
@@ -189,30 +186,32 @@ class ScanTables:
             (session,) = sessions
         elif session is None and sessions:
             rows = ", ".join(f"{row.place} ({row.session})" for _, row in own if row.session is not None)
-            cause = f"its name has no session; found {rows}; expected ses-… in the name, as in session_id"
-            return ScanFacts(ScanAge(None, cause=cause), {})
-        exact = [(table, row) for table, row in own if session is not None and row.session == session]
-        general = [(table, row) for table, row in own if row.session is None]
-        for table in self.tables:
-            for rows in (exact, general):
-                if difference := _difference([row for other, row in rows if other is table]):
-                    return ScanFacts(ScanAge(None, cause=difference), {})
-        given = [age for table, row in exact for age in table.ages_in(row)]
-        of_subject = [age for table, row in general for age in table.ages_in(row)]
+            return _unknown(f"its name has no session; found {rows}; expected ses-… in the name, as in session_id")
         is_only_scan &= len({*sessions, session} - {None}) < 2
-        if any(age.column.kind == "scan" and age.text not in MISSING_VALUES for age in given) and not is_only_scan:
-            # only to say that it is the age at birth
-            given += [age for age in of_subject if age.column.kind == "gestational"]
-        age = choose_age([*given, *(of_subject if is_only_scan else ())], self.notation)
-        if torn and not (given and age.week is not None):
+        ages, of_session = [], False
+        values: dict[str, str] = {}
+        for label in dict.fromkeys((None, session)):
+            rows_of_scan = [(table, row) for table, row in own if row.session == label]
+            for table in self.tables:
+                if difference := _difference([row for other, row in rows_of_scan if other is table]):
+                    return _unknown(difference)
+            given = [age for table, row in rows_of_scan for age in table.ages_in(row)]
+            ages += given if label == session or is_only_scan else [replace(age, of_subject=True) for age in given]
+            of_session = bool(given)
+            values |= {key: text for _, row in rows_of_scan for key, text in row.values.items()}
+        age = choose_age(ages, self.notation)
+        if torn and not (of_session and session is not None and age.week is not None):
             # it may have the age of exactly this scan
-            age = ScanAge(None, cause=torn[0])
-        elif age.week is None and not age.cause:
-            age = ScanAge(None, cause=_missing_age(own, [*given, *of_subject], session, sessions))
-        elif age.week is not None and self.ambiguity:
-            age = ScanAge(None, cause=self.ambiguity)
-        values = {key: text for _, row in (*general, *exact) for key, text in row.values.items()}
+            return _unknown(torn[0])
+        if age.week is None and not age.cause:
+            return _unknown(_missing_age(own, ages, session, sessions))
+        if age.week is not None and self.ambiguity:
+            return _unknown(self.ambiguity)
         return ScanFacts(age, {key: text for key, text in values.items() if key not in age.columns})
+
+
+def _unknown(cause: str) -> ScanFacts:
+    return ScanFacts(ScanAge(None, cause=cause), {})
 
 
 def _missing_age(

@@ -268,6 +268,27 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert {brain["scheme"] for brain in app("group")[1]["brains"]} == {"feta-7"}
 
 
+@pytest.mark.fault(85)
+def test_scans_that_cannot_be_used_are_counted_and_the_others_go_on(app, tmp_path):
+    make_tree(
+        tmp_path / "data",
+        text={"sub-02/sub-02_dseg.nii.gz": "torn", "seg/week24_dseg.nii.gz": "torn"},
+        labels=["sub-03/sub-03_dseg.nii.gz"],
+        tables={"sub-03/sub-03_sessions.tsv": ["session_id ga week", "1 22 28"]},
+    )
+    output = app("participant", code=2)
+    assert output == Facts("2 of 4 scans", "1 could not be read", "1 cannot be used", "sub-02_dseg.nii.gz")
+    assert output == Facts("not used: seg/week24_dseg.nii.gz", "ga", 22, "week", 28)
+    written = yaml.safe_load((tmp_path / "out" / "work" / "gyriflow.yaml").read_text())
+    assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
+    assert app("participant", "--participant-label", "02", code=2) == Facts("sub-02_dseg.nii.gz", "no scan")
+    assert app("participant", "--participant-label", "1", code=2) == Facts("sub-1", "sub-01, sub-02, sub-03")
+    done = CliRunner().invoke(main, ["measure", str(tmp_path / "data"), "-d", str(tmp_path)])
+    assert (done.exit_code, done.output) == (2, Facts("2 of 5 scans"))
+    written = yaml.safe_load((tmp_path / "data" / "gyriflow.yaml").read_text())
+    assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
+
+
 def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
     bids_folder(tmp_path)
     told = {}

@@ -18,7 +18,7 @@ from shapes import sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.files import read_json, read_text_table, read_table
+from gyriflow.io.files import read_json, read_table, read_text_table
 from gyriflow.io.surfaces import (
     read_surface,
     read_vertex_labels,

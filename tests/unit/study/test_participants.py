@@ -131,6 +131,26 @@ def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(fol
         config(folder)
 
 
+@pytest.mark.fault(83)
+def test_ages_of_a_table_follow_the_rules_of_a_data_set(folder):
+    head = ("participant_id", "visit", "gestational_age", "scan_age", "labels", "scheme")
+    rows = [("sub-1", visit, "33.1", age, "a.nii.gz", "feta-7") for visit, age in (("1", "22.3"), ("2", "28.1"))]
+    write(folder, head, *rows)
+    found = load(RAW | {"start": "first"}, folder)
+    assert [(brain.id, brain.week) for brain in found.brains] == [("sub-1_ses-1", 22.3), ("sub-1_ses-2", 28.1)]
+    assert found.age_sources["sub-1_ses-1"] == Facts("participants.tsv", "scan_age", "gestational_age", 33.1)
+    write(folder, head, *rows, ("sub-1", "1", "33.1", "22.8", "a.nii.gz", "feta-7"))
+    assert refusal(RAW, folder) == Facts("sub-1_ses-1", "scan_age", 22.3, 22.8, "row 2", "row 4")
+    write(folder, head, *rows, ("sub-2", "1", "33.1", "26.6", "a.nii.gz", "feta-7"))
+    assert refusal(RAW, folder) == Facts("participants.ages", "decimal", "days")
+    days = {"file": "bids/participants.tsv", "ages": "days"}
+    found = load(RAW | {"participants": days, "start": "first"}, folder)
+    assert [brain.week for brain in found.brains] == [22.43, 28.14, 26.86]
+    (folder / "bids" / "sub-2").mkdir()
+    (folder / "bids" / "sub-2" / "sub-2_sessions.tsv").symlink_to("nowhere")
+    assert refusal(RAW | {"participants": days}, folder) == Facts("sub-2_ses-1", "sub-2_sessions.tsv")
+
+
 def test_a_participant_has_a_brain_for_each_session(folder):
     write(folder, ("participant_id", "sex"), ("sub-1", "F"), ("sub-2", "M"))
     for name, ages in (("sub-1", ("21.5", "24.5")), ("sub-2", ("22.5", "23.5"))):
