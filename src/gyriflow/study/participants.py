@@ -177,8 +177,7 @@ class ScanTables:
         A row without a session is of a subject's only scan.
         """
         own = self.rows_of(subject, place)
-        torn = [table.problem for table in self._holding_for(place) if table.subject in (None, subject)]
-        torn = [problem for problem in torn if problem]
+        torn = [table for table in self._holding_for(place) if table.problem and table.subject in (None, subject)]
         if not own and not torn:
             return None
         sessions = list(dict.fromkeys(row.session for _, row in own if row.session is not None))
@@ -200,9 +199,10 @@ class ScanTables:
             of_session = bool(given)
             values |= {key: text for _, row in rows_of_scan for key, text in row.values.items()}
         age = choose_age(ages, self.notation)
-        if torn and not (of_session and session is not None and age.week is not None):
-            # it may have the age of exactly this scan
-            return _unknown(torn[0])
+        # a table that cannot be read may have the age of exactly this scan
+        torn = [table for table in torn if table.subject or age.week is None or not (of_session and session)]
+        if torn:
+            return _unknown(torn[0].problem)
         if age.week is None and not age.cause:
             return _unknown(_missing_age(own, ages, session, sessions))
         if age.week is not None and self.ambiguity:
