@@ -29,11 +29,12 @@ from ..settings.root import Config
 from ..settings.schemes import LabelScheme
 from ..settings.terms import ELEMENTS_NEEDED
 from ..settings.varying import Varying, curve_at
-from ..study.atlases import known_checksums, used_atlases
+from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
 from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
 from .recognition import scheme_fits
+from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
 THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
@@ -58,12 +59,12 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     with _inside(directory, path) as file:
         config = load(read_keys(file), folder_of(file))
         study, problems = resolve(config), list(input_problems(config))
-        valid = not any(bad for _, bad in problems)
+        valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
         unnamed = sum(not names_unit(volume) for volume in volumes) if valid else 0
         missing = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
-    yield from ((f"  {line}", bad) for line, bad in problems)
+    yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     if unnamed:
         yield f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm", False
@@ -72,6 +73,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     if valid:
         yield "  input files: all are readable and fit their label schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
+    yield from ((line, False) for line in scan_lines(list(_scans(config, problems))))
 
 
 @contextmanager
@@ -163,8 +165,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
             )
 
 
-def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
-    """Yield problems and warnings about the input files of the brains, each with whether it is a problem.
+def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
+    """Yield the brain's id and a problem or warning about its input files, each with whether it is a problem.
 
     Unreadable files and labels of another scheme are problems; an unusual size for the week is a warning.
     """
@@ -172,9 +174,19 @@ def input_problems(config: Config) -> Iterator[tuple[str, bool]]:
     for brain in config.brains:
         try:
             for doubt in _check_files(brain, config, checksums):
-                yield f"warning: brain {brain.id}: {doubt}", False
+                yield brain.id, doubt, False
         except GyriflowError as error:
-            yield f"brain {brain.id}: {error}", True
+            yield brain.id, str(error), True
+
+
+def _scans(config: Config, problems: Sequence[tuple[str, str, bool]]) -> Iterator[ScanRow]:
+    atlases = {brain["id"]: used.atlas.name for used in used_atlases(config) for brain in atlas_brains(used)}
+    for brain in config.brains:
+        verdicts = ["refused" if bad else "warning" for name, _, bad in problems if name == brain.id]
+        source = config.age_sources.get(brain.id) or atlases.get(brain.id, "configuration")
+        data = ", ".join(Path(file).name for file in brain.files) or brain.source
+        verdict = min(verdicts, default="ok")
+        yield ScanRow(brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict)
 
 
 def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[str, str]]) -> Iterator[str]:

@@ -31,7 +31,7 @@ from gyriflow.study.loading import load
 def problems(folder, **keys):
     brain = {"id": "a", "week": 23} | keys
     config = load({"brains": [brain], "start": "a", "folding": {"end_week": brain["week"] + 3}}, folder)
-    return [line for line, bad in input_problems(config) if bad]
+    return [text for _, text, bad in input_problems(config) if bad]
 
 
 def test_the_labels_of_one_hemisphere_are_read_as_labels(tmp_path):
@@ -62,7 +62,7 @@ def test_a_size_that_is_not_that_of_the_week_is_told(tmp_path, mm, doubts):
     write_label_volume(tmp_path / "l.nii.gz", LabelVolume(np.ones((45, 45, 40), np.int32), mm * np.eye(4)))
     brain = {"id": "a", "week": 38, "labels": "l.nii.gz", "scheme": "binary"}
     config = load({"brains": [brain], "start": "a", "folding": {"end_week": 39}}, tmp_path)
-    assert list(input_problems(config)) == doubts
+    assert [(text, bad) for _, text, bad in input_problems(config)] == doubts
 
 
 def test_labels_that_lie_as_those_of_another_scheme_are_refused():
