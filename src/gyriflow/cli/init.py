@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..io.files import read_json, write_json, write_text
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
-from ..settings.base import validated
+from ..settings.base import own_name, validated
 from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
@@ -109,9 +109,9 @@ def write_prediction(
             f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina bifida aperta and are not "
             "normal; unoperated ones end at 25 GW"
         )
-    entry = recognise_labels(labels.resolve(), scheme)
+    entry = recognise_labels(own_name(labels), scheme)
     entry = {"id": entry["id"], "week": weeks[0], "population": entry["id"]} | entry
-    entry |= {"image": str(image.resolve())} if image else {}
+    entry |= {"image": str(own_name(image))} if image else {}
     keys = {"name": atlas or SHIPPED_ATLAS, "folder": folder and str(folder), "accept_licence": accepted}
     settings = validated(AtlasSettings, keys, "--atlas").located(Path.cwd())
     series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted)
@@ -228,5 +228,5 @@ def _absolute(value: object, folder: Path) -> object:
     if isinstance(value, list):
         return [_absolute(item, folder) for item in value]
     if isinstance(value, str) and (folder / value).is_file():
-        return str((folder / value).resolve())
+        return str(own_name(folder / value))
     return value

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError
 from ..formats import is_volume
 from ..io.files import read_json, read_text_table
-from ..settings.base import located, path_in
+from ..settings.base import absent_content, located, own_name, path_in
 from ..settings.brains import SOURCES
 from ..settings.participants import ParticipantsSettings, WeekNotation
 from .ages import (
@@ -331,9 +331,9 @@ def _entry(
         value: Any = values[column]
         if column in PATHS:
             parts = value.split(";") if column == "white" else [value]
-            places = [path_in(folder, part.strip()).absolute() for part in parts]
+            places = [own_name(path_in(folder, part.strip())) for part in parts]
             if lost := [place for place in places if not place.is_file()]:
-                return {}, f"{column}: no such file: {lost[0]}"
+                return {}, f"{column}: {lost[0]}: {absent_content(lost[0]) or 'no such file'}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))
         *outer, last = column.split(".")
         section = entry

@@ -141,7 +141,7 @@ ABSENT = {
         ("a.img", lambda path: read_label_volume(path.with_suffix(".hdr"))),
         ("a.surf.gii", read_surface),
         ("lh.pial", read_surface),
-        ("a.tsv", read_tab_separated),
+        ("a.tsv", read_text_table),
         ("a.json", read_json),
         ("a.yaml", read_yaml),
     ],

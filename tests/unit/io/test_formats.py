@@ -75,7 +75,7 @@ def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
             assert (read_label_volume(path).labels == LABELS).all()
         assert is_volume(path) == (form.content == "volume")
         assert hide_paths({"file": path.name}) == {"file": "(file)"}
-    (found,) = recognise(tmp_path)
+    (found,) = recognise(tmp_path).brains
     # a pair is named by its header
     assert all(repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths)
 
