@@ -26,6 +26,7 @@ from ..geometry.triangles import (
     is_closed,
     merged,
     signed_volume,
+    split_sheets,
     submesh,
     vertex_areas,
     vertex_normals,
@@ -33,7 +34,7 @@ from ..geometry.triangles import (
 from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
-from .extraction import EDGE_SLOPE, LEVEL, Floats, isosurface, make_simple, without_stalks
+from .extraction import EDGE_SLOPE, LEVEL, Floats, Mask, isosurface, make_simple, without_stalks
 from .fissure import sample
 from .labels import REPORTED_LOSS
 from .terraces import without_terraces
@@ -171,6 +172,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tu
     `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
     all but the largest. MeshError for larger holes and for surfaces that stay open.
     """
+    mesh, turned = _turn_closed_pieces(mesh)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
     crossing = int(self_intersecting_faces(mesh).sum())
@@ -186,7 +188,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tu
             found=f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair",
             expected="a closed surface",
         )
-    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": sum(inward)}
+    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + sum(inward)}
     return mesh, doubles | opened | dropped | holes | counts
 
 
@@ -196,35 +198,73 @@ def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
 
+def _turn_closed_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Turn the two largest pieces outward where they are closed before vertices are merged; return how many."""
+    component, turned = face_components(mesh), 0
+    for number in range(min(component.max() + 1, 2)):
+        piece, _ = submesh(mesh, here := component == number)
+        if is_closed(piece) and signed_volume(piece) < 0:
+            mesh = TriangleMesh(mesh.vertices, np.where(here[:, None], mesh.faces[:, ::-1], mesh.faces))
+            turned += 1
+    return mesh, turned
+
+
 def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     vertices, _, _, faces = igl.remove_duplicate_vertices(mesh.vertices, mesh.faces, MERGE_MM)
     used = len(np.unique(mesh.faces))
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    result, used_vertices = submesh(TriangleMesh(vertices, faces[np.sort(first)]), np.ones(len(first), dtype=bool))
+    lowest_first = (np.argmin(faces, axis=1)[:, None] + [0, 1, 2]) % 3
+    _, first = np.unique(np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True)
+    single = TriangleMesh(vertices, faces[np.sort(first)])
+    result, used_vertices = submesh(single, ~_needless_opposites(single))
     return result, {
         "degenerate_faces_removed": int(flat.sum()),
-        "double_faces_removed": len(faces) - len(first),
+        "double_faces_removed": len(faces) - len(result.faces),
         "duplicate_vertices_joined": max(used - len(used_vertices), 0),
     }
 
 
+def _needless_opposites(mesh: TriangleMesh) -> Mask:
+    """Return the (m,) mask of faces that repeat an earlier one in the opposite orientation, except shared walls.
+
+    A wall shared by two closed pieces has both orientations. With the faces around it, each of its edges has as many
+    faces in one direction as in the other.
+    """
+    _, first, face, count = np.unique(
+        np.sort(mesh.faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    is_double = (count == 2)[face]
+    needless = is_double.copy()
+    if is_double.any():
+        start, end = mesh.faces, mesh.faces[:, [1, 2, 0]]
+        keys = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
+        _, edge = np.unique(keys.ravel(), return_inverse=True)
+        direction = np.bincount(edge, np.where(start < end, 1.0, -1.0).ravel())
+        others = np.bincount(edge, np.repeat(~is_double, 3))
+        edge = edge.reshape(-1, 3)[is_double]
+        region = face_components(submesh(mesh, is_double)[0])
+        # a surface of which every face is there twice has no other faces
+        is_wall = np.bincount(region, (others[edge] > 0).any(axis=1)) > 0
+        is_wall &= np.bincount(region, (direction[edge] != 0).any(axis=1)) == 0
+        needless[np.flatnonzero(is_double)[is_wall[region]]] = False
+        needless[first] = False
+    return needless
+
+
 def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     bad = int((edges(mesh)[1] > 2).sum())
-    document = in_meshlab(mesh)
-    if bad:
+    split = split_sheets(mesh)
+    if (edges(split)[1] > 2).any():
+        document = in_meshlab(split)
         document.meshing_repair_non_manifold_edges(method="Remove Faces")
-    split = int(document.get_topological_measures()["non_two_manifold_vertices"])
-    if bad or split:
-        document.meshing_repair_non_manifold_vertices(vertdispratio=0.0)
-        mesh = from_meshlab(document)
-    faces, _ = igl.bfs_orient(mesh.faces)
-    turned = int((faces != mesh.faces).any(axis=1).sum())
-    return TriangleMesh(mesh.vertices, faces), {
+        split = split_sheets(from_meshlab(document))
+    faces, _ = igl.bfs_orient(split.faces)
+    turned = int((faces != split.faces).any(axis=1).sum())
+    return TriangleMesh(split.vertices, faces), {
         "non_manifold_edges_opened": bad,
-        "non_manifold_vertices_split": split,
+        "non_manifold_vertices_split": len(split.vertices) - len(mesh.vertices),
         "faces_turned_to_agree": min(turned, len(faces) - turned),
     }
 

@@ -13,6 +13,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+# faces that meet at a smaller angle (radians) coincide
+COINCIDENCE_TOL = 1e-3
+
 
 def frozen(values: ArrayLike, dtype: type, width: int) -> NDArray:
     """Return a read-only (n, width) copy of `values`; ValueError for another shape."""
@@ -147,6 +150,55 @@ def face_components(mesh: TriangleMesh) -> Ints:
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
     return np.argsort(order)[component]
+
+
+def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
+    """Split a surface into manifold sheets at edges of more than two faces, and at vertices where fans of faces meet.
+
+    At such an edge the faces are paired that have the inside of one sheet between them, as at the wall that two closed
+    pieces share: faces in opposite directions, with the smallest sum of angles inside. A face without a partner is open
+    there. A surface without such places is returned as it is.
+    """
+    faces, count = mesh.faces, len(mesh.vertices)
+    # half-edge 3 f + k leads from corner k of face f to the next
+    start, end, apex = (np.roll(faces, -k, axis=1).ravel() for k in range(3))
+    following = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
+    keys = np.minimum(start, end) * count + np.maximum(start, end)
+    order = np.argsort(keys, kind="stable")
+    _, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
+    pairs, unclear = [order[first[uses == 2, None] + [0, 1]]], []
+    is_forward = (start < end) == (signed_volume(mesh) >= 0)
+    for place, number in zip(first[uses > 2], uses[uses > 2], strict=True):
+        around = order[place : place + number]
+        low, high = mesh.vertices[np.sort([start[around[0]], end[around[0]]])]
+        axis = (high - low) / np.linalg.norm(high - low)
+        arms = mesh.vertices[apex[around]] - low
+        angles = np.arctan2(np.cross(arms[0], arms) @ axis, (arms - np.outer(arms @ axis, axis)) @ arms[0])
+        forward = is_forward[around]
+        inside = (angles[forward] - angles[~forward, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
+        matched = scipy.optimize.linear_sum_assignment(inside)
+        sides = around[~forward], around[forward]
+        if inside[matched].sum() <= 2.0 * np.pi:
+            pairs.append(np.stack([side[chosen] for side, chosen in zip(sides, matched, strict=True)], axis=1))
+        else:
+            unclear.append(sides)
+    # faces overlap at other edges, where those belong together that do so elsewhere
+    links = np.concatenate(pairs).T // 3
+    graph = scipy.sparse.coo_matrix((np.ones(links.shape[1]), links), shape=(len(faces),) * 2)
+    sheet = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    for sides in unclear:
+        matched = scipy.optimize.linear_sum_assignment(sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3])
+        pairs.append(np.stack([side[chosen] for side, chosen in zip(sides, matched, strict=True)], axis=1))
+    one, other = np.concatenate(pairs).T
+    turned = start[one] != start[other]
+    joined = np.where(turned, following[other], other), np.where(turned, other, following[other])
+    ends = np.concatenate([one, following[one]]), np.concatenate(joined)
+    links = scipy.sparse.coo_matrix((np.ones(len(ends[0])), ends), shape=(faces.size,) * 2)
+    number, corner = scipy.sparse.csgraph.connected_components(links, directed=False)
+    if number == len(np.unique(faces)):
+        return mesh
+    _, first = np.unique(corner, return_index=True)
+    return TriangleMesh(mesh.vertices[faces.ravel()[first]], corner.reshape(-1, 3))
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
