@@ -8,17 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, MeshError
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import (
     TriangleMesh,
     area,
     area_cm2,
+    area_vectors,
     corners,
     euler_number,
+    face_components,
+    is_closed,
     merged,
     signed_volume,
+    submesh,
     transformed,
     volume_ml,
 )
@@ -70,7 +74,7 @@ from .plausible import (
     require_whole,
 )
 from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
-from .repair import make_sound, pieces, require_sound, sound_pieces, surface_of_mask
+from .repair import carried, make_sound, pieces, require_sound, sound_pieces, surface_of_mask
 from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
@@ -102,8 +106,9 @@ class PialSurface:
     """A posed pial surface in RAS+ mm.
 
     `whole` is closed and outward, in one piece or in one for each hemisphere. `left` and `right` are its parts, open
-    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`; None for a missing hemisphere. `pose`
-    leads from the brain's files. The report has the pose, measures and repairs, in plain values for JSON.
+    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`, and where a medial wall was capped; None
+    for a missing hemisphere. `pose` leads from the brain's files. The report has the pose, measures and repairs, in
+    plain values for JSON.
     """
 
     whole: TriangleMesh
@@ -299,7 +304,7 @@ def from_hemispheres(
 ) -> PialSurface:
     """Return the pial surface of a brain from closed surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`), posed, smoothed, remeshed to `edge_length_mm`, rotated
+    The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to `edge_length_mm`, rotated
     together so that the mid-sagittal plane is x = const, and moved apart along x until they are 0.5 mm from each
     other. With coordinates "auto" each may have any rigid pose, which is determined from its shape; `declared` is
     whether both files name the same coordinate system. If a shape contradicts named coordinates, there is a warning.
@@ -307,7 +312,7 @@ def from_hemispheres(
     impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
     """
     to_ras = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
-    sides = [sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True) for mesh in (left, right)]
+    sides = [sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)]
     warnings = logged(warning for side in sides for warning in side.warnings)
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
@@ -324,9 +329,29 @@ def from_hemispheres(
         warnings += logged(hemisphere_warnings(left, right, coordinates))
     even = [make_sound(mesh, edge_length_mm) for mesh in (left, right)]
     warnings += logged(warning for side in even for warning in side.warnings)
-    left, right = (side.mesh for side in even)
-    plane = mid_plane(merged(left, right), named=named)
+    plane = mid_plane(merged(*(side.mesh for side in even)), named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
+    parts = zip(sides, (left, right), even, strict=True)
+    caps = [carried(side.is_cap, closed, new.mesh) for side, closed, new in parts]
+    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
+    for name, *steps in zip(SIDES, sides, even, strict=True):
+        report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
+    left, right = (side.mesh for side in even)
+    return _pair(left, right, np.concatenate(caps), plane, named, pose, week, report, warnings)
+
+
+def _pair(
+    left: TriangleMesh,
+    right: TriangleMesh,
+    is_cap: Mask,
+    plane: MidPlane,
+    named: bool,
+    pose: Pose,
+    week: float,
+    report: Mapping[str, Any],
+    warnings: list[str],
+) -> PialSurface:
+    """Return the pial surface of a brain from its posed hemispheres, moved apart as far as necessary."""
     gap, to_right = smallest_gap(left, right), plane.normal
     left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
     if moved > 0:
@@ -335,12 +360,10 @@ def from_hemispheres(
     shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
     files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
-    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates, "moved_apart_mm": moved}
-    report["gap_before_mm"] = gap
-    for name, *steps in zip(SIDES, sides, even, strict=True):
-        report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
+    report = {**report, "moved_apart_mm": moved, "gap_before_mm": gap}
     mesh = merged(left, right)
-    return _upright(mesh, np.arange(len(mesh.faces)) < len(left.faces), plane, pose, week, report, warnings)
+    is_left = np.arange(len(mesh.faces)) < len(left.faces)
+    return _upright(mesh, is_left, plane, pose, week, report, warnings, is_cap)
 
 
 def from_surface(
@@ -354,35 +377,48 @@ def from_surface(
 ) -> PialSurface:
     """Return the pial surface of a brain, or of a single hemisphere (`side`), from one closed surface.
 
-    It is repaired (holes up to `max_hole_mm`), smoothed and remeshed to `edge_length_mm`. A whole brain, in one piece
-    or in one for each hemisphere, is rotated so that the mid-sagittal plane is x = const. The medial wall of a single
+    It is repaired (holes up to `max_hole_mm`, open medial walls of hemispheres), smoothed and remeshed to
+    `edge_length_mm`. A whole brain is rotated so that the mid-sagittal plane is x = const. If its hemispheres are two
+    pieces, they are moved apart as in `from_hemispheres`. The medial wall of a single
     hemisphere is set upright next to x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
     InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
     if it cannot be made closed and free of handles and self-intersections.
     """
-    clean = sound_pieces(mesh, max_hole_mm, single=side is not None)
+    clean = sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
     warnings = logged(clean.warnings)
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
         require_single_hemisphere(clean.mesh)
-    even = make_sound(clean.mesh, edge_length_mm)
-    warnings += logged(even.warnings)
+    # hemispheres may share their medial wall, so each is smoothed alone
+    component, report, parts, caps = face_components(clean.mesh), {**clean.report}, [], []
+    for number, closed in enumerate(pieces(clean.mesh)):
+        even = make_sound(closed, edge_length_mm)
+        warnings += logged(even.warnings)
+        report |= {f"{key}_{number}" if number else key: value for key, value in even.report.items()}
+        caps.append(carried(None if clean.is_cap is None else clean.is_cap[component == number], closed, even.mesh))
+        parts.append(even.mesh)
+    mesh, is_cap = merged(*parts), np.concatenate(caps)
     if side:
-        pose = pose_of_hemisphere(even.mesh, side, coordinates)
+        pose = pose_of_hemisphere(mesh, side, coordinates)
     else:
-        warnings += logged(require_whole(even.mesh, "surface"))
-        pose = pose_of_surface(even.mesh, coordinates)
+        warnings += logged(require_whole(mesh, "surface"))
+        pose = pose_of_surface(mesh, coordinates)
     warnings += logged(pose.warnings)
     # "lps" if these were found, else the configured coordinates
     read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
-    report = {"coordinates": read_as, **clean.report, **even.report}
+    report = {"coordinates": read_as, **report}
     if side:
         report = {"source": "hemisphere", "side": side, **report}
-        return _single_hemisphere(even.mesh, side, pose, week, report, warnings)
-    mesh = transformed(even.mesh, pose.of_file())
-    plane = mid_plane(mesh, named=coordinates != "auto")
-    left = left_faces(mesh, fissure_between(mesh, plane).height_above(corners(mesh).mean(axis=1)))
-    return _upright(mesh, left, plane, pose, week, {"source": "pial", **report}, warnings)
+        return _single_hemisphere(mesh, side, pose, week, report, warnings, is_cap)
+    report, named = {"source": "pial", **report}, coordinates != "auto"
+    mesh = transformed(mesh, pose.of_file())
+    plane = mid_plane(mesh, named=named)
+    is_left = left_faces(mesh, fissure_between(mesh, plane).height_above(corners(mesh).mean(axis=1)))
+    left, right = cut_sides(mesh, is_left)
+    if is_closed(left) and is_closed(right):
+        is_cap = np.concatenate([is_cap[is_left], is_cap[~is_left]])
+        return _pair(left, right, is_cap, plane, named, pose, week, report, warnings)
+    return _upright(mesh, is_left, plane, pose, week, report, warnings)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
@@ -413,12 +449,12 @@ def _pial_surface(
     report: Mapping[str, Any],
     warnings: Iterable[str] = (),
 ) -> PialSurface:
-    parts = {"whole": whole, "left": left, "right": right}
+    areas = {side: area_cm2(part) for side, part in zip(SIDES, (left, right), strict=True) if part}
     measures = {
         "pose": pose.plain(),
         "week": week,
         "fissure_x_mm": fissure_x,
-        "area_cm2": {name: area_cm2(part) for name, part in parts.items() if part},
+        "area_cm2": {"whole": sum(areas.values()), **areas},
         "volume_mL": volume_ml(whole),
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),
@@ -438,10 +474,15 @@ def _upright(
     week: float,
     report: Mapping[str, Any],
     warnings: Iterable[str],
+    is_cap: Mask | None = None,
 ) -> PialSurface:
     matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
     whole = transformed(mesh, matrix)
-    left, right = cut_sides(whole, is_left)
+    if is_cap is None:
+        is_cap = np.zeros(len(is_left), dtype=bool)
+    for cap, to_other_side in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
+        _require_medial(submesh(whole, cap)[0], to_other_side)
+    left, right = cut_sides(submesh(whole, ~is_cap)[0], is_left[~is_cap])
     # x of the plane, which may be tilted by less than half a degree, at the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
@@ -467,14 +508,34 @@ def _upright(
 
 
 def _single_hemisphere(
-    mesh: TriangleMesh, side: Side, pose: Pose, week: float, report: Mapping[str, Any], warnings: Iterable[str]
+    mesh: TriangleMesh,
+    side: Side,
+    pose: Pose,
+    week: float,
+    report: Mapping[str, Any],
+    warnings: Iterable[str],
+    is_cap: Mask | None = None,
 ) -> PialSurface:
-    whole = transformed(mesh, pose.of_file())
+    whole = pial = transformed(mesh, pose.of_file())
+    if is_cap is not None:
+        _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
+        pial = submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]
     fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
-    left, right = (whole, None) if side == "left" else (None, whole)
+    left, right = (pial, None) if side == "left" else (None, pial)
     report = {**report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
     return _pial_surface(whole, left, right, fissure_x, pose, week, report, warnings)
+
+
+def _require_medial(cap: TriangleMesh, to_other_side: float) -> None:
+    """Raise MeshError if the cap of a posed hemisphere does not face the other one, at x of the sign given."""
+    facing = area_vectors(cap).sum(axis=0)
+    if to_other_side * facing[0] < MIN_AXIS_COSINE * np.linalg.norm(facing):
+        raise MeshError(
+            "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere",
+            found=f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across",
+            expected="a closed surface, or hemispheres that are open at their medial walls only",
+        )
 
 
 def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:

@@ -14,8 +14,19 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import MeshError
-from ..geometry.remeshing import from_meshlab, in_meshlab, remesh, self_intersecting_faces, untangle
+from ..geometry.matching import nearest_on
+from ..geometry.remeshing import (
+    REMESHING_ROUNDS,
+    SHARP_DEG,
+    from_meshlab,
+    in_meshlab,
+    pymeshlab,
+    remesh,
+    self_intersecting_faces,
+    untangle,
+)
 from ..geometry.triangles import (
+    Ints,
     TriangleMesh,
     area,
     corners,
@@ -24,8 +35,10 @@ from ..geometry.triangles import (
     face_components,
     flipped,
     is_closed,
+    mean_length,
     merged,
     signed_volume,
+    smallest_patch,
     split_sheets,
     submesh,
     vertex_areas,
@@ -70,17 +83,27 @@ INSIDE_LEVEL = 0.8
 
 @dataclass(frozen=True, eq=False)
 class RepairedSurface:
-    """A surface after repairs, with a report in plain values for JSON and warnings."""
+    """A surface after repairs, with a report in plain values for JSON and warnings.
+
+    `is_cap` is the (m,) mask of the faces that close medial walls, None if these were closed.
+    """
 
     mesh: TriangleMesh
     report: dict[str, Any]
     warnings: list[str]
+    is_cap: Mask | None = None
 
 
-def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> RepairedSurface:
-    """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks."""
+def sound_pieces(
+    mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False, caps_walls: bool = False
+) -> RepairedSurface:
+    """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks.
+
+    With `caps_walls`, one hole of each hemisphere may be larger, and is capped. That it faces the other hemisphere is
+    to be checked when the surface is posed.
+    """
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
-    mesh, repairs = clean(mesh, max_hole_mm, single=single)
+    mesh, is_cap, repairs = _clean(mesh, max_hole_mm, single, caps_walls)
     warnings, dropped, remaining = [], repairs["area_dropped_mm2"], area(mesh)
     if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
         warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
@@ -89,12 +112,31 @@ def sound_pieces(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False
             f"{repairs['pieces_dropped']} pieces outside or inside the brain were dropped: "
             f"{100 * dropped / (remaining + dropped):.1f} % of the area"
         )
+    warnings += [
+        f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed there by a cap, which is left "
+        "out of area, curvature and depth"
+        for width in repairs["medial_walls_capped_mm"]
+    ]
+    closed = mesh
     mesh, stalks = surface_without_stalks(mesh)
+    is_cap = carried(is_cap, closed, mesh) if is_cap.any() else None
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
         for stalk in stalks
     ]
-    return RepairedSurface(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings)
+    return RepairedSurface(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings, is_cap)
+
+
+def carried(is_cap: Mask | None, mesh: TriangleMesh, changed: TriangleMesh) -> Mask:
+    """Return the mask of the faces of a changed surface that lie on the cap of the same surface before.
+
+    The other faces are in one piece.
+    """
+    if is_cap is None or not is_cap.any():
+        return np.zeros(len(changed.faces), dtype=bool)
+    on_cap = is_cap[nearest_on(corners(changed).mean(axis=1), mesh)[1]]
+    on_cap[~on_cap] = face_components(submesh(changed, ~on_cap)[0]) > 0
+    return on_cap
 
 
 def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
@@ -168,20 +210,28 @@ def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh
 def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
     """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are merged, degenerate and duplicate faces removed, non-manifold edges opened, holes up to
-    `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
-    all but the largest. MeshError for larger holes and for surfaces that stay open.
+    Equal vertices are merged, degenerate and duplicate faces removed, sheets separated where more than two faces meet,
+    holes up to `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with
+    `single` all but the largest. MeshError for larger holes and for surfaces that stay open.
     """
+    mesh, _, counts = _clean(mesh, max_hole_mm, single, caps_walls=False)
+    return mesh, counts
+
+
+def _clean(
+    mesh: TriangleMesh, max_hole_mm: float, single: bool, caps_walls: bool
+) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
     mesh, turned = _turn_closed_pieces(mesh)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
     crossing = int(self_intersecting_faces(mesh).sum())
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh, single)
-    mesh, holes = _fill_holes(mesh, max_hole_mm)
-    parts = pieces(mesh)
-    inward = [signed_volume(piece) < 0 for piece in parts]
-    mesh = merged(*(flipped(piece) if turn else piece for piece, turn in zip(parts, inward, strict=True)))
+    # a brain in one piece has no medial walls that could be open
+    mesh, is_cap, holes = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
+    inward = [signed_volume(piece) < 0 for piece in pieces(mesh)]
+    turn = np.isin(face_components(mesh), np.flatnonzero(inward))
+    mesh = TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces))
     if not is_closed(mesh):
         raise MeshError(
             "the surface cannot be closed",
@@ -189,7 +239,7 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tu
             expected="a closed surface",
         )
     counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + sum(inward)}
-    return mesh, doubles | opened | dropped | holes | counts
+    return mesh, is_cap, doubles | opened | dropped | holes | counts
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
@@ -281,11 +331,15 @@ def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[s
     return merged(*main), {"pieces": len(main)} | dropped
 
 
-def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
+def _fill_holes(
+    mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool
+) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
     loops = [np.asarray(loop) for loop in igl.boundary_loop_all(mesh.faces)]
     sizes = [float(np.ptp(mesh.vertices[loop], axis=0).max()) for loop in loops]
-    if sizes and max(sizes) > max_hole_mm:
-        wide = sorted((size for size in sizes if size > max_hole_mm), reverse=True)
+    wide = sorted((size for size in sizes if size > max_hole_mm), reverse=True)
+    component = face_components(mesh)
+    owners = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop, size in zip(loops, sizes, strict=True) if size > max_hole_mm}
+    if wide and not (caps_walls and len(owners) == len(wide)):
         raise MeshError(
             "the surface has holes that are too large to close",
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[0]:.1f} mm across",
@@ -294,16 +348,39 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float) -> tuple[TriangleMesh, d
             if wide[0] <= MAX_HOLE_MM
             else "Give a closed surface: holes of this size cannot be covered.",
         )
-    vertices, faces = [mesh.vertices], [mesh.faces]
-    for number, loop in enumerate(loops):
-        centre = np.full(len(loop), len(mesh.vertices) + number)
-        start, end = loop, np.roll(loop, -1)
-        # the fan is oriented against the existing faces
-        runs_along = (mesh.faces[:, [0, 1, 2]] == start[0]) & (mesh.faces[:, [1, 2, 0]] == end[0])
-        faces.append(np.stack([end, start, centre] if runs_along.any() else [start, end, centre], axis=1))
-        vertices.append(mesh.vertices[loop].mean(axis=0, keepdims=True))
-    counts = {"holes_closed": len(loops), "largest_hole_mm": max(sizes, default=0.0)}
-    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces)), counts
+    # the small ones first, so that the faces of caps are the last ones
+    caps = []
+    for number in np.argsort(sizes, kind="stable"):
+        loop = loops[number]
+        # along the hole, against the existing faces
+        runs_along = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (mesh.faces[:, [1, 2, 0]] == loop[1])
+        loop = loop[::-1] if runs_along.any() else loop
+        if sizes[number] > max_hole_mm:
+            caps.append(loop)
+            continue
+        fan = np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1)
+        centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
+        mesh = TriangleMesh(np.concatenate([mesh.vertices, centre]), np.concatenate([mesh.faces, fan]))
+    is_cap = np.zeros(len(mesh.faces), dtype=bool)
+    if caps:
+        mesh, is_cap = _with_caps(mesh, caps)
+    return mesh, is_cap, {
+        "holes_closed": len(loops) - len(wide),
+        "largest_hole_mm": max((size for size in sizes if size <= max_hole_mm), default=0.0),
+        "medial_walls_capped_mm": wide,
+    }
+
+
+def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:
+    """Close loops by patches of the smallest area with even triangles; return the mask of their faces, too."""
+    patches = [smallest_patch(mesh, loop) for loop in loops]
+    rims = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
+    document = in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))
+    document.compute_selection_by_condition_per_face(condselect=f"fi >= {len(mesh.faces)}")
+    even = {"iterations": REMESHING_ROUNDS, "featuredeg": SHARP_DEG, "checksurfdist": False, "selectedonly": True}
+    length = pymeshlab.PureValue(mean_length(mesh.vertices, rims))
+    document.meshing_isotropic_explicit_remeshing(targetlen=length, **even)
+    return from_meshlab(document), np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:

@@ -201,6 +201,38 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(mesh.vertices[faces.ravel()[first]], corner.reshape(-1, 3))
 
 
+def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
+    """Return the (n - 2, 3) faces of the smallest area that close a hole, whose (n,) vertices are given in order.
+
+    They have no edge of the surface inside (Barequet and Sharir 1995, doi 10.1016/0167-8396(94)00011-G).
+    """
+    count, points = len(loop), mesh.vertices[loop]
+    place = np.full(len(mesh.vertices), -1)
+    place[loop] = np.arange(count)
+    pairs = np.sort(place[edges(mesh)[0]], axis=1)
+    low, high = pairs[pairs[:, 0] >= 0].T
+    # smallest areas between two vertices and the edge that joins them, and the third vertices of the faces there
+    cost, third = np.zeros((count, count)), np.zeros((count, count), dtype=int)
+    for gap in range(2, count):
+        first = np.arange(count - gap)
+        middle = first[:, None] + np.arange(1, gap)
+        a, b, c = points[first][:, None], points[middle], points[first + gap][:, None]
+        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+        totals = cost[first[:, None], middle] + cost[middle, first[:, None] + gap] + areas
+        third[first, first + gap] = first + 1 + totals.argmin(axis=1)
+        cost[first, first + gap] = totals.min(axis=1)
+        if gap < count - 1:
+            cost[low[high - low == gap], high[high - low == gap]] = np.inf
+    faces, spans = [], [(0, count - 1)]
+    while spans:
+        start, end = spans.pop()
+        if end - start > 1:
+            middle = third[start, end]
+            faces.append((start, middle, end))
+            spans += [(start, middle), (middle, end)]
+    return loop[np.array(faces)]
+
+
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     """Return the convex hull, its faces outward; MeshError for a flat surface."""
     try:
