@@ -74,7 +74,7 @@ from .plausible import (
     require_whole,
 )
 from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
-from .repair import carried, make_sound, pieces, require_sound, sound_pieces, surface_of_mask
+from .repair import make_pieces_sound, pieces, require_sound, sound_pieces, surface_of_mask
 from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
@@ -327,17 +327,19 @@ def from_hemispheres(
     warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
         warnings += logged(hemisphere_warnings(left, right, coordinates))
-    even = [make_sound(mesh, edge_length_mm) for mesh in (left, right)]
+    even = [
+        make_pieces_sound(replace(side, mesh=mesh), edge_length_mm)
+        for side, mesh in zip(sides, (left, right), strict=True)
+    ]
     warnings += logged(warning for side in even for warning in side.warnings)
     plane = mid_plane(merged(*(side.mesh for side in even)), named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
-    parts = zip(sides, (left, right), even, strict=True)
-    caps = [carried(side.is_cap, closed, new.mesh) for side, closed, new in parts]
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     for name, *steps in zip(SIDES, sides, even, strict=True):
         report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
     left, right = (side.mesh for side in even)
-    return _pair(left, right, np.concatenate(caps), plane, named, pose, week, report, warnings)
+    is_cap = np.concatenate([side.is_cap for side in even])
+    return _pair(left, right, is_cap, plane, named, pose, week, report, warnings)
 
 
 def _pair(
@@ -389,15 +391,9 @@ def from_surface(
     warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
         require_single_hemisphere(clean.mesh)
-    # hemispheres may share their medial wall, so each is smoothed alone
-    component, report, parts, caps = face_components(clean.mesh), {**clean.report}, [], []
-    for number, closed in enumerate(pieces(clean.mesh)):
-        even = make_sound(closed, edge_length_mm)
-        warnings += logged(even.warnings)
-        report |= {f"{key}_{number}" if number else key: value for key, value in even.report.items()}
-        caps.append(carried(None if clean.is_cap is None else clean.is_cap[component == number], closed, even.mesh))
-        parts.append(even.mesh)
-    mesh, is_cap = merged(*parts), np.concatenate(caps)
+    even = make_pieces_sound(clean, edge_length_mm)
+    warnings += logged(even.warnings)
+    mesh, is_cap = even.mesh, even.is_cap
     if side:
         pose = pose_of_hemisphere(mesh, side, coordinates)
     else:
@@ -406,7 +402,7 @@ def from_surface(
     warnings += logged(pose.warnings)
     # "lps" if these were found, else the configured coordinates
     read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
-    report = {"coordinates": read_as, **report}
+    report = {"coordinates": read_as, **clean.report, **even.report}
     if side:
         report = {"source": "hemisphere", "side": side, **report}
         return _single_hemisphere(mesh, side, pose, week, report, warnings, is_cap)

@@ -85,7 +85,7 @@ INSIDE_LEVEL = 0.8
 class RepairedSurface:
     """A surface after repairs, with a report in plain values for JSON and warnings.
 
-    `is_cap` is the (m,) mask of the faces that close medial walls, None if these were closed.
+    `is_cap` is the (m,) mask of the faces that close medial walls; None if the surface was made of labels.
     """
 
     mesh: TriangleMesh
@@ -117,26 +117,15 @@ def sound_pieces(
         "out of area, curvature and depth"
         for width in repairs["medial_walls_capped_mm"]
     ]
-    closed = mesh
+    whole = mesh
     mesh, stalks = surface_without_stalks(mesh)
-    is_cap = carried(is_cap, closed, mesh) if is_cap.any() else None
+    if mesh is not whole:
+        is_cap = is_cap[nearest_on(corners(mesh).mean(axis=1), whole)[1]]
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
         for stalk in stalks
     ]
     return RepairedSurface(mesh, {"repair": repairs} | ({"stalks": stalks} if stalks else {}), warnings, is_cap)
-
-
-def carried(is_cap: Mask | None, mesh: TriangleMesh, changed: TriangleMesh) -> Mask:
-    """Return the mask of the faces of a changed surface that lie on the cap of the same surface before.
-
-    The other faces are in one piece.
-    """
-    if is_cap is None or not is_cap.any():
-        return np.zeros(len(changed.faces), dtype=bool)
-    on_cap = is_cap[nearest_on(corners(changed).mean(axis=1), mesh)[1]]
-    on_cap[~on_cap] = face_components(submesh(changed, ~on_cap)[0]) > 0
-    return on_cap
 
 
 def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
@@ -153,6 +142,21 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     smooth, _ = make_even(mesh, edge_length_mm)
     require_sound(smooth)
     return RepairedSurface(smooth, report, [f"the surface was rebuilt through voxels, since it had {remaining}"])
+
+
+def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> RepairedSurface:
+    """Make each piece of a clean surface sound by itself, since hemispheres may share their medial wall."""
+    component, parts, caps = face_components(clean.mesh), [], []
+    report, warnings = {}, []
+    for number, piece in enumerate(pieces(clean.mesh)):
+        even = make_sound(piece, edge_length_mm)
+        report |= {f"{key}_{number + 1}" if number else key: value for key, value in even.report.items()}
+        warnings += even.warnings
+        is_cap = clean.is_cap[component == number][nearest_on(corners(even.mesh).mean(axis=1), piece)[1]]
+        # the pial surface beside a cap is in one piece
+        is_cap[~is_cap] = face_components(submesh(even.mesh, ~is_cap)[0]) > 0
+        parts, caps = [*parts, even.mesh], [*caps, is_cap]
+    return RepairedSurface(merged(*parts), report, warnings, np.concatenate(caps))
 
 
 def require_sound(mesh: TriangleMesh) -> None:
