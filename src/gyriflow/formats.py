@@ -33,6 +33,7 @@ FORMATS = (
     FileFormat("STL", "surface", (".stl",)),
     FileFormat("PLY", "surface", (".ply",)),
     FileFormat("OBJ", "surface", (".obj",)),
+    FileFormat("OFF", "surface", (".off",)),
     FileFormat("FreeSurfer", "surface", (".pial", ".white")),
     FileFormat("NIfTI", "volume", (".nii", ".nii.gz")),
     FileFormat("NIfTI pair", "volume", (".hdr", ".hdr.gz"), (".img", ".img.gz")),

@@ -15,6 +15,7 @@ rule growth_rates:
     params:
         series=[series for series, _ in study.growth_brains],
         brains=[brain.id for _, brain in study.growth_brains],
+        with_rates=study.series_with_rates,
         with_thickness=study.with_thickness_curve,
         weeks=[brain.week for _, brain in study.growth_brains],
     script:

@@ -20,4 +20,4 @@ with step(snakemake.log[0]):
     for tissue in TISSUES:
         areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in tissues]
     write_table(output.areas, areas)
-    write_table(output.rates, rates_of_series(areas))
+    write_table(output.rates, rates_of_series(areas, params.with_rates))

@@ -43,15 +43,15 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
     )
 
 
-def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
-    """Return the growth rates of each series of brains: tables of `growth_rates` with the column `series`.
+def rates_of_series(areas: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
+    """Return the growth rates of named series of brains: tables of `growth_rates` with the column `series`.
 
     `areas` has the columns series, week, area_cm2 and volume_ml; brains of the same week and series are averaged. If it
     also has tissue_ml, ventricles_ml and cortex_ml, from labels, the table has tissue_ratio, … and
     tissue_compound_rate_per_s, …, ln(V₂/V₁)/(3Δt), NaN where unknown.
     """
     tables = []
-    for name, brains in areas.groupby("series", sort=False):
+    for name, brains in areas[areas["series"].isin(names)].groupby("series", sort=False):
         weekly = brains.groupby("week")[["area_cm2", "volume_ml"]].mean()
         areas_mm2, volumes_mm3 = weekly["area_cm2"] / CM2_PER_MM2, weekly["volume_ml"] / ML_PER_MM3
         rates = growth_rates(weekly.index.tolist(), areas_mm2.tolist(), volumes_mm3.tolist())
@@ -63,4 +63,4 @@ def rates_of_series(areas: pd.DataFrame) -> pd.DataFrame:
                 rates[f"{tissue}_ratio"] = volumes_ml[1:] / volumes_ml[:-1]
                 rates[f"{tissue}_compound_rate_per_s"] = np.log(rates[f"{tissue}_ratio"]) / (3 * seconds)
         tables.append(rates)
-    return pd.concat(tables, ignore_index=True)
+    return pd.concat(tables, ignore_index=True) if tables else growth_rates([], [], []).assign(series=[])

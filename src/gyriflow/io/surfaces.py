@@ -1,4 +1,4 @@
-"""Triangle surfaces (GIFTI, FreeSurfer, VTK, STL, PLY, OBJ), in mm, and maps and labels at their vertices (GIFTI).
+"""Triangle surfaces (GIFTI, FreeSurfer, VTK, STL, PLY, OBJ, OFF), in mm, and maps and labels at their vertices (GIFTI).
 
 Coordinates are transformed to scanner space if the file defines their space.
 """
@@ -38,7 +38,7 @@ System = tuple[str, str, Floats]
 
 
 def read_surface(path: AnyPath) -> TriangleMesh:
-    """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY or OBJ file, in the order of corners of the file.
+    """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY, OBJ or OFF file, in the order of corners of the file.
 
     Coordinates of GIFTI and FreeSurfer files are transformed to scanner space if the file defines how. InputError for
     missing, truncated or empty files, NaN or infinite coordinates, faces with missing vertices, and coordinates of
@@ -98,7 +98,7 @@ def _read_side(path: AnyPath, side: Side) -> tuple[TriangleMesh, str | None]:
 def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
     """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()
-    if suffix in (".stl", ".ply", ".obj"):
+    if suffix in (".stl", ".ply", ".obj", ".off"):
         import trimesh  # takes a second, as pyvista does below, which most readers need not wait for
 
         body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -106,7 +106,7 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
             body.export(temporary)
         return
     if suffix != ".gii":
-        raise InputError("unknown kind of surface file", path=path, expected=".gii, .stl, .ply or .obj")
+        raise InputError("unknown kind of surface file", path=path, expected=".gii, .stl, .ply, .obj or .off")
     points = GiftiDataArray(
         mesh.vertices.astype(np.float32),
         intent="NIFTI_INTENT_POINTSET",
@@ -165,7 +165,7 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
-        raise InputError(problem, path=surface_path, expected=f"the GIFTI, PLY or OBJ file that {path} was made on")
+        raise InputError(problem, path=surface_path, expected=f"the GIFTI, PLY, OBJ or OFF file that {path} was made on")
     surface = read_surface(surface_path)
     arrays = load_gifti(path).darrays
     if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
@@ -392,6 +392,7 @@ SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "STL": _read_with_trimesh,
     "PLY": _read_with_trimesh,
     "OBJ": _read_with_trimesh,
+    "OFF": _read_with_trimesh,
     "FreeSurfer": _read_freesurfer_surface,
 }
 """The reader of each format of surfaces."""

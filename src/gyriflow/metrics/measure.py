@@ -297,6 +297,8 @@ def measure_brain(
         sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
     volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
     whole_metrics = size_metrics(whole, crossing_faces(whole)) | _folding_and_thickness(sides)
+    # without caps of medial walls
+    whole_metrics["area"] = sum(area_cm2(side.mesh) for side in sides)
     whole_metrics |= {metric: volume for metric, volume in volumes.items() if volume is not None}
     metrics = {"whole": whole_metrics | area_ratio(whole_metrics)}
     for side in sides:

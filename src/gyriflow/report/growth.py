@@ -41,7 +41,8 @@ def growth_chart(
 ) -> Figure:
     """Draw cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
 
-    Series of brains share the panels of area and volume. Up to four have a panel of bars each, on one scale.
+    Series of brains share the panels of area and volume. Up to four have a panel of bars each, on one scale. Series
+    without rates have none.
 
     Parameters
     ----------
@@ -51,10 +52,11 @@ def growth_chart(
         Growth rate of the simulations in 1/s, drawn as a line over the bars: a number, or values by week, linear in
         between and constant beyond.
     """
-    names = list(dict.fromkeys(rates["series"]))
+    names = list(dict.fromkeys(areas["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))
-    is_shared = len(names) > MAX_RATE_PANELS
-    panels = 1 if is_shared else len(names)
+    with_rates = rates["series"].unique()
+    is_shared = len(with_rates) > MAX_RATE_PANELS
+    panels = 1 if is_shared else len(with_rates)
     figure, (area_axes, volume_axes, *rate_axes) = panel_figure(2 + panels, panel_in=2.4, foot_in=0.0)
     labels = {"area_cm2": "pial area (cm²)", "volume_ml": "volume (mL)"}
     for axes, (column, label) in zip((area_axes, volume_axes), labels.items(), strict=True):
@@ -65,14 +67,14 @@ def growth_chart(
     if is_shared:
         _rates_together(rate_axes[0], rates, colours)
         return figure
-    for axes, (name, colour) in zip(rate_axes, colours.items(), strict=True):
-        _rates_panel(axes, rates[rates["series"] == name], colour, folding_rate_per_s)
+    for axes, name in zip(rate_axes, with_rates, strict=True):
+        _rates_panel(axes, rates[rates["series"] == name], colours[name], folding_rate_per_s)
         title = "tangential growth rate" if len(names) == 1 else wrap(f"tangential growth rate: {name}", 28)
         # the legend stands below the title
         axes.set_title(title, pad=6.0 if folding_rate_per_s is None else 16.0)
-    low, high = zip(*(axes.get_ylim() for axes in rate_axes), strict=True)
+    limits = [axes.get_ylim() for axes in rate_axes]
     for axes in rate_axes:
-        axes.set_ylim(min(low), max(high))
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
     return figure
 
 

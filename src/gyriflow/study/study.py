@@ -67,6 +67,25 @@ class Study:
         series = self.series.brains
         return [(name, brain) for name in series for brain in sorted(series[name], key=lambda brain: brain.week)]
 
+    @cached_property
+    def series_with_rates(self) -> list[str]:
+        """The series whose differences between weeks are growth: of a subject, of an atlas, or used by a run.
+
+        Other brains may be different fetuses.
+        """
+        simulations = self.simulations.values()
+        starts = {simulation.start for simulation in simulations}
+        grown = [self.chains[simulation.start.id, simulation.shapes] for simulation in simulations if simulation.shapes]
+        used = {simulation.followed_series for simulation in simulations}
+        used |= {self.series.with_brain(brain) for chain in grown for brain in chain.later}
+        return [
+            name
+            for name, brains in self.series.brains.items()
+            if name in used
+            or not several_subjects(brains)
+            and (brains[0].config.subject or starts & {*brains} or all(brain.id in self.atlases for brain in brains))
+        ]
+
     @property
     def with_thickness_curve(self) -> list[str]:
         """The ids of the brains whose cortical thickness gives a curve, if a run follows it."""

@@ -35,7 +35,7 @@ def save_volume(kind):
 
 
 WRITERS = {
-    **dict.fromkeys(("GIFTI", "STL", "PLY", "OBJ"), save_surface),
+    **dict.fromkeys(("GIFTI", "STL", "PLY", "OBJ", "OFF"), save_surface),
     "VTK": save_with_vtk,
     "FreeSurfer": lambda path: write_geometry(path, BALL.vertices, BALL.faces),
     "NIfTI": save_volume(nib.Nifti1Image),

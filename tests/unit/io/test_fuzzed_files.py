@@ -57,7 +57,7 @@ def wholes(tmp_path_factory):
     image.header.set_xyzt_units("mm")
     nib.save(image, folder / "a.nii")
     nib.save(nib.MGHImage(LABELS.astype(np.int32), np.diag([2.0, 2.0, 2.0, 1.0])), folder / "a.mgh")
-    for name in ("a.surf.gii", "a.stl", "a.ply", "a.obj"):
+    for name in ("a.surf.gii", "a.stl", "a.ply", "a.obj", "a.off"):
         write_surface(folder / name, BALL)
     info = {"head": [2, 0, 20], "valid": "1  # volume info valid", "filename": "a.mgz", "volume": [8, 8, 8]}
     axes = {"xras": [-1.0, 0, 0], "yras": [0, 0, -1.0], "zras": [0, 1.0, 0], "cras": [1.0, 2.0, 3.0]}
@@ -77,7 +77,7 @@ def wholes(tmp_path_factory):
     [
         ("a.nii", read_label_volume, 352), ("a.mgh", read_label_volume, 284), ("a.nii.gz", read_volume_map, 16),
         ("a.surf.gii", read_surface, 1500), ("lh.pial", read_surface, 80), ("a.stl", read_surface, 84),
-        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.vtk", read_surface, 200),
+        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.off", read_surface, None), ("a.vtk", read_surface, 200),
         ("a.vtp", read_surface, 1000), ("a.label.gii", read_vertex_labels, 800),
         ("a.shape.gii", read_vertex_maps, 800), ("a.h5", read_maps, 200), ("a.json", read_json, None),
         ("participants.tsv", read_text_table, None), ("participants.tsv", read_table, None),

@@ -39,7 +39,7 @@ def gifti(path, vertices, faces):
     return path
 
 
-@pytest.mark.parametrize("name", ["a.surf.gii", "a.stl", "a.ply", "a.obj", "a.vtk", "a.vtp"])
+@pytest.mark.parametrize("name", ["a.surf.gii", "a.stl", "a.ply", "a.obj", "a.off", "a.vtk", "a.vtp"])
 def test_written_surface_comes_back_closed_and_outward(tmp_path, ball, name):
     if ".vt" in name:
         pv.PolyData.from_regular_faces(np.array(ball.vertices), np.array(ball.faces, dtype=int)).save(tmp_path / name)
@@ -195,7 +195,7 @@ def test_labels_and_names_come_back(tmp_path):
     assert nib.load(path).meta["AnatomicalStructurePrimary"] == "CortexLeft"
 
 
-@pytest.mark.parametrize("name", ["ball.surf.gii", "ball.ply", "ball.obj"])
+@pytest.mark.parametrize("name", ["ball.surf.gii", "ball.ply", "ball.obj", "ball.off"])
 def test_maps_of_hemispheres_stand_side_by_side_each_value_at_its_vertex(tmp_path, ball, name):
     left = moved(ball, -60.0)
     paths, surfaces = (
