@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
-from gyriflow.geometry.triangles import TriangleMesh, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, submesh, vertex_normals
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""
@@ -74,6 +74,16 @@ def octasphere(radius: float, subdivisions: int = 5) -> TriangleMesh:
     for _ in range(subdivisions):
         shape = shape.subdivide()
     return TriangleMesh(radius * shape.vertices / np.linalg.norm(shape.vertices, axis=1)[:, None], shape.faces)
+
+
+@cache
+def cut_ellipsoid() -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
+    """Return the open left and right half of an ellipsoid as large as a brain of week 24, and the left one's wall."""
+    ball = octasphere(1.0)
+    whole = TriangleMesh(ball.vertices * [22.0, 28.0, 24.0], ball.faces)
+    is_left = whole.vertices[whole.faces][:, :, 0].mean(axis=1) < 0.0
+    left, right = (submesh(whole, side)[0] for side in (is_left, ~is_left))
+    return left, right, TriangleMesh(left.vertices * [0.0, 1.0, 1.0], left.faces[:, ::-1])
 
 
 def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:

@@ -16,12 +16,13 @@ from gyriflow.anatomy.fissure import smallest_gap, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.plausible import expected_volume_ml, proportion_warnings, require_plausible_size
 from gyriflow.anatomy.repair import pieces
-from gyriflow.errors import InputError
+from gyriflow.errors import InputError, MeshError
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
     euler_number,
+    flipped,
     is_closed,
     merged,
     signed_volume,
@@ -32,6 +33,7 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.mesh.maps import move_to_mesh
+from gyriflow.metrics.measure import measure_brain
 from gyriflow.shipped import SHIPPED
 
 DATA = Path(os.environ.get("GYRIFLOW_DATA", Path(__file__).parents[4] / "shared" / "data"))
@@ -219,6 +221,59 @@ def test_pial_surface_that_cuts_itself_is_made_anew(phantom):
     surface = from_surface(tangled, week=24.0, **QUICK)
     require_sound(surface)
     assert signed_volume(surface.whole) == pytest.approx(signed_volume(tangled), rel=0.03)
+
+
+@pytest.mark.fault(70)
+@pytest.mark.parametrize("has_common_vertices", [True, False])
+def test_hemispheres_that_share_their_medial_wall_in_one_file_are_moved_apart(has_common_vertices):
+    *open_halves, wall = shapes.cut_ellipsoid()
+    halves = [merged(half, side) for half, side in zip(open_halves, (wall, flipped(wall)), strict=True)]
+    vertices, places = np.unique(merged(*halves).vertices.round(6), axis=0, return_inverse=True)
+    both = TriangleMesh(vertices, places[merged(*halves).faces]) if has_common_vertices else merged(*halves)
+    surface = from_surface(both, week=24.0, edge_length_mm=2.0)
+    require_sound(surface, surfaces=2)
+    assert signed_volume(surface.whole) == pytest.approx(sum(map(signed_volume, halves)), rel=0.01)
+    assert area(surface.whole) == pytest.approx(sum(map(area, halves)), rel=0.02)
+    assert smallest_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.05)
+    assert Facts("0.5 mm") in surface.report["warnings"]
+
+
+@pytest.mark.fault(17, 71)
+@pytest.mark.parametrize("source", ["hemisphere", "hemispheres", "pial"])
+def test_an_open_medial_wall_is_capped_and_the_cap_left_out(source):
+    left, right, _ = shapes.cut_ellipsoid()
+    right, settings = shapes.moved(right, 1.0), {"week": 24.0, "edge_length_mm": 2.0}
+    if source == "hemisphere":
+        surface = from_surface(left, "left", **settings)
+    elif source == "hemispheres":
+        surface = from_hemispheres(left, right, **settings)
+    else:
+        surface = from_surface(merged(left, right), **settings)
+    sides = [side for side in (surface.left, surface.right) if side]
+    assert is_closed(surface.whole)
+    assert not self_intersecting_faces(surface.whole).any()
+    assert [euler_number(piece) for piece in pieces(surface.whole)] == [2] * len(sides)
+    assert [area(side) for side in sides] == pytest.approx([area(left)] * len(sides), rel=0.02)
+    assert surface.report["area_cm2"]["whole"] == pytest.approx(sum(map(area, sides)) / 100)
+    assert area(surface.whole) == pytest.approx((area(left) + np.pi * 28.0 * 24.0) * len(sides), rel=0.02)
+    assert [warning for warning in surface.report["warnings"] if warning == Facts("56 mm")]
+    metrics = measure_brain(surface.whole, surface.left, surface.right).table.set_index(["hemisphere", "metric"])
+    assert metrics.loc[("whole", "area"), "value"] == pytest.approx(surface.report["area_cm2"]["whole"])
+
+
+@pytest.mark.fault(17, 72)
+def test_a_wide_hole_elsewhere_is_refused_with_its_size():
+    left, right, wall = shapes.cut_ellipsoid()
+    closed = merged(left, wall)
+    lateral, _ = submesh(closed, closed.vertices[closed.faces][:, :, 0].max(axis=1) > -19.0)
+    whole, _ = submesh(merged(left, right), np.r_[left.vertices[left.faces][:, :, 2].min(axis=1) < 20.0, right.faces[:, 0] >= 0])
+    settings = {"week": 24.0, "edge_length_mm": 2.0}
+    with pytest.raises(MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")):
+        from_surface(lateral, "left", **settings)
+    with pytest.raises(MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")):
+        from_hemispheres(lateral, merged(right, flipped(wall)), **settings)
+    with pytest.raises(MeshError, match=r"mm across", check=Facts("3 mm")):
+        from_surface(whole, week=24.0)
 
 
 def test_split_gives_bulges_back_to_their_hemisphere(phantom):

@@ -5,12 +5,23 @@ import tracemalloc
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import sphere, torus
+from shapes import box, moved, sphere, torus
 
 from gyriflow.anatomy.repair import clean, make_even, pieces, rebuild, sound_pieces
 from gyriflow.errors import MeshError
+from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.remeshing import remesh, self_intersecting_faces
-from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, merged, signed_volume, submesh
+from gyriflow.geometry.triangles import (
+    TriangleMesh,
+    area,
+    euler_number,
+    flipped,
+    is_closed,
+    merged,
+    signed_volume,
+    submesh,
+    transformed,
+)
 
 RADIUS = 10.0
 VOLUME = 4 / 3 * np.pi * RADIUS**3
@@ -118,6 +129,38 @@ def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
     assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
     assert signed_volume(mesh) == pytest.approx(VOLUME * (1 + 0.95**3), rel=0.01)
     assert all(signed_volume(piece) > 0 for piece in pieces(mesh))
+
+
+BLOCK = box((10.0, 20.0, 16.0), (5.0, 0.0, 0.0), 3)
+NEIGHBOURS = {
+    "the same triangles": transformed(BLOCK, MIRROR),
+    "the same vertices, other triangles": moved(BLOCK, -10.0),
+    "half of the wall": moved(BLOCK, -10.0, 10.0),
+    "one edge": moved(BLOCK, -10.0, 20.0),
+    "one vertex": moved(BLOCK, -10.0, 20.0, 16.0),
+}
+
+
+@pytest.mark.fault(70)
+@pytest.mark.parametrize("shared", NEIGHBOURS)
+@pytest.mark.parametrize("kind", ["vertices of their own", "vertices in common", "one inside out", "all inside out"])
+def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
+    both = merged(BLOCK, flipped(NEIGHBOURS[shared]) if kind == "one inside out" else NEIGHBOURS[shared])
+    if kind == "vertices in common":
+        # as readers of STL join them
+        vertices, places = np.unique(both.vertices.round(9), axis=0, return_inverse=True)
+        both = TriangleMesh(vertices, places[both.faces])
+    mesh, report = clean(flipped(both) if kind == "all inside out" else both, 3.0)
+    assert is_closed(mesh)
+    assert [euler_number(piece) for piece in pieces(mesh)] == [2, 2]
+    assert [signed_volume(piece) for piece in pieces(mesh)] == pytest.approx([3200.0, 3200.0])
+    assert (report["double_faces_removed"], report["holes_closed"]) == (0, 0)
+
+
+def test_a_surface_with_every_face_in_both_directions_is_one():
+    mesh, report = clean(merged(WHOLE, flipped(WHOLE)), 3.0)
+    assert (len(pieces(mesh)), report["double_faces_removed"]) == (1, COUNT)
+    assert area(mesh) == pytest.approx(area(WHOLE))
 
 
 def test_remeshing_gives_the_edge_length_and_keeps_the_volume():
