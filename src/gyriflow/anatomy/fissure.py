@@ -63,7 +63,7 @@ FLOOR_MM = 1.2
 MAX_SEPARATION_MM = 10.0
 # a second closed piece is a hemisphere if it has at least this share of the largest piece's area,
 COMPARABLE_PIECE = 0.1
-# and if both have at least this share of their area on their own side of the fissure; a whole brain has half
+# and if both have at least this share of their area, weighted by height, on their own side of the fissure
 MIN_SHARE_ON_SIDE = 0.75
 # patches on the wrong side of the cut are bulges over the fissure if they are at most this share of the area
 MAX_BULGE_SHARE = 0.05
@@ -413,7 +413,9 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
     areas = face_areas(mesh)
     side = heights < 0
     sizes = np.bincount(surface, weights=areas)
-    on_left = np.bincount(surface, weights=areas * side) / sizes
+    # walls in contact at the fissure do not count
+    moments = areas * np.abs(heights)
+    on_left = np.bincount(surface, weights=moments * side) / np.bincount(surface, weights=moments)
     if len(sizes) > 1 and sizes[1] >= COMPARABLE_PIECE * sizes[0]:
         # a detached lump is not a hemisphere, since the rest of the brain lies on both sides
         low, high = sorted(on_left[:2])

@@ -18,7 +18,6 @@ from ..geometry.triangles import (
     area_vectors,
     corners,
     euler_number,
-    face_components,
     is_closed,
     merged,
     signed_volume,
@@ -106,9 +105,9 @@ class PialSurface:
     """A posed pial surface in RAS+ mm.
 
     `whole` is closed and outward, in one piece or in one for each hemisphere. `left` and `right` are its parts, open
-    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`, and where a medial wall was capped; None
-    for a missing hemisphere. `pose` leads from the brain's files. The report has the pose, measures and repairs, in
-    plain values for JSON.
+    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls; None for a
+    missing hemisphere. `pose` leads from the brain's files. The report has the pose, measures and repairs, in plain
+    values for JSON.
     """
 
     whole: TriangleMesh
@@ -302,17 +301,20 @@ def from_hemispheres(
     max_hemisphere_ratio: float = 1.15,
     max_asymmetry: float = 0.02,
 ) -> PialSurface:
-    """Return the pial surface of a brain from closed surfaces of its hemispheres.
+    """Return the pial surface of a brain from surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to `edge_length_mm`, rotated
-    together so that the mid-sagittal plane is x = const, and moved apart along x until they are 0.5 mm from each
-    other. With coordinates "auto" each may have any rigid pose, which is determined from its shape; `declared` is
-    whether both files name the same coordinate system. If a shape contradicts named coordinates, there is a warning.
+    The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to
+    `edge_length_mm`, rotated together so that the mid-sagittal plane is x = const, and moved apart along x until they
+    are 0.5 mm from each other. With coordinates "auto" each may have any rigid pose, which is determined from its
+    shape; `declared` is whether both files name the same coordinate system. If a shape contradicts named coordinates,
+    there is a warning.
     InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
     impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
     """
     to_ras = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
-    sides = [sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)]
+    sides = [
+        sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)
+    ]
     warnings = logged(warning for side in sides for warning in side.warnings)
     left, right = (side.mesh for side in sides)
     volume = signed_volume(left) + signed_volume(right)
@@ -377,12 +379,12 @@ def from_surface(
     edge_length_mm: float = 1.0,
     max_hole_mm: float = 3.0,
 ) -> PialSurface:
-    """Return the pial surface of a brain, or of a single hemisphere (`side`), from one closed surface.
+    """Return the pial surface of a brain, or of a single hemisphere (`side`), from one surface.
 
     It is repaired (holes up to `max_hole_mm`, open medial walls of hemispheres), smoothed and remeshed to
     `edge_length_mm`. A whole brain is rotated so that the mid-sagittal plane is x = const. If its hemispheres are two
-    pieces, they are moved apart as in `from_hemispheres`. The medial wall of a single
-    hemisphere is set upright next to x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
+    pieces, they are moved apart as in `from_hemispheres`. The medial wall of a single hemisphere is set upright next to
+    x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
     InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
     if it cannot be made closed and free of handles and self-intersections.
     """
@@ -414,7 +416,7 @@ def from_surface(
     if is_closed(left) and is_closed(right):
         is_cap = np.concatenate([is_cap[is_left], is_cap[~is_left]])
         return _pair(left, right, is_cap, plane, named, pose, week, report, warnings)
-    return _upright(mesh, is_left, plane, pose, week, report, warnings)
+    return _upright(mesh, is_left, plane, pose, week, report, warnings, is_cap)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
@@ -445,7 +447,8 @@ def _pial_surface(
     report: Mapping[str, Any],
     warnings: Iterable[str] = (),
 ) -> PialSurface:
-    areas = {side: area_cm2(part) for side, part in zip(SIDES, (left, right), strict=True) if part}
+    sides = {"left": left, "right": right}
+    areas = {side: area_cm2(part) for side, part in sides.items() if part}
     measures = {
         "pose": pose.plain(),
         "week": week,
@@ -513,7 +516,7 @@ def _single_hemisphere(
     is_cap: Mask | None = None,
 ) -> PialSurface:
     whole = pial = transformed(mesh, pose.of_file())
-    if is_cap is not None:
+    if is_cap is not None and is_cap.any():
         _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
         pial = submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]

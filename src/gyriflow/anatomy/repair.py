@@ -4,7 +4,7 @@ Every repair is counted.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import igl
@@ -33,7 +33,6 @@ from ..geometry.triangles import (
     edges,
     euler_number,
     face_components,
-    flipped,
     is_closed,
     mean_length,
     merged,
@@ -85,13 +84,13 @@ INSIDE_LEVEL = 0.8
 class RepairedSurface:
     """A surface after repairs, with a report in plain values for JSON and warnings.
 
-    `is_cap` is the (m,) mask of the faces that close medial walls; None if the surface was made of labels.
+    `is_cap` is the (m,) mask of the faces that close medial walls, empty if the surface was made of labels.
     """
 
     mesh: TriangleMesh
     report: dict[str, Any]
     warnings: list[str]
-    is_cap: Mask | None = None
+    is_cap: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 def sound_pieces(
@@ -146,8 +145,8 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
 
 def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> RepairedSurface:
     """Make each piece of a clean surface sound by itself, since hemispheres may share their medial wall."""
-    component, parts, caps = face_components(clean.mesh), [], []
-    report, warnings = {}, []
+    component, report, warnings = face_components(clean.mesh), dict[str, Any](), list[str]()
+    parts, caps = list[TriangleMesh](), list[Mask]()
     for number, piece in enumerate(pieces(clean.mesh)):
         even = make_sound(piece, edge_length_mm)
         report |= {f"{key}_{number + 1}" if number else key: value for key, value in even.report.items()}
@@ -335,55 +334,45 @@ def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[s
     return merged(*main), {"pieces": len(main)} | dropped
 
 
-def _fill_holes(
-    mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool
-) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
-    loops = [np.asarray(loop) for loop in igl.boundary_loop_all(mesh.faces)]
-    sizes = [float(np.ptp(mesh.vertices[loop], axis=0).max()) for loop in loops]
-    wide = sorted((size for size in sizes if size > max_hole_mm), reverse=True)
-    component = face_components(mesh)
-    owners = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop, size in zip(loops, sizes, strict=True) if size > max_hole_mm}
-    if wide and not (caps_walls and len(owners) == len(wide)):
+def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
+    by_size = sorted(
+        (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop)) for loop in igl.boundary_loop_all(mesh.faces)
+    )
+    sizes, loops = [size for size, _ in by_size], [np.asarray(loop) for _, loop in by_size]
+    small = sum(size <= max_hole_mm for size in sizes)
+    wide, component = sizes[small:], face_components(mesh)
+    pieces_with_wide = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]}
+    if wide and not (caps_walls and len(pieces_with_wide) == len(wide)):
         raise MeshError(
             "the surface has holes that are too large to close",
-            found=f"{len(wide)} of {len(loops)} holes, up to {wide[0]:.1f} mm across",
+            found=f"{len(wide)} of {len(loops)} holes, up to {wide[-1]:.1f} mm across",
             expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
             remedy="Give a closed surface, or raise surface.max_hole_mm if the opening may be covered."
-            if wide[0] <= MAX_HOLE_MM
+            if wide[-1] <= MAX_HOLE_MM
             else "Give a closed surface: holes of this size cannot be covered.",
         )
-    # the small ones first, so that the faces of caps are the last ones
-    caps = []
-    for number in np.argsort(sizes, kind="stable"):
-        loop = loops[number]
-        # along the hole, against the existing faces
+    for number, loop in enumerate(loops):
+        # against the existing faces
         runs_along = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (mesh.faces[:, [1, 2, 0]] == loop[1])
-        loop = loop[::-1] if runs_along.any() else loop
-        if sizes[number] > max_hole_mm:
-            caps.append(loop)
-            continue
+        loops[number] = loop[::-1] if runs_along.any() else loop
+    for loop in loops[:small]:
         fan = np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1)
         centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
         mesh = TriangleMesh(np.concatenate([mesh.vertices, centre]), np.concatenate([mesh.faces, fan]))
-    is_cap = np.zeros(len(mesh.faces), dtype=bool)
-    if caps:
-        mesh, is_cap = _with_caps(mesh, caps)
-    return mesh, is_cap, {
-        "holes_closed": len(loops) - len(wide),
-        "largest_hole_mm": max((size for size in sizes if size <= max_hole_mm), default=0.0),
-        "medial_walls_capped_mm": wide,
-    }
+    counts = {"holes_closed": small, "largest_hole_mm": max(sizes[:small], default=0.0), "medial_walls_capped_mm": wide}
+    return *(_with_caps(mesh, loops[small:]) if wide else (mesh, np.zeros(len(mesh.faces), dtype=bool))), counts
 
 
 def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:
-    """Close loops by patches of the smallest area with even triangles; return the mask of their faces, too."""
-    patches = [smallest_patch(mesh, loop) for loop in loops]
+    """Close loops by patches of the smallest area, remeshed; return the mask of their faces, too."""
     rims = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
+    patches = [smallest_patch(mesh, loop) for loop in loops]
     document = in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))
     document.compute_selection_by_condition_per_face(condselect=f"fi >= {len(mesh.faces)}")
-    even = {"iterations": REMESHING_ROUNDS, "featuredeg": SHARP_DEG, "checksurfdist": False, "selectedonly": True}
     length = pymeshlab.PureValue(mean_length(mesh.vertices, rims))
-    document.meshing_isotropic_explicit_remeshing(targetlen=length, **even)
+    document.meshing_isotropic_explicit_remeshing(
+        iterations=REMESHING_ROUNDS, targetlen=length, featuredeg=SHARP_DEG, checksurfdist=False, selectedonly=True
+    )
     return from_meshlab(document), np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 

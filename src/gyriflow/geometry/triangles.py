@@ -142,11 +142,7 @@ def euler_number(mesh: TriangleMesh) -> int:
 
 def face_components(mesh: TriangleMesh) -> Ints:
     """Return the (m,) number of the connected component of each face, the largest area first (0)."""
-    graph = scipy.sparse.coo_matrix(
-        (np.ones(2 * len(mesh.faces)), (mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel())),
-        shape=(len(mesh.vertices),) * 2,
-    )
-    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    label = _connected(mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(mesh.vertices))
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
     return np.argsort(order)[component]
@@ -170,35 +166,36 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     is_forward = (start < end) == (signed_volume(mesh) >= 0)
     for place, number in zip(first[uses > 2], uses[uses > 2], strict=True):
         around = order[place : place + number]
+        sides = around[~is_forward[around]], around[is_forward[around]]
         low, high = mesh.vertices[np.sort([start[around[0]], end[around[0]]])]
         axis = (high - low) / np.linalg.norm(high - low)
-        arms = mesh.vertices[apex[around]] - low
-        angles = np.arctan2(np.cross(arms[0], arms) @ axis, (arms - np.outer(arms @ axis, axis)) @ arms[0])
-        forward = is_forward[around]
-        inside = (angles[forward] - angles[~forward, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
+        arms = [mesh.vertices[apex[side]] - low for side in (around[:1], *sides)]
+        across = arms[0][0] - (arms[0][0] @ axis) * axis
+        backward, forward = (np.arctan2(arm @ np.cross(axis, across), arm @ across) for arm in arms[1:])
+        inside = (forward - backward[:, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
         matched = scipy.optimize.linear_sum_assignment(inside)
-        sides = around[~forward], around[forward]
         if inside[matched].sum() <= 2.0 * np.pi:
-            pairs.append(np.stack([side[chosen] for side, chosen in zip(sides, matched, strict=True)], axis=1))
+            pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
         else:
             unclear.append(sides)
-    # faces overlap at other edges, where those belong together that do so elsewhere
-    links = np.concatenate(pairs).T // 3
-    graph = scipy.sparse.coo_matrix((np.ones(links.shape[1]), links), shape=(len(faces),) * 2)
-    sheet = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    # at other edges the faces overlap: those belong together that do so elsewhere
+    sheet = _connected(np.concatenate(pairs) // 3, len(faces))
     for sides in unclear:
         matched = scipy.optimize.linear_sum_assignment(sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3])
-        pairs.append(np.stack([side[chosen] for side, chosen in zip(sides, matched, strict=True)], axis=1))
+        pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
     one, other = np.concatenate(pairs).T
     turned = start[one] != start[other]
-    joined = np.where(turned, following[other], other), np.where(turned, other, following[other])
-    ends = np.concatenate([one, following[one]]), np.concatenate(joined)
-    links = scipy.sparse.coo_matrix((np.ones(len(ends[0])), ends), shape=(faces.size,) * 2)
-    number, corner = scipy.sparse.csgraph.connected_components(links, directed=False)
-    if number == len(np.unique(faces)):
-        return mesh
+    joined = np.where(turned, [following[other], other], [other, following[other]])
+    corner = _connected(np.concatenate([[one, following[one]], joined]).reshape(2, -1).T, faces.size)
     _, first = np.unique(corner, return_index=True)
+    if len(first) == len(np.unique(faces)):
+        return mesh
     return TriangleMesh(mesh.vertices[faces.ravel()[first]], corner.reshape(-1, 3))
+
+
+def _connected(pairs: Ints, count: int) -> Ints:
+    graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
 def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:

@@ -139,7 +139,8 @@ GROWTH_RATES = Kind(
     section="Growth",
     title="Cortical growth rates",
     caption=(
-        "Pial area (a; both hemispheres, without the cut at the midline, with the caps of open medial walls) and brain volume (b) of the observed brains, "
+        "Pial area (a; both hemispheres, without the cut at the midline, with the caps of open medial walls) and brain "
+        "volume (b) of the observed brains, "
         "and the tangential growth rate between successive weeks of a series, α = (√θ − 1)/Δt, where θ is the ratio of "
         "the areas. Dashed: the growth rate of the simulations. A series has rates if it is of one subject or of an "
         "atlas, or if a run uses it: other brains may be different fetuses, whose differences are not growth."

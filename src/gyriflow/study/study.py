@@ -82,8 +82,12 @@ class Study:
             name
             for name, brains in self.series.brains.items()
             if name in used
-            or not several_subjects(brains)
-            and (brains[0].config.subject or starts & {*brains} or all(brain.id in self.atlases for brain in brains))
+            or (
+                not several_subjects(brains)
+                and (
+                    brains[0].config.subject or starts & {*brains} or all(brain.id in self.atlases for brain in brains)
+                )
+            )
         ]
 
     @property

@@ -266,7 +266,9 @@ def test_a_wide_hole_elsewhere_is_refused_with_its_size():
     left, right, wall = shapes.cut_ellipsoid()
     closed = merged(left, wall)
     lateral, _ = submesh(closed, closed.vertices[closed.faces][:, :, 0].max(axis=1) > -19.0)
-    whole, _ = submesh(merged(left, right), np.r_[left.vertices[left.faces][:, :, 2].min(axis=1) < 20.0, right.faces[:, 0] >= 0])
+    whole, _ = submesh(
+        merged(left, right), np.r_[left.vertices[left.faces][:, :, 2].min(axis=1) < 20.0, right.faces[:, 0] >= 0]
+    )
     settings = {"week": 24.0, "edge_length_mm": 2.0}
     with pytest.raises(MeshError, match=r"2\d\.\d mm across", check=Facts("medial wall")):
         from_surface(lateral, "left", **settings)

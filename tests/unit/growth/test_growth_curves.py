@@ -229,7 +229,8 @@ def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean(
             brains("volume", {21: 110.0}, {21: 1000.0}),
         ]
     )
-    table = rates_of_series(pd.concat([surface, volume]))
+    areas = pd.concat([surface, volume, surface.assign(series="cross-section")])
+    table = rates_of_series(areas, ["surface", "volume"])
     assert table["series"].tolist() == ["surface", "volume"]
     np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
     np.testing.assert_allclose(table["core_rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
@@ -248,7 +249,7 @@ def test_the_rule_writes_what_is_known_of_each_brain(tmp_path) -> None:
         tmp_path,
         inputs | {"thickness": ["thickness.json"]},
         {"areas": "areas.csv", "rates": "rates.csv"},
-        known | {"with_thickness": ["b"]},
+        known | {"with_thickness": ["b"], "with_rates": ["mine", "atlas"]},
     )
     areas = pd.read_csv(tmp_path / "areas.csv")
     assert areas["subject"].tolist() == [*"abcd"]

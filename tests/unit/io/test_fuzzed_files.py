@@ -77,8 +77,8 @@ def wholes(tmp_path_factory):
     [
         ("a.nii", read_label_volume, 352), ("a.mgh", read_label_volume, 284), ("a.nii.gz", read_volume_map, 16),
         ("a.surf.gii", read_surface, 1500), ("lh.pial", read_surface, 80), ("a.stl", read_surface, 84),
-        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.off", read_surface, None), ("a.vtk", read_surface, 200),
-        ("a.vtp", read_surface, 1000), ("a.label.gii", read_vertex_labels, 800),
+        ("a.ply", read_surface, 250), ("a.obj", read_surface, None), ("a.off", read_surface, None),
+        ("a.vtk", read_surface, 200), ("a.vtp", read_surface, 1000), ("a.label.gii", read_vertex_labels, 800),
         ("a.shape.gii", read_vertex_maps, 800), ("a.h5", read_maps, 200), ("a.json", read_json, None),
         ("participants.tsv", read_text_table, None), ("participants.tsv", read_table, None),
         ("study.yaml", read_yaml, None),

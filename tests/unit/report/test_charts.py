@@ -263,6 +263,15 @@ def test_growth_bars_are_the_rates_in_units_of_1e_7_per_second():
     assert volume_axes.lines[0].get_ydata().tolist() == [50, 60, 70]
 
 
+@pytest.mark.fault(73)
+def test_brains_without_rates_have_areas_and_volumes_only():
+    assert len(growth_chart(AREAS, RATES[:0]).axes) == 2
+    figure = growth_chart(pd.concat([AREAS.assign(series="others"), AREAS]), RATES)
+    area_axes, _, rate_axes = figure.axes
+    assert len(area_axes.lines) == 2
+    assert [bar.get_height() for bar in rate_axes.patches] == pytest.approx([1.2, -0.3])
+
+
 def test_the_rates_of_many_subjects_share_a_panel():
     names = [f"sub-{number}" for number in range(9)]
     figure = growth_chart(

@@ -170,3 +170,33 @@ def test_charts_are_coloured_by_a_covariate_that_groups_subjects(volume):
     assert coloured["mother"]["b2"] == "mother: 2"
     with pytest.raises(InputError, check=Facts("metrics.colour_by:", 1, "site", 2, 6)):
         load({"brains": brains, "metrics": {"colour_by": "site"}})
+
+
+MEASURED: dict = {"start": None, "folding": None}
+CROSS_SECTION, ONE_SUBJECT = [{}, {}, {}], [{"subject": "s"}] * 3
+COHORT = {"growth": {"brains": {"cohort": ["all"]}}}
+
+
+@pytest.mark.fault(73)
+@pytest.mark.parametrize(
+    ("keys", "changes", "names"),
+    [
+        (CROSS_SECTION, MEASURED, []),
+        (CROSS_SECTION, {}, ["volume"]),
+        (ONE_SUBJECT, MEASURED, ["volume"]),
+        ([{"subject": name} for name in "xyz"], MEASURED | COHORT, []),
+        ([{"subject": name} for name in "xyz"], {"runs": {"r": {}}, **COHORT}, []),
+        ([{"subject": name} for name in "xyz"], {"runs": {"r": {"growth": "sizes"}}, **COHORT}, ["cohort"]),
+    ],
+)
+def test_only_brains_whose_differences_are_growth_have_rates(keys, changes, names):
+    brains = [{**brain, **key} for brain, key in zip(labelled(21, 22, 23), keys, strict=True)]
+    found = resolved(brains, **changes)
+    assert len(found.growth_brains) == 3
+    assert found.series_with_rates == names
+
+
+def test_an_atlas_has_rates_without_runs(folder):
+    named = {"name": "spina-bifida", "weeks": [21, 22]}
+    found = resolve(load(study(labelled(23, 24), atlas=named, **MEASURED), folder))
+    assert found.series_with_rates == ["spina bifida aperta, unoperated"]
