@@ -90,7 +90,7 @@ rule slow:
 """
 
 
-@pytest.mark.fault(79)
+@pytest.mark.fault(78)
 @pytest.mark.parametrize(("name", "send"), [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)])
 def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
     (workflow.directory / "Snakefile").write_text(STUBBORN)

@@ -75,7 +75,7 @@ def test_a_run_beside_a_live_one_is_refused_with_5_and_leaves_its_lock_but_may_l
         holder.communicate("\n")
 
 
-@pytest.mark.fault(75)
+@pytest.mark.fault(74)
 @pytest.mark.promise(10)
 def test_without_locks_of_files_a_run_goes_on_and_leaves_those_of_others(tmp_path, monkeypatch, capsys):
     def no_locks(*_):

@@ -169,7 +169,7 @@ def test_two_at_once_make_one_environment(outside, tmp_path):
     assert sum("create" in line for line in (tmp_path / "record").read_text().splitlines()) == 1
 
 
-@pytest.mark.fault(75)
+@pytest.mark.fault(74)
 def test_an_environment_is_made_without_locks(outside, tmp_path):
     (tmp_path / "programs" / "flock").write_text("#!/bin/sh\nexit 71\n")
     (tmp_path / "programs" / "flock").chmod(0o755)

@@ -113,7 +113,7 @@ def test_a_look_leaves_nothing_behind(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
-@pytest.mark.fault(76)
+@pytest.mark.fault(75)
 @pytest.mark.parametrize("directory", ["", "/proc/self", "a.yaml/below"])
 def test_a_look_needs_no_folder_to_write_in(tmp_path, directory):
     config = tmp_path / "a.yaml"
@@ -122,7 +122,7 @@ def test_a_look_needs_no_folder_to_write_in(tmp_path, directory):
     assert plan(config, tmp_path / directory, ["surface"])
 
 
-@pytest.mark.fault(78)
+@pytest.mark.fault(77)
 def test_a_study_is_checked_from_its_working_directory(tmp_path):
     folder = tmp_path / "l'étude 100% {wk} #1"
     folder.mkdir()

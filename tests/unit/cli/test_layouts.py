@@ -143,7 +143,7 @@ HCP = "100307/{}/100307.@.{}"
     ],
     ids=["FeTA", "dHCP", "fetpype", "NiBabies", "FreeSurfer", "Infant FreeSurfer", "HCP", "git-annex"],
 )
-@pytest.mark.fault(84)
+@pytest.mark.fault(81)
 def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
     assert brains(make_tree(tmp_path, **contents)) == expected
 
@@ -151,7 +151,7 @@ def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
 WEEK = "sub-01_week24"
 
 
-@pytest.mark.fault(85)
+@pytest.mark.fault(82)
 @pytest.mark.parametrize(
     ("contents", "cause"),
     [
@@ -183,7 +183,7 @@ def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
     assert (len(brain.warnings), brain.problem) == (1, "")
 
 
-@pytest.mark.fault(86)
+@pytest.mark.fault(83)
 def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     brain = cerebrum_surface(*phantom(24.0, 2.0))
     write_surface(tmp_path / "24.stl", brain)

@@ -268,7 +268,7 @@ def test_a_bids_app_takes_labels_and_settings(app, tmp_path):
     assert {brain["scheme"] for brain in app("group")[1]["brains"]} == {"feta-7"}
 
 
-@pytest.mark.fault(85)
+@pytest.mark.fault(82)
 def test_scans_that_cannot_be_used_are_counted_and_the_others_go_on(app, tmp_path):
     make_tree(
         tmp_path / "data",

@@ -7,7 +7,7 @@ import pytest
 from gyriflow.folding.compilation import form_compiler
 
 
-@pytest.mark.fault(80)
+@pytest.mark.fault(79)
 def test_ranks_on_different_processors_share_code_that_all_can_execute(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folders = {}

@@ -8,7 +8,7 @@ import pytest
 
 from gyriflow.running.machine import available_cores, available_memory_mib
 
-pytestmark = pytest.mark.fault(77)
+pytestmark = pytest.mark.fault(76)
 
 
 @pytest.fixture

@@ -131,7 +131,7 @@ def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(fol
         config(folder)
 
 
-@pytest.mark.fault(83)
+@pytest.mark.fault(80)
 def test_ages_of_a_table_follow_the_rules_of_a_data_set(folder):
     head = ("participant_id", "visit", "gestational_age", "scan_age", "labels", "scheme")
     rows = [("sub-1", visit, "33.1", age, "a.nii.gz", "feta-7") for visit, age in (("1", "22.3"), ("2", "28.1"))]
