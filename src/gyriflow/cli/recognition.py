@@ -37,19 +37,7 @@ RESAMPLED_NAME = re.compile(r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[.
 SPACE_NAME = re.compile(r"(?<![A-Za-z0-9])space-([A-Za-z0-9]+)")
 NATIVE_SPACES = ("orig", "native", "individual", "subject", "anat", "scanner", "acpc", "t1w", "t2w")
 TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage(?!_LR).*")
-GENERIC_FOLDERS = (
-    "surf",
-    "mri",
-    "anat",
-    "label",
-    "labels",
-    "seg",
-    "segmentation",
-    "native",
-    "t1w",
-    "t2w",
-    "derivatives",
-)
+GENERIC_FOLDER = re.compile(r"surf|mri|anat|labels?|seg|segmentation|native|t[12]w|derivatives", re.IGNORECASE)
 """Folders that do not name a subject."""
 _SUFFIX_WORDS = sorted({word for suffix in (*SURFACE_SUFFIXES, *VOLUME_SUFFIXES) for word in suffix[1:].split(".")})
 SUFFIXES = re.compile(
@@ -58,35 +46,36 @@ SUFFIXES = re.compile(
     re.IGNORECASE,
 )
 ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([A-Za-z0-9]+)")
+FREESURFER_INPUT = re.compile(r"\.T[12]$")
+"""Suffix for the image that a surface was made with: lh.pial is often a link to lh.pial.T1."""
+RESAMPLED = "resampled"
+"""Space of a subject's own surface on the mesh of a template."""
 WHOLE_BRAIN_ML = (15.0, 700.0)
-"""Volumes of closed surfaces whose names do not say what they are."""
+"""Range of volumes in which a closed surface is accepted as that of a brain."""
 UNSET = "CHOOSE"
 """Placeholder for values that the files do not give; `gyriflow check` then asks for them."""
 
 
 @dataclass
 class FoundBrain:
-    """A recognised scan: its entry of `brains`, where its age is from, and what is wrong with it.
+    """A recognised scan: its entry of `brains`, the source of its age, and reasons why it cannot be used.
 
-    `problem` is why its files cannot be used, `contradiction` why its age cannot; `notes` are values to fill in.
-    `unreadable` files are damaged or missing.
+    `problem` is about its files, `contradiction` about its age; `notes` are values to fill in. It `is_unreadable` if
+    files are damaged or missing. `fits` is the result of `scheme_fits` for its labels.
     """
 
     entry: dict[str, Any]
-    subject: str | None = None
-    session: str | None = None
     age_source: str = ""
     problem: str = ""
-    unreadable: bool = False
+    is_unreadable: bool = False
     contradiction: str = ""
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     fits: dict[str, str] | None = None
-    """Of labels what `scheme_fits` returns."""
 
     @property
     def causes(self) -> list[str]:
-        """Why the scan cannot be used as it is."""
+        """Reasons why the scan cannot be used as it is."""
         return [cause for cause in (self.problem, self.contradiction, *self.notes) if cause]
 
     @property
@@ -106,32 +95,28 @@ class Recognised:
 
 @dataclass
 class _Candidate:
-    """Files that may be a scan: the one that names it, its entry's source, and its space, "" if it is the subject's."""
+    """Files that may be a scan: the one that names it, their keys in an entry, and their space ("": the subject's)."""
 
     file: Path
     source: dict[str, Any]
     space: str = ""
     problem: str = ""
 
-    @property
-    def entities(self) -> dict[str, set[str]]:
-        found: dict[str, set[str]] = {"sub": set(), "ses": set()}
-        for entity, label in ENTITY.findall(self.file.as_posix()):
-            found[entity].add(label)
-        return found
+    def labels(self, entity: str) -> list[str]:
+        return sorted({label for name, label in ENTITY.findall(self.file.as_posix()) if name == entity})
 
     def label(self, entity: str) -> str | None:
-        # a path that gives several is refused
-        return next(iter(sorted(self.entities[entity])), None)
+        # a path with several labels is refused
+        return next(iter(self.labels(entity)), None)
 
     @property
     def scan(self) -> str:
         subject, session = self.label("sub"), self.label("ses")
         if subject:
             return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
-        name = re.sub(r"\.T[12]$", "", self.file.name)
-        name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", SIDE_NAME.sub("", name))))
-        folders = [part for part in self.file.parts[:-1] if part.lower() not in GENERIC_FOLDERS]
+        name = SIDE_NAME.sub("", FREESURFER_INPUT.sub("", self.file.name))
+        name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", name)))
+        folders = [part for part in self.file.parts[:-1] if not GENERIC_FOLDER.fullmatch(part)]
         if folders and not re.search(r"\d", name):
             name = folders[-1]
         return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
@@ -145,57 +130,51 @@ def recognise(
     participants: Collection[str] = (),
     sessions: Collection[str] = (),
 ) -> Recognised:
-    """Return the scans of a folder and those in it, from files whose paths match a pattern.
+    """Return the scans of a folder and of those in it, from files whose paths match a pattern.
 
-    Results and data sets that gyriflow itself has made are left out. All labels are of the `scheme`, where one is
-    named. With labels of `participants` or `sessions`, files of others are not read. InputError where no scan is found,
-    or none of a named participant or session.
+    Results and data sets of gyriflow itself are left out. If a `scheme` is named, all labels are of it. With labels of
+    `participants` or `sessions`, files of others are not read. InputError if no scan is found, or none of a named
+    participant or session.
     """
-    every = [path.relative_to(folder) for path in files_in(folder)]
-    own = [file.parent for file in every if file.name == "dataset_description.json" and _is_own(folder / file)]
-    own += [file.parents[1] for file in every if file.parts[-2:] == ("study", "study.json")]
+    paths = [path.relative_to(folder) for path in files_in(folder)]
+    own = [file.parent for file in paths if file.name == "dataset_description.json" and _is_own(folder / file)]
+    own += [file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")]
     own += [results.parent / "resources" for results in own]
-    files = [file for file in every if not any(map(file.is_relative_to, own))]
+    files = [file for file in paths if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
-    candidates = [*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)]
     found: dict[str, list[_Candidate]] = defaultdict(list)
-    for candidate in candidates:
+    sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
+    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)):
+        sessions_of[candidate.label("sub")].add(candidate.label("ses"))
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
     if not found:
         expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
-        looked = f"{len(files)} files" + "".join(f"\n  {file}" for file in files[:10]) + ("\n  …" * (len(files) > 10))
-        raise InputError("no brain was recognised", path=folder, found=looked, expected=expected)
-    scans: dict[str | None, set[str | None]] = defaultdict(set)
-    for candidate in candidates:
-        scans[candidate.label("sub")].add(candidate.label("ses"))
-    selected = {
-        name: group
-        for name, group in found.items()
-        if (not participants or group[0].label("sub") in participants)
-        and (not sessions or group[0].label("ses") in sessions)
-    }
-    for entity, labels in (("sub", participants), ("ses", sessions)):
-        there = {candidate.label(entity) for group in found.values() for candidate in group}
-        if lost := sorted(set(labels) - there):
-            names = ", ".join(sorted(f"{entity}-{label}" for label in there if label)[:20]) or "none"
-            problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in lost)}"
-            raise InputError(
-                problem, path=folder, found=names, remedy="Labels must be equal, with their zeros and case."
-            )
-    if not selected:
-        raise InputError("has no scan of these participants in these sessions", path=folder)
+        names = f"{len(files)} files" + "".join(f"\n  {file}" for file in files[:10]) + ("\n  …" * (len(files) > 10))
+        raise InputError("no brain was recognised", path=folder, found=names, expected=expected)
+    selection = {"sub": participants, "ses": sessions}
+    for entity, labels in selection.items():
+        existing = {candidate.label(entity) for group in found.values() for candidate in group}
+        if absent := sorted(set(labels) - existing):
+            problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
+            names = ", ".join(sorted(f"{entity}-{label}" for label in existing if label)[:20]) or "none"
+            remedy = "Labels must be equal, with their zeros and case."
+            raise InputError(problem, path=folder, found=names, remedy=remedy)
     unused: dict[str, str] = {}
     brains = []
-    for name, group in selected.items():
-        chosen = _of_the_subject(group, unused)
-        for number, candidate in enumerate(chosen, start=1):
-            brain = _found_brain(folder, candidate, tables, scans, name if number == 1 else f"{name}-{number}")
+    for name, group in found.items():
+        if any(labels and group[0].label(entity) not in labels for entity, labels in selection.items()):
+            continue
+        preferred = _preferred_files(group, unused)
+        for number, candidate in enumerate(preferred, start=1):
+            brain = _found_brain(folder, candidate, tables, sessions_of, name if number == 1 else f"{name}-{number}")
             brains.append(brain)
-            if len(chosen) > 1:
+            if len(preferred) > 1:
                 # several files of one scan do not make a series
                 brain.entry.pop("subject", None)
-                brain.notes.append(f"{len(chosen)} files are of {name}: keep one")
+                brain.notes.append(f"{len(preferred)} files are of {name}: keep one")
+    if not brains:
+        raise InputError("has no scan of these participants in these sessions", path=folder)
     _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     brains.sort(key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
@@ -204,42 +183,37 @@ def recognise(
 
 def _is_own(description: Path) -> bool:
     try:
-        described = read_json(description)
+        content = read_json(description)
     except InputError:
         return False
-    tools = described.get("GeneratedBy") if isinstance(described, dict) else None
+    tools = content.get("GeneratedBy") if isinstance(content, dict) else None
     return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
 
 
-def _of_the_subject(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:
-    """Return the files of a scan in the subject's own space, or if there are none its resampled ones, or others."""
+def _preferred_files(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:
+    """Return the files of a scan in the subject's own space, else the resampled ones, else all; add to the `unused`."""
     native = [candidate for candidate in group if not candidate.space]
     resampled = [candidate for candidate in group if candidate.space == RESAMPLED]
-    chosen = native or resampled or list(group)
-    surfaces = [candidate for candidate in chosen if candidate.file.parent.name == "surf"]
-    if surfaces and len(chosen) > len(surfaces):
-        # volumes of a FreeSurfer subject beside its surfaces
-        subject = surfaces[0].file.parents[1]
-        chosen = [candidate for candidate in chosen if candidate.file.parent != subject / "mri"]
+    preferred = native or resampled or list(group)
+    # volumes of FreeSurfer subjects that have surfaces, too
+    volumes = {candidate.file.parents[1] / "mri" for candidate in preferred if candidate.file.parent.name == "surf"}
+    preferred = [candidate for candidate in preferred if candidate.file.parent not in volumes]
     for candidate in group:
-        if candidate not in chosen:
-            reason = f"in the space {candidate.space}" if candidate.space else "a volume beside surfaces"
-            unused[str(candidate.file)] = "resampled" if candidate.space == RESAMPLED else reason
-    return chosen
+        if candidate not in preferred:
+            reason = f"in the space {candidate.space}" if candidate.space else "a volume of a subject with surfaces"
+            unused[str(candidate.file)] = RESAMPLED if candidate.space == RESAMPLED else reason
+    return preferred
 
 
 def _refuse_equal_weeks(brains: Sequence[FoundBrain]) -> None:
-    weeks = Counter((brain.entry.get("subject"), brain.entry["week"]) for brain in brains)
+    scans: dict[tuple[str, float], list[FoundBrain]] = defaultdict(list)
     for brain in brains:
-        subject, week = brain.entry.get("subject"), brain.entry["week"]
-        if subject and week != UNSET and weeks[subject, week] > 1:
-            scans = ", ".join(
-                f"{each.entry['id']} ({each.age_source})" for each in brains if each.subject == brain.subject
-            )
-            brain.contradiction = f"scans of one subject have the same age, {week:g}; found {scans}; expected one"
-
-
-RESAMPLED = "resampled"
+        if "subject" in brain.entry and brain.entry["week"] != UNSET:
+            scans[brain.entry["subject"], brain.entry["week"]].append(brain)
+    for (_, week), group in scans.items():
+        found = ", ".join(f"{brain.entry['id']} ({brain.age_source})" for brain in group)
+        for brain in group if len(group) > 1 else ():
+            brain.contradiction = f"scans of one subject have the same age, {week:g}; found {found}; expected one"
 
 
 def _space(file: Path, *, is_surface: bool) -> str:
@@ -254,59 +228,50 @@ def _space(file: Path, *, is_surface: bool) -> str:
 
 def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
     surfaces: dict[tuple[str, str], dict[Side, Path]] = {}
-    traces_of: dict[tuple[Path, str], dict[Side, Path]] = defaultdict(dict)
-    names = set(files)
+    files_of: dict[tuple[Path, str], dict[Side, Path]] = defaultdict(dict)
+    existing = set(files)
     for file in files:
-        side = SIDE_NAME.search(file.name)
-        if side is None:
+        if not (match := SIDE_NAME.search(file.name)):
             continue
-        traces_of[file.parent, file.name[: side.start()]].setdefault("left" if side[1] else "right", file)
-        # FreeSurfer's lh.pial is often a link to lh.pial.T1
-        plain = re.sub(r"\.T[12]$", "", file.name)
-        kind = LAYER_NAME.search(plain)
-        is_double = plain != file.name and file.with_name(plain) in names
-        if kind and plain.lower().endswith(SURFACE_SUFFIXES) and not is_double:
-            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", plain)))
-            sides = surfaces.setdefault((rest, "pial" if kind[1] else "white"), {})
-            sides["left" if side[1] else "right"] = file
-    for (rest, layer), sides in surfaces.items():
-        pair = {name: str(sides[name]) for name in SIDES if name in sides}
+        side: Side = "left" if match[1] else "right"
+        files_of[file.parent, SIDE_NAME.split(file.name)[0]].setdefault(side, file)
+        name = FREESURFER_INPUT.sub("", file.name)
+        layer = LAYER_NAME.search(name)
+        is_double = name != file.name and file.with_name(name) in existing
+        if layer and name.lower().endswith(SURFACE_SUFFIXES) and not is_double:
+            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", name)))
+            surfaces.setdefault((rest, "pial" if layer[1] else "white"), {})[side] = file
+    for (rest, kind), sides in surfaces.items():
+        pair = {side: str(sides[side]) for side in SIDES if side in sides}
         first = next(iter(pair))
         file, white = sides[first], surfaces.get((rest, "white"), {})
-        problem = ""
         source: dict[str, Any] = {"hemispheres": pair}
-        if layer == "white":
+        problem = ""
+        if kind == "white":
             if (rest, "pial") in surfaces:
                 continue
             problem = "white surfaces alone; pial ones are needed"
         elif len(pair) == 1:
             source = {"hemisphere": {"file": str(file), "side": first}}
-            side = SIDE_NAME.search(file.name)
-            traces = traces_of[file.parent, file.name[: side.start()] if side else ""]
-            for lost in set(traces) - {first}:
-                found = f"found {traces[lost]}; expected both sides, or no file of the {lost} one"
-                problem = f"has no pial surface of the {lost} hemisphere; {found}"
+            for side, sign in files_of[file.parent, SIDE_NAME.split(file.name)[0]].items():
+                if side != first:
+                    found = f"found {sign}; expected both sides, or no file of the {side} one"
+                    problem = f"has no pial surface of the {side} hemisphere; {found}"
         elif len(white) == 1:
             problem = f"has one white surface; found {next(iter(white.values()))}; expected both or none"
         elif white:
-            source["white"] = [str(white[name]) for name in SIDES]
+            source["white"] = [str(white[side]) for side in SIDES]
         yield _Candidate(file, source, _space(file, is_surface=True), problem)
-
-
-def _require_content(path: Path) -> None:
-    with reading(path, "a surface"), path.open("rb") as file:
-        if not file.read(1):
-            raise InputError("is empty", path=path, expected="a surface")
 
 
 def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
     for file in files:
         name = file.name.lower()
         layer = LAYER_NAME.search(name)
-        is_named = bool(layer and layer[1])
         has_no_side = not SIDE_NAME.search(name) and not NO_BRAIN_NAME.search(name)
         # GIFTI files may have other data than surfaces
-        if name.endswith(SURFACE_SUFFIXES) and has_no_side and (is_named or not name.endswith((".gii", ".gii.gz"))):
+        is_surface = bool(layer and layer[1]) or not name.endswith((".gii", ".gii.gz"))
+        if name.endswith(SURFACE_SUFFIXES) and has_no_side and is_surface:
             yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True))
 
 
@@ -323,41 +288,33 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
 
 
 def _found_brain(
-    folder: Path,
-    candidate: _Candidate,
-    tables: ScanTables,
-    scans: dict[str | None, set[str | None]],
-    name: str,
+    folder: Path, candidate: _Candidate, tables: ScanTables, sessions_of: dict[str | None, set[str | None]], name: str
 ) -> FoundBrain:
     subject, session = candidate.label("sub"), candidate.label("ses")
-    facts, owner = None, subject
-    if subject is not None:
-        facts = tables.facts(subject, session, len(scans[subject]) < 2, folder / candidate.file)
-        missing = "" if facts else _equal_but_for_zeros(subject, tables)
-    else:
-        owners = _owners(candidate, tables)
-        owner, missing = (owners[0] if owners else None), ""
-        if len(owners) > 1:
-            missing = f"several rows may be of this scan: found {', '.join(owners)}; expected one id in its path"
-        elif owner is not None:
-            facts = tables.facts(owner, session, place=folder / candidate.file)
-    age, named = facts.age if facts else ScanAge(None, cause=missing), week_in_name(candidate.file.parts)
-    if age.week is not None and named.week is not None and not _agree(age.week, named):
+    owners = _owners(candidate, tables) if subject is None else [subject]
+    facts, cause = None, ""
+    if len(owners) > 1:
+        cause = f"several rows may be of this scan: found {', '.join(owners)}; expected one id in its path"
+    elif owners:
+        is_only_scan = subject is None or len(sessions_of[subject]) < 2
+        facts = tables.facts(owners[0], session, is_only_scan, folder / candidate.file)
+        cause = "" if facts else _similar_ids(owners[0], tables)
+    age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(candidate.file.parts)
+    if age.week is not None and named.week is not None and not _agree(age.week, named.week):
         age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
     elif age.week is None and not age.cause:
         age = named
-    names = {
-        f"{entity}-{label}" for entity, labels in candidate.entities.items() for label in labels if len(labels) > 1
-    }
-    label = f"sub-{subject}" if subject else owner
-    entry = {"id": name, "week": UNSET if age.week is None else age.week} | ({"subject": label} if label else {})
-    brain = FoundBrain(entry | (covariates(facts) if facts else {}) | candidate.source, owner, session, age.source)
+    entry = {"id": name, "week": UNSET if age.week is None else age.week}
+    entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
+    brain = FoundBrain(
+        entry | (covariates(facts.values) if facts else {}) | candidate.source, age.source, candidate.problem
+    )
     if age.week is None:
         brain.contradiction = age.cause
-        brain.notes += [] if age.cause else ["week: its name does not give the week, and no table has it"]
-    brain.problem = candidate.problem
-    if names:
-        brain.problem = f"its path names several scans: found {', '.join(sorted(names))}; expected one"
+        brain.notes += [] if age.cause else ["week: neither its name nor a table gives the week"]
+    labels = {entity: candidate.labels(entity) for entity in ("ses", "sub")}
+    if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
+        brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
     elif candidate.space and candidate.space != RESAMPLED:
         brain.problem = f"is in the space {candidate.space}; expected the subject's own"
     elif candidate.space:
@@ -370,10 +327,12 @@ def _found_brain(
         elif "pial" in candidate.source:
             _require_brain(folder / candidate.file)
         else:
-            for file in (*brain.files.split(", "), *candidate.source.get("white", ())):
-                _require_content(folder / file)
+            for path in (folder / file for file in (*brain.files.split(", "), *candidate.source.get("white", ()))):
+                with reading(path, "a surface"), path.open("rb") as file:
+                    if not file.read(1):
+                        raise InputError("is empty", path=path, expected="a surface")
     except InputError as error:
-        brain.problem, brain.unreadable = str(error), True
+        brain.problem, brain.is_unreadable = str(error), True
     return brain
 
 
@@ -387,32 +346,27 @@ def _require_brain(path: Path) -> None:
         raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
 
 
-def _agree(week: float, named: ScanAge) -> bool:
+def _agree(week: float, named: float) -> bool:
     # names may give whole weeks, completed or rounded
-    assert named.week is not None
-    is_whole = named.week == int(named.week)
-    return abs(week - named.week) <= MAX_DIFFERENCE_WEEKS or (is_whole and -0.5 <= week - named.week < 1.0)
+    return abs(week - named) <= MAX_DIFFERENCE_WEEKS or (named.is_integer() and -0.5 <= week - named < 1.0)
 
 
 def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
     """Return the subjects of tables whose ids are whole parts of a path without `sub-`: of the name or of a folder."""
-    name = re.split(r"[._]", candidate.file.name)
-    beginnings = {"_".join(name[:number]) for number in range(1, len(name) + 1)} | {candidate.scan}
+    parts = re.split(r"[._]", candidate.file.name)
+    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {candidate.scan}
     ids = dict.fromkeys(row.subject for table in tables.tables for row in table.rows)
-    named = [subject for subject in ids if subject in beginnings]
-    if named:
-        return [max(named, key=len)]
-    return [subject for subject in ids if subject in candidate.file.parts[:-1]]
+    in_name = [subject for subject in ids if subject in beginnings]
+    in_folders = [subject for subject in ids if subject in candidate.file.parts[:-1]]
+    return [max(in_name, key=len)] if in_name else in_folders
 
 
-def _equal_but_for_zeros(subject: str, tables: ScanTables) -> str:
-    """Return which ids tables have instead of a subject: those that differ in zeros or case, or some of all."""
+def _similar_ids(subject: str, tables: ScanTables) -> str:
+    """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
     ids = {row.subject: row.place for table in tables.tables for row in table.rows}
-    near = [other for other in ids if other.lower().lstrip("0") == subject.lower().lstrip("0")]
-    if not ids:
-        return ""
-    found = ", ".join(f"{other} ({ids[other]})" for other in near) or ", ".join([*list(ids)[:5], "…"])
-    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case"
+    similar = [f"{name} ({ids[name]})" for name in ids if name.lower().lstrip("0") == subject.lower().lstrip("0")]
+    found = ", ".join(similar or [*list(ids)[:5], "…"])
+    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if ids else ""
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
@@ -430,13 +384,11 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
 
 
 def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
-    """Return the entry of one label volume: its id, file and scheme; InputError where that is unknown or not one."""
+    """Return the entry of a label volume: its id, file and scheme; InputError if the scheme is unknown or unclear."""
     if scheme not in (None, *SCHEMES):
         raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
-    entry, fits = (
-        {"id": _Candidate(file, {}).scan, "labels": str(file), "scheme": UNSET},
-        scheme_fits(read_label_volume(file, cropped=True).labels),
-    )
+    entry = {"id": _Candidate(file, {}).scan, "labels": str(file), "scheme": UNSET}
+    fits = scheme_fits(read_label_volume(file, cropped=True).labels)
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:
         problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
@@ -451,7 +403,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
 def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> None:
     """Set the scheme of all brains with labels: `scheme`, otherwise the only scheme that fits all of them.
 
-    Where none fits all, each has its own. A note asks where several fit or none does, and where the scans of one
+    If none fits all, each has its own. A note asks for the scheme if several fit or none does, or if the scans of one
     subject would have several.
     """
     each = [[name for name, against in (brain.fits or {}).items() if not against] for brain in brains]
@@ -476,7 +428,7 @@ def choose_schemes(brains: Sequence[FoundBrain], scheme: str | None = None) -> N
 
 
 def scheme_reasons(brains: Sequence[FoundBrain]) -> Iterator[str]:
-    """Yield for each chosen scheme how many volumes have it, then what speaks against it and against each other one."""
+    """Yield the number of volumes of each chosen scheme, then contradictions to it and to the other schemes."""
     for name, number in Counter(brain.entry.get("scheme", UNSET) for brain in brains).items():
         if name != UNSET:
             fits = [brain.fits or {} for brain in brains if brain.entry.get("scheme") == name]

@@ -1,5 +1,6 @@
 """The table of scans with which `init`, `check` and the BIDS app end."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -8,6 +9,8 @@ from ..io.files import read_table
 from .recognition import UNSET, FoundBrain, Recognised
 
 HEADINGS = ("scan", "age", "from", "data", "scheme", "verdict")
+UNUSABLE = {"not read": "could not be read", "refused": "cannot be used", "fill in": "to fill in"}
+"""Verdicts on scans that are not usable as they are, and what the last line calls them."""
 
 
 class ScanRow(NamedTuple):
@@ -31,16 +34,11 @@ def scan_lines(rows: Sequence[ScanRow]) -> Iterator[str]:
     for line, row in zip(lines[1:], rows, strict=True):
         yield line
         yield from (f"    {' '.join(reason.split())}" for reason in row.reasons)
-    unread, refused, open_values = (sum(row.verdict == verdict for row in rows) for verdict in VERDICTS)
-    usable = len(rows) - unread - refused - open_values
-    counts = [f"{unread} could not be read"] * (unread > 0) + [f"{refused} cannot be used"] * (refused > 0)
-    counts += [f"{open_values} to fill in"] * (open_values > 0)
+    counts = Counter(row.verdict for row in rows)
+    unusable = [f"{counts[verdict]} {text}" for verdict, text in UNUSABLE.items() if counts[verdict]]
+    usable = sum(row.verdict not in UNUSABLE for row in rows)
     total = f"{len(rows)} scan{'s' if len(rows) != 1 else ''}"
-    yield f"{usable} of {total}; {', '.join(counts)}" if counts else total
-
-
-VERDICTS = ("not read", "refused", "fill in")
-"""Verdicts on scans that are not usable as they are."""
+    yield f"{usable} of {total}; {', '.join(unusable)}" if unusable else total
 
 
 def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
@@ -52,24 +50,21 @@ def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
     return {str(row["subject"]): (str(row["verdict"]), str(row.get("cause", ""))) for _, row in table.iterrows()}
 
 
-def found_rows(found: Recognised, measured: dict[str, tuple[str, str]] | None = None) -> list[ScanRow]:
-    """Return the rows of recognised scans; `measured` has verdict and cause of those that were run, by id."""
-    return [_row(brain, (measured or {}).get(brain.entry["id"])) for brain in found.brains]
+def found_rows(found: Recognised, verdicts: dict[str, tuple[str, str]] | None = None) -> list[ScanRow]:
+    """Return the rows of recognised scans; `verdicts` has verdict and cause of those that were run, by id."""
+    return [_row(brain, (verdicts or {}).get(brain.entry["id"])) for brain in found.brains]
 
 
-def _row(brain: FoundBrain, measured: tuple[str, str] | None) -> ScanRow:
-    entry = brain.entry
-    week, scheme = entry["week"], entry.get("scheme", "–")
+def _row(brain: FoundBrain, quality: tuple[str, str] | None) -> ScanRow:
+    week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
     reasons = [*brain.causes, *brain.warnings]
-    verdict = "not read" if brain.unreadable else "refused" if brain.problem or brain.contradiction else "ok"
+    verdict = "not read" if brain.is_unreadable else "refused" if brain.problem or brain.contradiction else "ok"
     verdict = "fill in" if verdict == "ok" and brain.notes else verdict
-    if measured and verdict == "ok":
-        verdict, cause = measured
+    if quality and verdict == "ok":
+        verdict, cause = quality
         reasons += [cause] if cause else []
     elif verdict == "ok" and brain.warnings:
         verdict = "warning"
     data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
-    age = "–" if week == UNSET else f"{week:g}"
-    return ScanRow(
-        entry["id"], age, brain.age_source or "–", data, "–" if scheme == UNSET else scheme, verdict, reasons
-    )
+    age, scheme = "–" if week == UNSET else f"{week:g}", "–" if scheme == UNSET else scheme
+    return ScanRow(brain.entry["id"], age, brain.age_source or "–", data, scheme, verdict, reasons)

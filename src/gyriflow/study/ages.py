@@ -19,6 +19,9 @@ _AGE = r"(?:age|ga|pma|gestational_age|post_?menstrual_age)"
 _SCAN = r"(?:scan|mri|mr|imaging|acquisition|session|visit|exam)"
 AT_SCAN = re.compile(rf"{_SCAN}_{_AGE}|{_AGE}_(?:at_)?{_SCAN}|pma|post_?menstrual_age")
 GESTATIONAL = re.compile(r"gestational_age|gest_age|gestation|ga|gw|weeks?|gestational_weeks?")
+Kind = Literal["scan", "gestational", "age"]
+KINDS: dict[Kind, re.Pattern[str]] = {"scan": AT_SCAN, "gestational": GESTATIONAL, "age": re.compile("age")}
+"""Kinds of ages by the names of their columns: at the scan, gestational, or any."""
 OTHER_AGE = re.compile(
     r".*(birth|delivery).*|(post_?natal|chronological|corrected|(?:post_?)?concept\w*)(?:_age)?|pna|pca"
 )
@@ -30,7 +33,7 @@ WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d?)")
 NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 MIN_AMBIGUOUS_AGES = 3
-"""With fewer ages in tenths of a week, digits from 0 to 6 only are no sign of days."""
+"""Ages in tenths of a week, all with digits from 0 to 6, from which on the digits may be days."""
 MAX_DIFFERENCE_WEEKS = 0.1
 """Two ages of a scan agree if they differ by rounding."""
 WEEK_NAME = re.compile(
@@ -38,37 +41,36 @@ WEEK_NAME = re.compile(
     re.IGNORECASE,
 )
 AMBIGUOUS_ENDING = re.compile(r"[_+-]?[wdp]?\d+[dw]?(?![A-Za-z0-9])|[+-]\d", re.IGNORECASE)
-"""What may follow the weeks in a name and be days, a decimal or another week."""
+"""Text after the weeks in a name that may be days, a decimal or another week."""
 
 
 @dataclass(frozen=True)
 class AgeColumn:
-    """A column of ages, `scan` at the scan, `gestational` or plain `age`, with its unit and why it cannot be used."""
+    """A column of ages, with its unit, and the problem if it cannot be used."""
 
     name: str
-    kind: Literal["scan", "gestational", "age"]
+    kind: Kind
     unit: str
     problem: str
 
 
 @dataclass(frozen=True)
-class GivenAge:
-    """An age that a table gives: its place (table and row), column and text.
+class TableAge:
+    """An age in a table: its place (table and row), column and text.
 
-    `of_session` is whether the row names a session, `of_subject` whether the subject has other scans too, so that the
-    age is that of none.
+    `has_session` is whether the row names a session, `is_shared` whether it could be of several scans of the subject.
     """
 
     place: str
     column: AgeColumn
     text: str
-    of_session: bool
-    of_subject: bool = False
+    has_session: bool
+    is_shared: bool = False
 
 
 @dataclass(frozen=True)
 class ScanAge:
-    """The age of a scan in weeks, None if unknown, with where it is from or the cause, and the columns it is from."""
+    """The age of a scan in weeks with its source and columns, or None with the cause."""
 
     week: float | None
     source: str = ""
@@ -84,10 +86,11 @@ def column_key(name: str) -> str:
 def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[AgeColumn]:
     """Return the columns with ages of scans; `sidecar` is the content of the table's JSON file.
 
-    Ages at birth and ages since birth or conception are not ages of scans: they have a problem if they are named like
-    one, and otherwise are not returned.
+    Ages at birth and ages since birth or conception are not ages of scans. If they are named like one, they have a
+    problem, otherwise they are not returned.
     """
-    described = {column_key(str(key)): value for key, value in sidecar.items()} if isinstance(sidecar, dict) else {}
+    keys = sidecar.items() if isinstance(sidecar, dict) else ()
+    described = {column_key(str(key)): value for key, value in keys if isinstance(value, dict)}
     columns = []
     for name in names:
         key = column_key(name)
@@ -95,72 +98,61 @@ def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[A
         base = key[: ending.start()] if ending else key
         if OTHER_AGE.fullmatch(base):
             continue
-        kind: Literal["scan", "gestational", "age"] | None = None
-        if AT_SCAN.fullmatch(base):
-            kind = "scan"
-        elif GESTATIONAL.fullmatch(base) or (base == "age" and ending):
-            kind = "gestational"
-        elif base == "age":
-            kind = "age"
-        if kind:
-            facts = described.get(key)
-            unit, problem = _unit(
-                kind, ending[1] if ending else "", facts if isinstance(facts, dict) else {}, sidecar_name
-            )
+        for kind in (kind for kind, pattern in KINDS.items() if pattern.fullmatch(base)):
+            kind = "gestational" if kind == "age" and ending else kind
+            unit, problem = _unit(kind, ending[1] if ending else "", described.get(key, {}), sidecar_name)
             columns.append(AgeColumn(name, kind, unit, problem))
     return columns
 
 
 def _unit(kind: str, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str]:
     unit = str(described.get("Units", "")).strip().lower()
-    named = [text for text in (ending, unit) if text]
-    units = {UNITS.get(text) for text in named} or {None if kind == "age" else "weeks"}
+    names = [text for text in (ending, unit) if text]
+    units = {UNITS.get(text) for text in names} or {None if kind == "age" else "weeks"}
     text = " ".join(str(described.get(key, "")) for key in ("LongName", "Description"))
     reference = str(described.get("AgeReference", "")) or ("" if re.search("scan|MRI|imaging", text) else text)
     if len(units) > 1 or None in units:
-        found = f"found the unit {' and '.join(named)}" if named else "has no unit"
+        found = f"found the unit {' and '.join(names)}" if names else "has no unit"
         return "weeks", f"{found}; expected Units weeks or days in {sidecar_name}"
     if OTHER_REFERENCE.search(reference):
-        return "weeks", f"is not a gestational age at the scan: {sidecar_name} says {reference.strip()!r}"
+        return "weeks", f"is not a gestational age at the scan: {sidecar_name} has {reference.strip()!r}"
     return str(units.pop()), ""
 
 
-def choose_age(given: Sequence[GivenAge], notation: WeekNotation | None) -> ScanAge:
-    """Return the age of a scan from all places that name it.
+def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAge:
+    """Return the age of a scan from all its ages in tables.
 
-    Ages named as at the scan come first, since a gestational age beside them is the one at birth; then those of the
-    scan's own session. Without a value, or with two that differ, there is none, and a cause.
+    Ages at the scan take precedence, since the table's gestational age is then the one at birth; next are ages of the
+    scan's session. If all are missing, or if two differ, the age is None, with the cause.
     """
-    given = [age for age in given if age.text not in MISSING_VALUES]
-    own = [age for age in given if not age.of_subject]
-    if not own:
+    ages = [age for age in ages if age.text not in MISSING_VALUES]
+    used = [age for age in ages if not age.is_shared]
+    if not used:
         return ScanAge(None)
-    chosen = [age for age in own if age.column.kind == "scan"]
-    if not chosen:
-        chosen = [age for age in own if age.of_session] or own
-        # a plain age beside a gestational one may be the mother's
-        chosen = [age for age in chosen if age.column.kind == "gestational"] or chosen
-    kind = chosen[0].column.kind
+    at_scan = [age for age in used if age.column.kind == "scan"]
+    used = at_scan or [age for age in used if age.has_session] or used
+    # an age of no kind may be the mother's
+    used = at_scan or [age for age in used if age.column.kind == "gestational"] or used
     weeks = []
-    for age in chosen:
+    for age in used:
         week, problem = read_week(age.text, age.column.unit, notation)
         if problem := age.column.problem or problem:
             return ScanAge(None, cause=f"{age.column.name}: {problem} ({age.place})")
         weeks.append(week or 0.0)
     if max(weeks) - min(weeks) > MAX_DIFFERENCE_WEEKS:
-        values = " and ".join(f"{age.text} ({age.place}, {age.column.name})" for age in chosen)
-        remedy = " Give each scan a row with its session_id." if len({age.place for age in chosen}) > 1 else ""
+        values = " and ".join(f"{age.text} ({age.place}, {age.column.name})" for age in used)
+        remedy = " Give each scan a row with its session_id." if len({age.place for age in used}) > 1 else ""
         return ScanAge(None, cause=f"found two ages, {values}; expected one.{remedy}")
-    unused = [f"{age.column.name} {age.text}" for age in given if age.column.kind == "gestational" and kind == "scan"]
-    source = f"{chosen[0].place.partition(' row')[0]}, {chosen[0].column.name}"
-    source += f" ({', '.join(dict.fromkeys(unused))} is at birth)" if unused else ""
-    return ScanAge(weeks[0], source, columns=frozenset(age.column.name for age in chosen))
+    at_birth = [f"{age.column.name} {age.text}" for age in ages if at_scan and age.column.kind == "gestational"]
+    source = f"{used[0].place.partition(' row')[0]}, {used[0].column.name}"
+    source += f" ({', '.join(dict.fromkeys(at_birth))} is at birth)" if at_birth else ""
+    return ScanAge(weeks[0], source, columns=frozenset(age.column.name for age in used))
 
 
 def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = None) -> tuple[float | None, str]:
-    """Return a gestational age in weeks, rounded to the two decimals of file names, and the problem with it, or ''.
+    """Return a gestational age in weeks, rounded to two decimals as in file names, and the problem with it, or ''.
 
-    `notation` says whether 24.3 is a decimal (default) or three days after 24 weeks.
+    By `notation`, 24.3 is a decimal (default), or 24 weeks and 3 days.
     """
     tenths = TENTHS.fullmatch(text)
     if whole := WEEKS_AND_DAYS.fullmatch(text):
@@ -193,8 +185,7 @@ def week_in_name(parts: Sequence[str]) -> ScanAge:
         for match in matches:
             if ending := AMBIGUOUS_ENDING.match(match["more"]):
                 found = f"found {match[0]}{ending[0]}; expected one such as week24.4 or week24+3"
-                cause = f"the name gives an ambiguous age: {found}"
-                return ScanAge(None, cause=cause)
+                return ScanAge(None, cause=f"the name gives an ambiguous age: {found}")
         weeks = {match["age"]: read_week(match["age"].lower()) for match in matches}
         if len({week for week, _ in weeks.values()}) > 1:
             return ScanAge(None, cause=f"the name gives two ages: found {' and '.join(weeks)}; expected one")

@@ -1,4 +1,4 @@
-"""Tables of participants and their sessions in the format of BIDS, and the facts that they give about a scan."""
+"""Tables of participants and their sessions in the format of BIDS: the age and the other values of a scan."""
 
 import difflib
 import os
@@ -20,8 +20,8 @@ from .ages import (
     EXPECTED_COLUMNS,
     MISSING_VALUES,
     AgeColumn,
-    GivenAge,
     ScanAge,
+    TableAge,
     age_columns,
     choose_age,
     column_key,
@@ -55,7 +55,7 @@ class Row:
 class Table:
     """A table of participants or sessions.
 
-    It holds for the files in the folder `scope`, with a `subject` for those of the subject only. A table that cannot be
+    It applies to the files in the folder `scope`, with a `subject` only to those of the subject. A table that cannot be
     read has a `problem`.
     """
 
@@ -67,19 +67,18 @@ class Table:
     ages: Sequence[AgeColumn] = ()
     problem: str = ""
 
-    def ages_in(self, row: Row) -> Iterator[GivenAge]:
-        """Yield the ages that one of its rows gives."""
+    def ages_in(self, row: Row) -> Iterator[TableAge]:
+        """Yield the ages in one of its rows."""
         kind = next((name for name in self.columns if column_key(name) == "age_type"), "")
-        postnatal = POSTNATAL.search(row.values.get(kind, ""))
+        is_postnatal = POSTNATAL.search(row.values.get(kind, ""))
         for column in self.ages:
-            if postnatal and column_key(column.name).startswith("age"):
-                problem = f"is not a gestational age: {kind} is {row.values[kind]}"
-                column = replace(column, problem=problem)
-            yield GivenAge(row.place, column, row.values[column.name], row.session is not None)
+            if is_postnatal and column_key(column.name).startswith("age"):
+                column = replace(column, problem=f"is not a gestational age: {kind} is {row.values[kind]}")
+            yield TableAge(row.place, column, row.values[column.name], row.session is not None)
 
     @property
-    def no_ages(self) -> str:
-        """Why its columns give no age, or ""."""
+    def age_problem(self) -> str:
+        """The reason why none of its columns gives ages, or ""."""
         if not self.ages:
             expected = f"{EXPECTED_COLUMNS} {self.path.stem}.json"
             return f"has no column of gestational ages; found {', '.join(self.columns)}; expected {expected}"
@@ -90,7 +89,7 @@ class Table:
 
 @dataclass(frozen=True)
 class ScanFacts:
-    """What tables say of a scan: its age, and its values by column."""
+    """The age of a scan in tables, and its other values by column."""
 
     age: ScanAge
     values: Mapping[str, str]
@@ -99,7 +98,7 @@ class ScanFacts:
 def read_table_of_scans(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or has no ids.
 
-    A table in a folder `sub-…` holds for the folder around it, another one for its own.
+    A table in a folder `sub-…` applies to the folder around it, another one to its own.
     """
     empty = _empty_table(path)
     texts = read_text_table(path)
@@ -112,30 +111,23 @@ def read_table_of_scans(path: Path) -> Table:
     session = next((names[key] for key in SESSIONS if key in names), None)
     rows = []
     for number, values in enumerate(texts, start=2):
+        name = values[ids] if ids is not None else empty.subject or ""
         label = values[session] if session is not None else ""
-        rows.append(
-            Row(
-                f"{path.name} row {number}",
-                values[ids] if ids is not None else empty.subject or "",
-                None if label in MISSING_VALUES else label.removeprefix("ses-"),
-                {name: text for name, text in values.items() if name not in (ids, session)},
-            )
-        )
-    ages = age_columns(columns, _sidecar(path), f"{path.stem}.json")
+        label_or_none = None if label in MISSING_VALUES else label.removeprefix("ses-")
+        others = {key: text for key, text in values.items() if key not in (ids, session)}
+        rows.append(Row(f"{path.name} row {number}", name, label_or_none, others))
+    common = path.stem.rpartition("_")[2] + ".json"
+    sidecars = (path.with_suffix(".json"), path.parent / common, path.parent.parent / common)
+    sidecar = next((read_json(place) for place in sidecars if os.path.lexists(place)), {})
+    ages = age_columns(columns, sidecar, f"{path.stem}.json")
     return replace(empty, rows=rows, columns=columns, ages=ages)
 
 
 def _empty_table(path: Path) -> Table:
-    named, folder = TABLE_NAME.fullmatch(path.name), SUBJECT_FOLDER.fullmatch(path.parent.name)
-    subject = named[2] if named and named[2] else folder[0] if folder else None
+    name, folder = TABLE_NAME.fullmatch(path.name), SUBJECT_FOLDER.fullmatch(path.parent.name)
+    subject = name[2] if name and name[2] else folder[0] if folder else None
     scope = path.parent.parent if folder else path.parent
     return Table(path, scope, subject.removeprefix("sub-") if subject else None)
-
-
-def _sidecar(path: Path) -> Any:
-    name = path.stem.rpartition("_")[2] + ".json"
-    places = (path.with_suffix(".json"), path.parent / name, path.parent.parent / name)
-    return next((read_json(place) for place in places if os.path.lexists(place)), {})
 
 
 class ScanTables:
@@ -152,7 +144,7 @@ class ScanTables:
 
     @cached_property
     def ambiguity(self) -> str:
-        """The problem that all ages may be decimals or weeks and days, or ""."""
+        """The problem that all ages may be either decimals or weeks and days, or ""."""
         ages = [age for table in self.tables for row in table.rows for age in table.ages_in(row)]
         kinds = {age.column.kind for age in ages}
         first = "scan" if "scan" in kinds else "gestational" if "gestational" in kinds else "age"
@@ -163,22 +155,22 @@ class ScanTables:
         return ""
 
     def rows_of(self, subject: str, place: Path | None = None) -> list[tuple[Table, Row]]:
-        """Return the rows of a subject in the tables that hold for a place (default: in all), with their tables."""
-        return [(table, row) for table in self._holding_for(place) for row in table.rows if row.subject == subject]
+        """Return the rows of a subject, with their tables, in the tables that apply to a file (default: in all)."""
+        return [(table, row) for table in self._tables_of(place) for row in table.rows if row.subject == subject]
 
-    def _holding_for(self, place: Path | None) -> list[Table]:
+    def _tables_of(self, place: Path | None) -> list[Table]:
         return [table for table in self.tables if place is None or place.is_relative_to(table.scope)]
 
     def facts(
         self, subject: str, session: str | None, is_only_scan: bool = True, place: Path | None = None
     ) -> ScanFacts | None:
-        """Return what the tables that hold for a place say of a scan, or None if they have no row of its subject.
+        """Return the age and values of a scan in the tables for a file, or None if they have no row of its subject.
 
         A row without a session is of a subject's only scan.
         """
         own = self.rows_of(subject, place)
-        torn = [table for table in self._holding_for(place) if table.problem and table.subject in (None, subject)]
-        if not own and not torn:
+        unread = [table for table in self._tables_of(place) if table.problem and table.subject in (None, subject)]
+        if not own and not unread:
             return None
         sessions = list(dict.fromkeys(row.session for _, row in own if row.session is not None))
         if session is None and len(sessions) == 1 and is_only_scan:
@@ -187,22 +179,21 @@ class ScanTables:
             rows = ", ".join(f"{row.place} ({row.session})" for _, row in own if row.session is not None)
             return _unknown(f"its name has no session; found {rows}; expected ses-… in the name, as in session_id")
         is_only_scan &= len({*sessions, session} - {None}) < 2
-        ages, of_session = [], False
+        ages: list[TableAge] = []
         values: dict[str, str] = {}
         for label in dict.fromkeys((None, session)):
             rows_of_scan = [(table, row) for table, row in own if row.session == label]
             for table in self.tables:
-                if difference := _difference([row for other, row in rows_of_scan if other is table]):
+                if difference := _difference([row for owner, row in rows_of_scan if owner is table]):
                     return _unknown(difference)
-            given = [age for table, row in rows_of_scan for age in table.ages_in(row)]
-            ages += given if label == session or is_only_scan else [replace(age, of_subject=True) for age in given]
-            of_session = bool(given)
+            is_shared = label != session and not is_only_scan
+            ages += [replace(age, is_shared=is_shared) for table, row in rows_of_scan for age in table.ages_in(row)]
             values |= {key: text for _, row in rows_of_scan for key, text in row.values.items()}
         age = choose_age(ages, self.notation)
         # a table that cannot be read may have the age of exactly this scan
-        torn = [table for table in torn if table.subject or age.week is None or not (of_session and session)]
-        if torn:
-            return _unknown(torn[0].problem)
+        is_certain = age.week is not None and any(age.has_session for age in ages)
+        if unread := [table for table in unread if table.subject or not is_certain]:
+            return _unknown(unread[0].problem)
         if age.week is None and not age.cause:
             return _unknown(_missing_age(own, ages, session, sessions))
         if age.week is not None and self.ambiguity:
@@ -215,20 +206,18 @@ def _unknown(cause: str) -> ScanFacts:
 
 
 def _missing_age(
-    own: Sequence[tuple[Table, Row]], ages: Sequence[GivenAge], session: str | None, sessions: Sequence[str]
+    own: Sequence[tuple[Table, Row]], ages: Sequence[TableAge], session: str | None, sessions: Sequence[str]
 ) -> str:
-    table = own[0][0]
-    named = [age for age in ages if age.text not in MISSING_VALUES]
     if session is not None and sessions and session not in sessions:
         found = ", ".join(f"{row.session} ({row.place})" for _, row in own if row.session is not None)
         return f"no row of its session; found {found}; expected {session}"
-    if named:
-        found = f"{named[0].column.name} {named[0].text} ({named[0].place})"
+    for age in (age for age in ages if age.text not in MISSING_VALUES):
+        found = f"{age.column.name} {age.text} ({age.place})"
         expected = f"a row with session_id {session}" if session is not None else "a row for each, with session_id"
         return f"one age is given for several sessions; found {found}; expected {expected}"
     if ages:
         return f"{ages[0].column.name}: found n/a; expected {EXPECTED_AGE} ({ages[0].place})"
-    return f"{table.path}: {table.no_ages}"
+    return f"{own[0][0].path}: {own[0][0].age_problem}"
 
 
 # brains of a configuration
@@ -259,8 +248,8 @@ def participants_brains(
         if near and column_key(column) not in KNOWN_COLUMNS and column not in {age.name for age in table.ages}:
             raise InputError("has a column whose name seems mistyped", path=path, found=column, expected=near[0])
     tables = ScanTables([path, *_session_tables(table)], settings.ages)
-    if all(each.no_ages for each in tables.tables):
-        raise InputError(table.no_ages, path=path)
+    if all(each.age_problem for each in tables.tables):
+        raise InputError(table.age_problem, path=path)
     if tables.ambiguity:
         raise InputError(tables.ambiguity, path=path)
     entries: list[dict[str, Any]] = []
@@ -268,10 +257,10 @@ def participants_brains(
     sources: dict[str, str] = {}
     for name in dict.fromkeys(row.name for row in table.rows):
         subject = name.removeprefix("sub-")
-        named = dict.fromkeys(row.session for _, row in tables.rows_of(subject) if row.session is not None)
-        for session in named or [None]:
+        sessions = dict.fromkeys(row.session for _, row in tables.rows_of(subject) if row.session is not None)
+        for session in sessions or [None]:
             scan = name if session is None else f"{name}_ses-{session}"
-            facts = tables.facts(subject, session, len(named) < 2)
+            facts = tables.facts(subject, session, len(sessions) < 2)
             assert facts is not None
             entry, problem = _entry(scan, name, session, facts, settings.columns, path.parent)
             if problem := facts.age.cause or problem:
@@ -301,28 +290,28 @@ def _difference(rows: Sequence[Row]) -> str:
     return ""
 
 
-def covariates(facts: ScanFacts) -> dict[str, dict[str, str]]:
-    """Return the key `covariates` of a scan's brain: the columns of its tables without another meaning."""
+def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Return the key `covariates` of a scan's brain: the values of its tables without another meaning."""
     keys = {FILES, SIDE, *BRAIN_KEYS}
-    values = {key: text for key, text in facts.values.items() if key not in keys and text not in MISSING_VALUES}
-    return {"covariates": values} if values else {}
+    further = {key: text for key, text in values.items() if key not in keys and text not in MISSING_VALUES}
+    return {"covariates": further} if further else {}
 
 
 def _entry(
     scan: str, name: str, session: str | None, facts: ScanFacts, columns: Mapping[str, str], folder: Path
 ) -> tuple[dict[str, Any], str]:
     names = {"id": scan, "subject": name, "session": f"ses-{session}" if session else "n/a"}
-    texts = dict(facts.values)
-    for key, text in columns.items():
-        if key not in texts:
-            texts[key] = re.sub(r"\{(id|subject|session)\}", lambda match: names[match[1]], text)
-    values = {key: value for key, value in texts.items() if value not in MISSING_VALUES}
-    entry: dict[str, Any] = {"id": scan, "week": facts.age.week, "subject": name}
-    entry |= covariates(replace(facts, values=values))
+    added = {
+        key: re.sub(r"\{(id|subject|session)\}", lambda match: names[match[1]], text) for key, text in columns.items()
+    }
+    # after the table's columns, and without replacing them
+    texts = {**facts.values, **added, **facts.values}
+    values = {key: text for key, text in texts.items() if text not in MISSING_VALUES}
+    entry: dict[str, Any] = {"id": scan, "week": facts.age.week, "subject": name, **covariates(values)}
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)
-        most, expected = (2, "at most a left and a right hemisphere") if side is None else (1, "the file of this side")
-        if len(files) > most:
+        limit, expected = (2, "at most a left and a right hemisphere") if side is None else (1, "the file of this side")
+        if len(files) > limit:
             return {}, f"files: found {len(files)}, {'; '.join(files)}; expected {expected}"
         values |= _file_keys(files, side)
     for column in values:
