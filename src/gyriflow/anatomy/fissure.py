@@ -37,7 +37,7 @@ SEARCH_DEG = 60.0
 # a plane x = const is accepted if the distance to the mirror image is at most this factor of the best plane's, plus
 # this many edge lengths, since distances are measured to vertices
 SYMMETRY_TOL_FACTOR, SYMMETRY_TOL_EDGES = 1.1, 0.1
-# smaller tilts are not corrected, since the plane is no more accurate
+# smaller tilts are not corrected, since the plane is not more accurate
 MIN_TILT_DEG = 0.5
 # distances to the mirror image above this quantile are ignored as asymmetry
 TRIM_QUANTILE = 0.8
@@ -269,7 +269,7 @@ class Fissure:
         for height in np.arange(-reach, reach + 0.25 * voxel, 0.5 * voxel):
             index = voxel_index(self.places + height * self.plane.normal, affine)
             visible |= ndimage.map_coordinates(mask.astype(np.float32), index, order=0, mode="constant") < 0.5
-        # small gaps between touching walls are no fissure, and would leave tunnels when it is opened
+        # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
         return ~ndimage.binary_opening(visible, iterations=MIN_VISIBLE_CELLS)
 
     def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float) -> tuple[Ints, Floats, Floats]:
@@ -491,7 +491,7 @@ def smallest_gap(left: TriangleMesh, right: TriangleMesh) -> float:
 def separate(
     left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
 ) -> tuple[TriangleMesh, TriangleMesh, float]:
-    """Move two hemispheres apart until they are `gap_mm` from each other.
+    """Move two hemispheres until the gap between them is `gap_mm`.
 
     They move by equal distances along `to_right` (3,), a unit vector from left to right. The third value is this
     distance in mm, 0 if the gap was wide enough. InputError if more than 10 mm would be needed.

@@ -73,7 +73,7 @@ from .plausible import (
     require_whole,
 )
 from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
-from .repair import make_pieces_sound, pieces, require_sound, sound_pieces, surface_of_mask
+from .repair import RepairedSurface, make_pieces_sound, pieces, require_sound, sound_pieces, surface_of_mask
 from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
@@ -193,7 +193,7 @@ def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, 
     pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
     report = {"source": "hemisphere", "side": side, **report, **even.report}
     warnings += logged([*even.warnings, *pose.warnings])
-    return _single_hemisphere(even.mesh, side, pose, volume.week, report, warnings)
+    return _single_hemisphere(replace(even, report=report, warnings=warnings), side, pose, volume.week)
 
 
 def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool) -> PialSurface:
@@ -225,21 +225,16 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
         field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, fissure)
         warnings += logged(_fused_sulci_warning(report))
         opened_ml += taken_ml
+    volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
     even = surface_of_mask(
-        field,
-        affine,
-        cerebrum.volume_mm3,
-        edge_length_mm,
-        smallest=cerebrum.smallest_part,
-        taken_mm3=opened_ml / ML_PER_MM3,
-        original=original,
+        field, affine, volume_mm3, edge_length_mm, smallest=smallest, taken_mm3=taken, original=original
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)
     # half-way between the walls of the surface itself, since cortex may be thicker on one side
     heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
-    report = {"source": "labels", **report, **even.report}
-    return _upright(mesh, left_faces(mesh, heights), fissure.plane, volume.pose, volume.week, report, warnings)
+    even = replace(even, report={"source": "labels", **report, **even.report}, warnings=warnings)
+    return _upright(even, left_faces(mesh, heights), fissure.plane, volume.pose, volume.week)
 
 
 def _with_sulci(
@@ -304,8 +299,8 @@ def from_hemispheres(
     """Return the pial surface of a brain from surfaces of its hemispheres.
 
     The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to
-    `edge_length_mm`, rotated together so that the mid-sagittal plane is x = const, and moved apart along x until they
-    are 0.5 mm from each other. With coordinates "auto" each may have any rigid pose, which is determined from its
+    `edge_length_mm`, rotated together so that the mid-sagittal plane is x = const, and moved along x to a gap of 0.5 mm
+    between them. With coordinates "auto" each may have any rigid pose, which is determined from its
     shape; `declared` is whether both files name the same coordinate system. If a shape contradicts named coordinates,
     there is a warning.
     InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
@@ -329,45 +324,38 @@ def from_hemispheres(
     warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
         warnings += logged(hemisphere_warnings(left, right, coordinates))
-    even = [
-        make_pieces_sound(replace(side, mesh=mesh), edge_length_mm)
-        for side, mesh in zip(sides, (left, right), strict=True)
-    ]
+    posed = [replace(side, mesh=mesh) for side, mesh in zip(sides, (left, right), strict=True)]
+    even = [make_pieces_sound(side, edge_length_mm) for side in posed]
     warnings += logged(warning for side in even for warning in side.warnings)
-    plane = mid_plane(merged(*(side.mesh for side in even)), named=named)
+    whole = merged(*(side.mesh for side in even))
+    plane = mid_plane(whole, named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
     for name, *steps in zip(SIDES, sides, even, strict=True):
         report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
-    left, right = (side.mesh for side in even)
-    is_cap = np.concatenate([side.is_cap for side in even])
-    return _pair(left, right, is_cap, plane, named, pose, week, report, warnings)
+    surface = RepairedSurface(whole, report, warnings, np.concatenate([side.is_cap for side in even]))
+    is_left = np.arange(len(whole.faces)) < len(even[0].mesh.faces)
+    return _two_pieces(surface, is_left, plane, pose, week, named=named)
 
 
-def _pair(
-    left: TriangleMesh,
-    right: TriangleMesh,
-    is_cap: Mask,
-    plane: MidPlane,
-    named: bool,
-    pose: Pose,
-    week: float,
-    report: Mapping[str, Any],
-    warnings: list[str],
+def _two_pieces(
+    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, week: float, *, named: bool
 ) -> PialSurface:
-    """Return the pial surface of a brain from its posed hemispheres, moved apart as far as necessary."""
+    """Return the pial surface of a brain whose hemispheres are closed pieces, with a gap between them."""
+    left, right = cut_sides(surface.mesh, is_left)
+    is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
     gap, to_right = smallest_gap(left, right), plane.normal
     left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
+    warnings = list(surface.warnings)
     if moved > 0:
-        warnings += logged([f"the hemispheres were moved apart by {moved:.2f} mm each, to a gap of {MIN_GAP_MM:g} mm"])
+        warnings += logged([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
         plane = mid_plane(merged(left, right), named=named)
     shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
     files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
-    report = {**report, "moved_apart_mm": moved, "gap_before_mm": gap}
-    mesh = merged(left, right)
-    is_left = np.arange(len(mesh.faces)) < len(left.faces)
-    return _upright(mesh, is_left, plane, pose, week, report, warnings, is_cap)
+    report = {**surface.report, "moved_apart_mm": moved, "gap_before_mm": gap}
+    surface = RepairedSurface(merged(left, right), report, warnings, is_cap)
+    return _upright(surface, np.arange(len(is_cap)) < len(left.faces), plane, pose, week)
 
 
 def from_surface(
@@ -383,7 +371,7 @@ def from_surface(
 
     It is repaired (holes up to `max_hole_mm`, open medial walls of hemispheres), smoothed and remeshed to
     `edge_length_mm`. A whole brain is rotated so that the mid-sagittal plane is x = const. If its hemispheres are two
-    pieces, they are moved apart as in `from_hemispheres`. The medial wall of a single hemisphere is set upright next to
+    pieces, they get a gap as in `from_hemispheres`. The medial wall of a single hemisphere is set upright next to
     x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
     InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
     if it cannot be made closed and free of handles and self-intersections.
@@ -395,28 +383,25 @@ def from_surface(
         require_single_hemisphere(clean.mesh)
     even = make_pieces_sound(clean, edge_length_mm)
     warnings += logged(even.warnings)
-    mesh, is_cap = even.mesh, even.is_cap
     if side:
-        pose = pose_of_hemisphere(mesh, side, coordinates)
+        pose = pose_of_hemisphere(even.mesh, side, coordinates)
     else:
-        warnings += logged(require_whole(mesh, "surface"))
-        pose = pose_of_surface(mesh, coordinates)
+        warnings += logged(require_whole(even.mesh, "surface"))
+        pose = pose_of_surface(even.mesh, coordinates)
     warnings += logged(pose.warnings)
     # "lps" if these were found, else the configured coordinates
     read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     report = {"coordinates": read_as, **clean.report, **even.report}
     if side:
         report = {"source": "hemisphere", "side": side, **report}
-        return _single_hemisphere(mesh, side, pose, week, report, warnings, is_cap)
-    report, named = {"source": "pial", **report}, coordinates != "auto"
-    mesh = transformed(mesh, pose.of_file())
+        return _single_hemisphere(replace(even, report=report, warnings=warnings), side, pose, week)
+    mesh, named = transformed(even.mesh, pose.of_file()), coordinates != "auto"
+    surface = RepairedSurface(mesh, {"source": "pial", **report}, warnings, even.is_cap)
     plane = mid_plane(mesh, named=named)
     is_left = left_faces(mesh, fissure_between(mesh, plane).height_above(corners(mesh).mean(axis=1)))
-    left, right = cut_sides(mesh, is_left)
-    if is_closed(left) and is_closed(right):
-        is_cap = np.concatenate([is_cap[is_left], is_cap[~is_left]])
-        return _pair(left, right, is_cap, plane, named, pose, week, report, warnings)
-    return _upright(mesh, is_left, plane, pose, week, report, warnings, is_cap)
+    if all(map(is_closed, cut_sides(mesh, is_left))):
+        return _two_pieces(surface, is_left, plane, pose, week, named=named)
+    return _upright(surface, is_left, plane, pose, week)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
@@ -426,7 +411,9 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     has self-intersections.
     """
     require_sound(mesh)
-    return _pial_surface(mesh, *split(mesh, 0.0), 0.0, Pose(), week, {"source": "shape", "rotation_deg": 0.0})
+    left, right = split(mesh, 0.0)
+    surface = RepairedSurface(mesh, {"source": "shape", "rotation_deg": 0.0}, [])
+    return _pial_surface(surface, {"left": left, "right": right}, 0.0, Pose(), week)
 
 
 def logged(warnings: Iterable[str]) -> list[str]:
@@ -438,17 +425,10 @@ def logged(warnings: Iterable[str]) -> list[str]:
 
 
 def _pial_surface(
-    whole: TriangleMesh,
-    left: TriangleMesh | None,
-    right: TriangleMesh | None,
-    fissure_x: float,
-    pose: Pose,
-    week: float,
-    report: Mapping[str, Any],
-    warnings: Iterable[str] = (),
+    surface: RepairedSurface, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, week: float
 ) -> PialSurface:
-    sides = {"left": left, "right": right}
-    areas = {side: area_cm2(part) for side, part in sides.items() if part}
+    whole = surface.mesh
+    areas = {side: area_cm2(part) for side, part in sides.items()}
     measures = {
         "pose": pose.plain(),
         "week": week,
@@ -460,27 +440,18 @@ def _pial_surface(
         "faces": len(whole.faces),
         "pieces": len(pieces(whole)),
         "euler_number": euler_number(whole),
-        "warnings": list(warnings),
+        "warnings": list(surface.warnings),
     }
-    return PialSurface(whole, left, right, fissure_x, pose, {**report, **measures})
+    report = {**surface.report, **measures}
+    return PialSurface(whole, sides.get("left"), sides.get("right"), fissure_x, pose, report)
 
 
-def _upright(
-    mesh: TriangleMesh,
-    is_left: Mask,
-    plane: MidPlane,
-    pose: Pose,
-    week: float,
-    report: Mapping[str, Any],
-    warnings: Iterable[str],
-    is_cap: Mask | None = None,
-) -> PialSurface:
-    matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
-    whole = transformed(mesh, matrix)
-    if is_cap is None:
-        is_cap = np.zeros(len(is_left), dtype=bool)
-    for cap, to_other_side in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
-        _require_medial(submesh(whole, cap)[0], to_other_side)
+def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, week: float) -> PialSurface:
+    matrix, angle = upright(plane, surface.mesh.vertices.mean(axis=0))
+    whole = transformed(surface.mesh, matrix)
+    is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_left)
+    for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
+        _require_medial(submesh(whole, cap)[0], sign)
     left, right = cut_sides(submesh(whole, ~is_cap)[0], is_left[~is_cap])
     # x of the plane, which may be tilted by less than half a degree, at the brain's centre
     normal = matrix[:3, :3] @ plane.normal
@@ -494,47 +465,34 @@ def _upright(
     doubts += proportion_warnings(np.ptp(whole.vertices, axis=0))
     areas = sorted((area(left), area(right)))
     if areas[1] > MAX_AREA_RATIO * areas[0]:
-        raise InputError(
-            "one hemisphere is too small",
-            found=f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²",
-            expected=f"at most {MAX_AREA_RATIO:g} times as much",
-        )
+        found = f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²"
+        raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
     facts = {"rotation_deg": angle, "fissure_points": plane.fissure_points, "asymmetry_mm": plane.asymmetry_mm}
-    warnings = [*warnings, *logged(doubts)]
-    return _pial_surface(whole, left, right, fissure_x, pose.then(matrix), week, {**report, **facts}, warnings)
+    report, warnings = {**surface.report, **facts}, [*surface.warnings, *logged(doubts)]
+    surface = RepairedSurface(whole, report, warnings)
+    return _pial_surface(surface, {"left": left, "right": right}, fissure_x, pose.then(matrix), week)
 
 
-def _single_hemisphere(
-    mesh: TriangleMesh,
-    side: Side,
-    pose: Pose,
-    week: float,
-    report: Mapping[str, Any],
-    warnings: Iterable[str],
-    is_cap: Mask | None = None,
-) -> PialSurface:
-    whole = pial = transformed(mesh, pose.of_file())
-    if is_cap is not None and is_cap.any():
-        _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
-        pial = submesh(whole, ~is_cap)[0]
+def _single_hemisphere(surface: RepairedSurface, side: Side, pose: Pose, week: float) -> PialSurface:
+    whole = pial = transformed(surface.mesh, pose.of_file())
+    if surface.is_cap.any():
+        _require_medial(submesh(whole, surface.is_cap)[0], 1.0 if side == "left" else -1.0)
+        pial = submesh(whole, ~surface.is_cap)[0]
     x = whole.vertices[:, 0]
     fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
-    left, right = (pial, None) if side == "left" else (None, pial)
-    report = {**report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
-    return _pial_surface(whole, left, right, fissure_x, pose, week, report, warnings)
+    report = {**surface.report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
+    return _pial_surface(RepairedSurface(whole, report, surface.warnings), {side: pial}, fissure_x, pose, week)
 
 
-def _require_medial(cap: TriangleMesh, to_other_side: float) -> None:
-    """Raise MeshError if the cap of a posed hemisphere does not face the other one, at x of the sign given."""
-    facing = area_vectors(cap).sum(axis=0)
-    if to_other_side * facing[0] < MIN_AXIS_COSINE * np.linalg.norm(facing):
-        raise MeshError(
-            "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere",
-            found=f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across",
-            expected="a closed surface, or hemispheres that are open at their medial walls only",
-        )
+def _require_medial(cap: TriangleMesh, sign: float) -> None:
+    """Raise MeshError if the cap of a posed hemisphere does not face the other one, in the direction `sign` x."""
+    normal = area_vectors(cap).sum(axis=0)
+    if sign * normal[0] < MIN_AXIS_COSINE * np.linalg.norm(normal):
+        problem = "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere"
+        found = f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across"
+        raise MeshError(problem, found=found, expected="a closed surface, or hemispheres open at medial walls only")
 
 
 def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
@@ -545,11 +503,9 @@ def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
 
 def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.float32]) -> list[str]:
     if len(sides := _labelled_sides(cerebrum.tissue, scheme)) == 1:
-        raise InputError(
-            f"the volume has labels of the {sides[0]} hemisphere only",
-            expected="labels of both hemispheres",
-            remedy="Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side.",
-        )
+        problem = f"the volume has labels of the {sides[0]} hemisphere only"
+        remedy = "Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side."
+        raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
     # parts that are removed below because of their size do not count
     parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
     surface = isosurface(smooth_mask(parts), cerebrum.affine)

@@ -74,7 +74,7 @@ MAX_RESTORED = 0.05
 # Taubin smoothing
 SMOOTHING_ITERATIONS = 10
 ROUNDS = 2
-# rounds in which crossing walls are reset, and after smoothing the number of rings of neighbours reset with them
+# rounds that reset crossing walls, and the rings of neighbours that are reset with them after smoothing
 N_RESETS, N_RESET_RINGS = 4, 3
 # walls where the field before an opening was above this are walls of the opening
 INSIDE_LEVEL = 0.8
@@ -98,8 +98,8 @@ def sound_pieces(
 ) -> RepairedSurface:
     """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks.
 
-    With `caps_walls`, one hole of each hemisphere may be larger, and is capped. That it faces the other hemisphere is
-    to be checked when the surface is posed.
+    With `caps_walls`, one hole of each hemisphere may be larger, and is capped. Whether it faces the other hemisphere
+    can be checked only after posing.
     """
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
     mesh, is_cap, repairs = _clean(mesh, max_hole_mm, single, caps_walls)
@@ -112,13 +112,13 @@ def sound_pieces(
             f"{100 * dropped / (remaining + dropped):.1f} % of the area"
         )
     warnings += [
-        f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed there by a cap, which is left "
-        "out of area, curvature and depth"
+        f"a hemisphere is open at its medial wall, {width:.0f} mm across: it was closed by a cap, which does not count "
+        "in area, curvature and depth"
         for width in repairs["medial_walls_capped_mm"]
     ]
     whole = mesh
     mesh, stalks = surface_without_stalks(mesh)
-    if mesh is not whole:
+    if stalks:
         is_cap = is_cap[nearest_on(corners(mesh).mean(axis=1), whole)[1]]
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
@@ -145,27 +145,24 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
 
 def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> RepairedSurface:
     """Make each piece of a clean surface sound by itself, since hemispheres may share their medial wall."""
-    component, report, warnings = face_components(clean.mesh), dict[str, Any](), list[str]()
-    parts, caps = list[TriangleMesh](), list[Mask]()
+    component, report = face_components(clean.mesh), dict[str, Any]()
+    parts, caps = list[RepairedSurface](), list[Mask]()
     for number, piece in enumerate(pieces(clean.mesh)):
         even = make_sound(piece, edge_length_mm)
         report |= {f"{key}_{number + 1}" if number else key: value for key, value in even.report.items()}
-        warnings += even.warnings
         is_cap = clean.is_cap[component == number][nearest_on(corners(even.mesh).mean(axis=1), piece)[1]]
-        # the pial surface beside a cap is in one piece
+        # the pial surface around a cap is in one piece
         is_cap[~is_cap] = face_components(submesh(even.mesh, ~is_cap)[0]) > 0
-        parts, caps = [*parts, even.mesh], [*caps, is_cap]
-    return RepairedSurface(merged(*parts), report, warnings, np.concatenate(caps))
+        parts, caps = [*parts, even], [*caps, is_cap]
+    warnings = [warning for part in parts for warning in part.warnings]
+    return RepairedSurface(merged(*(part.mesh for part in parts)), report, warnings, np.concatenate(caps))
 
 
 def require_sound(mesh: TriangleMesh) -> None:
     """Raise MeshError if the surface is not made of closed spheres without self-intersections."""
     if problems := faults(mesh):
-        raise MeshError(
-            "the surface could not be repaired",
-            found=problems,
-            expected="closed pieces of Euler number 2 without self-intersections",
-        )
+        expected = "closed pieces of Euler number 2 without self-intersections"
+        raise MeshError("the surface could not be repaired", found=problems, expected=expected)
 
 
 def faults(mesh: TriangleMesh) -> str:
@@ -213,9 +210,9 @@ def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh
 def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
     """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
 
-    Equal vertices are merged, degenerate and duplicate faces removed, sheets separated where more than two faces meet,
-    holes up to `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with
-    `single` all but the largest. MeshError for larger holes and for surfaces that stay open.
+    Equal vertices are merged, degenerate and duplicate faces removed, edges of more than two faces split, holes up to
+    `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
+    all but the largest. MeshError for larger holes and for surfaces that stay open.
     """
     mesh, _, counts = _clean(mesh, max_hole_mm, single, caps_walls=False)
     return mesh, counts
@@ -224,7 +221,8 @@ def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tu
 def _clean(
     mesh: TriangleMesh, max_hole_mm: float, single: bool, caps_walls: bool
 ) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
-    mesh, turned = _turn_closed_pieces(mesh)
+    # before merging, which may join pieces, but where each face may also be a piece
+    mesh, turned = _turn_outward(mesh, 2)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
     crossing = int(self_intersecting_faces(mesh).sum())
@@ -232,16 +230,11 @@ def _clean(
     mesh, dropped = _main_pieces(mesh, single)
     # a brain in one piece has no medial walls that could be open
     mesh, is_cap, holes = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
-    inward = [signed_volume(piece) < 0 for piece in pieces(mesh)]
-    turn = np.isin(face_components(mesh), np.flatnonzero(inward))
-    mesh = TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces))
+    mesh, turned_later = _turn_outward(mesh, dropped["pieces"])
     if not is_closed(mesh):
-        raise MeshError(
-            "the surface cannot be closed",
-            found=f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair",
-            expected="a closed surface",
-        )
-    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + sum(inward)}
+        found = f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair"
+        raise MeshError("the surface cannot be closed", found=found, expected="a closed surface")
+    counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + turned_later}
     return mesh, is_cap, doubles | opened | dropped | holes | counts
 
 
@@ -251,15 +244,13 @@ def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
 
-def _turn_closed_pieces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Turn the two largest pieces outward where they are closed before vertices are merged; return how many."""
-    component, turned = face_components(mesh), 0
-    for number in range(min(component.max() + 1, 2)):
-        piece, _ = submesh(mesh, here := component == number)
-        if is_closed(piece) and signed_volume(piece) < 0:
-            mesh = TriangleMesh(mesh.vertices, np.where(here[:, None], mesh.faces[:, ::-1], mesh.faces))
-            turned += 1
-    return mesh, turned
+def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
+    """Turn the `count` largest pieces outward if they are closed; return the surface and how many were turned."""
+    component = face_components(mesh)
+    parts = [submesh(mesh, component == number)[0] for number in range(min(component.max() + 1, count))]
+    inward = [number for number, part in enumerate(parts) if is_closed(part) and signed_volume(part) < 0]
+    is_inward = np.isin(component, inward)[:, None]
+    return TriangleMesh(mesh.vertices, np.where(is_inward, mesh.faces[:, ::-1], mesh.faces)), len(inward)
 
 
 def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
@@ -270,8 +261,8 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     faces = faces[~flat]
     lowest_first = (np.argmin(faces, axis=1)[:, None] + [0, 1, 2]) % 3
     _, first = np.unique(np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True)
-    single = TriangleMesh(vertices, faces[np.sort(first)])
-    result, used_vertices = submesh(single, ~_needless_opposites(single))
+    distinct = TriangleMesh(vertices, faces[np.sort(first)])
+    result, used_vertices = submesh(distinct, ~_duplicate_opposites(distinct))
     return result, {
         "degenerate_faces_removed": int(flat.sum()),
         "double_faces_removed": len(faces) - len(result.faces),
@@ -279,35 +270,35 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     }
 
 
-def _needless_opposites(mesh: TriangleMesh) -> Mask:
+def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
     """Return the (m,) mask of faces that repeat an earlier one in the opposite orientation, except shared walls.
 
-    A wall shared by two closed pieces has both orientations. With the faces around it, each of its edges has as many
-    faces in one direction as in the other.
+    A wall that two closed pieces share has both orientations, and each of its edges has as many faces in one direction
+    as in the other.
     """
     _, first, face, count = np.unique(
         np.sort(mesh.faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
     )
     is_double = (count == 2)[face]
-    needless = is_double.copy()
+    is_duplicate = is_double.copy()
     if is_double.any():
         start, end = mesh.faces, mesh.faces[:, [1, 2, 0]]
         keys = np.minimum(start, end) * len(mesh.vertices) + np.maximum(start, end)
         _, edge = np.unique(keys.ravel(), return_inverse=True)
         direction = np.bincount(edge, np.where(start < end, 1.0, -1.0).ravel())
-        others = np.bincount(edge, np.repeat(~is_double, 3))
+        single = np.bincount(edge, np.repeat(~is_double, 3))
         edge = edge.reshape(-1, 3)[is_double]
         region = face_components(submesh(mesh, is_double)[0])
-        # a surface of which every face is there twice has no other faces
-        is_wall = np.bincount(region, (others[edge] > 0).any(axis=1)) > 0
+        # a surface whose faces are all double has no single ones around
+        is_wall = np.bincount(region, (single[edge] > 0).any(axis=1)) > 0
         is_wall &= np.bincount(region, (direction[edge] != 0).any(axis=1)) == 0
-        needless[np.flatnonzero(is_double)[is_wall[region]]] = False
-        needless[first] = False
-    return needless
+        is_duplicate[is_double] = ~is_wall[region]
+        is_duplicate[first] = False
+    return is_duplicate
 
 
 def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
-    bad = int((edges(mesh)[1] > 2).sum())
+    non_manifold = int((edges(mesh)[1] > 2).sum())
     split = split_sheets(mesh)
     if (edges(split)[1] > 2).any():
         document = in_meshlab(split)
@@ -316,7 +307,7 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     faces, _ = igl.bfs_orient(split.faces)
     turned = int((faces != split.faces).any(axis=1).sum())
     return TriangleMesh(split.vertices, faces), {
-        "non_manifold_edges_opened": bad,
+        "non_manifold_edges_opened": non_manifold,
         "non_manifold_vertices_split": len(split.vertices) - len(mesh.vertices),
         "faces_turned_to_agree": min(turned, len(faces) - turned),
     }
@@ -343,18 +334,18 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
     wide, component = sizes[small:], face_components(mesh)
     pieces_with_wide = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]}
     if wide and not (caps_walls and len(pieces_with_wide) == len(wide)):
+        can_cover = "or raise surface.max_hole_mm if the opening may be covered."
+        remedy = can_cover if wide[-1] <= MAX_HOLE_MM else "since holes of this size cannot be covered."
         raise MeshError(
             "the surface has holes that are too large to close",
             found=f"{len(wide)} of {len(loops)} holes, up to {wide[-1]:.1f} mm across",
             expected=f"at most {max_hole_mm:g} mm (max_hole_mm)",
-            remedy="Give a closed surface, or raise surface.max_hole_mm if the opening may be covered."
-            if wide[-1] <= MAX_HOLE_MM
-            else "Give a closed surface: holes of this size cannot be covered.",
+            remedy=f"Give a closed surface, {remedy}",
         )
     for number, loop in enumerate(loops):
-        # against the existing faces
-        runs_along = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (mesh.faces[:, [1, 2, 0]] == loop[1])
-        loops[number] = loop[::-1] if runs_along.any() else loop
+        # new faces have the edges of existing ones in the opposite direction
+        is_same = (mesh.faces[:, [0, 1, 2]] == loop[0]) & (mesh.faces[:, [1, 2, 0]] == loop[1])
+        loops[number] = loop[::-1] if is_same.any() else loop
     for loop in loops[:small]:
         fan = np.stack([loop, np.roll(loop, -1), np.full(len(loop), len(mesh.vertices))], axis=1)
         centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
@@ -364,7 +355,7 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
 
 
 def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:
-    """Close loops by patches of the smallest area, remeshed; return the mask of their faces, too."""
+    """Close loops by patches of the smallest area, and remesh these; return the surface and the mask of the caps."""
     rims = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
     patches = [smallest_patch(mesh, loop) for loop in loops]
     document = in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))

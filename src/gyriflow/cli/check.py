@@ -6,7 +6,7 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import chdir, contextmanager
+from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -56,38 +56,32 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
 
     InputError for a configuration that is not valid, with all its problems.
     """
-    with _inside(directory, path) as file:
+    file = path.absolute()
+    # paths may be relative to the working directory
+    with chdir(directory if directory.is_dir() else Path()):
         config = load(read_keys(file), folder_of(file))
         study, problems = resolve(config), list(input_problems(config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
-        unnamed = sum(not names_unit(volume) for volume in volumes) if valid else 0
-        missing = sum(len(atlas.missing) for atlas in used_atlases(config))
+        without_unit = sum(not names_unit(volume) for volume in volumes) if valid else 0
+        downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
     yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
-    if unnamed:
-        yield f"  note: {unnamed} of {len(volumes)} label volumes give no unit of length, taken as mm", False
-    if missing:
-        yield f"  {missing} atlas file{'s are' if missing > 1 else ' is'} missing and will be downloaded", False
+    if without_unit:
+        yield f"  note: {without_unit} of {len(volumes)} label volumes give no unit of length, taken as mm", False
+    if downloads:
+        yield f"  {downloads} atlas file{'s are' if downloads > 1 else ' is'} missing and will be downloaded", False
     if valid:
         yield "  input files: all are readable and fit their label schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
-    yield from ((line, False) for line in scan_lines(list(_scans(config, problems))))
-
-
-@contextmanager
-def _inside(directory: Path, path: Path) -> Iterator[Path]:
-    """Change to a working directory, if it exists, as paths may be relative to it; yield a path as an absolute one."""
-    path = path.absolute()
-    with chdir(directory if directory.is_dir() else Path()):
-        yield path
+    yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
 
 def work_of(
     path: Path, directory: Path, cores: int, further: Sequence[str], study: Study | None = None, *, show: bool = False
 ) -> Iterator[tuple[str, bool]]:
-    """Yield lines about the jobs that would run and their needs, each with whether these exceed what is available.
+    """Yield lines about the jobs that would run and their needs, each with whether these exceed the available ones.
 
     The study is read from `path` unless given. `further` are arguments for Snakemake. With `show`, it lists every job
     on the terminal first.
@@ -104,7 +98,8 @@ def work_of(
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     if study is None:
-        with _inside(directory, path) as file:
+        file = path.absolute()
+        with chdir(directory if directory.is_dir() else Path()):
             study = resolve(load(read_keys(file), folder_of(file)))
     yield from _needs(jobs, study, directory, cores)
 
@@ -166,7 +161,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
-    """Yield the brain's id and a problem or warning about its input files, each with whether it is a problem.
+    """Yield each problem or warning about a brain's input files: the brain's id, the text, and if it is a problem.
 
     Unreadable files and labels of another scheme are problems; an unusual size for the week is a warning.
     """
@@ -182,10 +177,10 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
 def _scans(config: Config, problems: Sequence[tuple[str, str, bool]]) -> Iterator[ScanRow]:
     atlases = {brain["id"]: used.atlas.name for used in used_atlases(config) for brain in atlas_brains(used)}
     for brain in config.brains:
-        verdicts = ["refused" if bad else "warning" for name, _, bad in problems if name == brain.id]
+        is_bad = {bad for name, _, bad in problems if name == brain.id}
+        verdict = "refused" if True in is_bad else "warning" if is_bad else "ok"
         source = config.age_sources.get(brain.id) or atlases.get(brain.id, "configuration")
         data = ", ".join(Path(file).name for file in brain.files) or brain.source
-        verdict = min(verdicts, default="ok")
         yield ScanRow(brain.id, f"{brain.week:g}", source, data, brain.scheme or "–", verdict)
 
 

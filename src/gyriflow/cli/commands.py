@@ -157,13 +157,13 @@ def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, *
     return found
 
 
-def _show_scans(found: "Recognised", measured: dict[str, tuple[str, str]] | None = None) -> int:
+def _show_scans(found: "Recognised", verdicts: dict[str, tuple[str, str]] | None = None) -> int:
     """Print the table of scans and the unused files; return the exit code."""
     from .scans import found_rows, scan_lines
 
     for file, reason in found.unused.items():
         click.echo(f"not used: {file} ({reason})")
-    for line in scan_lines(found_rows(found, measured)):
+    for line in scan_lines(found_rows(found, verdicts or {})):
         click.echo(line)
     return InputError.exit_code if any(brain.problem or brain.contradiction for brain in found.brains) else 0
 
@@ -252,7 +252,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
             config = Path(scratch) / CONFIG if dry_run else config
             found = _recognise(data, **selection)
             write_configuration(found, data, config, only_measured=True)
-            refused = _show_scans(found, {})
+            refused = _show_scans(found)
         code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")
     sys.exit(code or refused)
 
@@ -323,12 +323,9 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options = work / "bids.json"
     if level == "group":
         selection = with_earlier_options(options, selection)
-    how = {key: selection[key] for key in ("settings", "fold")}
-    which = {key: value for key, value in selection.items() if key not in how}
-    for entity, key in (("sub-", "participants"), ("ses-", "sessions")):
-        which[key] = [label.removeprefix(entity) for label in selection[key] or ()]
-    found = _recognise(data, **which)
-    brains = write_bids(found, data, config, **how)
+    folding = {key: selection[key] for key in ("settings", "fold")}
+    found = _recognise(data, **{key: value for key, value in selection.items() if key not in folding})
+    brains = write_bids(found, data, config, **folding)
     if level == "participant" and not dry_run:
         store_options(options, selection)
     work_to_do = "measure and fold" if selection["fold"] else "measure (--fold adds simulations)"

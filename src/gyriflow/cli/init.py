@@ -61,7 +61,7 @@ def write_configuration(
     inside = path.resolve().parent == folder.resolve()
     usable = [brain for brain in found.brains if not (brain.causes if only_measured else brain.problem)]
     if not usable:
-        raise InputError("no scan can be used", path=folder, found="".join(_causes(found.brains)))
+        raise InputError("no scan can be used", path=folder, found=_causes(found.brains))
     lines = []
     for brain in found.brains:
         entry = brain.entry if inside else _absolute(brain.entry, folder)
@@ -74,14 +74,13 @@ def write_configuration(
     series = next((scans for scans in by_subject if len(_weeks(scans)) > 1), usable)
     weeks, several = _weeks(series), series is not usable
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    measured_run = MEASURED_RUN if several and not only_measured and _gives_shapes(series, folder) else ""
+    measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
     rest = "" if only_measured else REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
     write_text(path, HEAD + "".join(lines) + rest)
 
 
-def _causes(brains: Iterable[FoundBrain]) -> Iterator[str]:
-    for brain in brains:
-        yield from (f"\n  {brain.entry['id']}: {cause}" for cause in brain.causes)
+def _causes(brains: Iterable[FoundBrain]) -> str:
+    return "".join(f"\n  {brain.entry['id']}: {cause}" for brain in brains for cause in brain.causes)
 
 
 def write_prediction(
@@ -164,15 +163,16 @@ def write_bids(
     found.brains = [brain for brain in found.brains if brain.entry["id"].startswith("sub-")]
     brains = [brain for brain in found.brains if not brain.causes]
     if not brains:
-        several = "Of several files of a scan choose with --files, such as '*_desc-brain_dseg.nii.gz'; "
-        remedy = f"{several}--scheme names labels."
-        causes = "".join(_causes(found.brains)) or "no files named sub-…"
+        remedy = (
+            "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz', and labels with --scheme."
+        )
+        causes = _causes(found.brains) or "no files named sub-…"
         raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     followed = [scans for scans in _by_subject(brains).values() if len(_weeks(scans)) > 1]
     starts = [scans[0].entry["id"] for scans in followed]
-    can_measure = fold and bool(followed) and all(_gives_shapes(scans, folder) for scans in followed)
+    can_measure = fold and bool(followed) and all(_have_shapes(scans, folder) for scans in followed)
     weeks = _weeks(brains)
     further = read_keys(Path(settings)) if settings else {}
     runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
@@ -214,7 +214,7 @@ def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> 
     raise InputError(problem, found="; ".join(spans), remedy=remedy)
 
 
-def _gives_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
+def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
     """Return whether scans can give the later shapes of a start brain: label volumes or vertex-matched surfaces."""
     if all("labels" in brain.entry for brain in scans):
         return True

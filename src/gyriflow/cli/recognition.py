@@ -51,7 +51,7 @@ FREESURFER_INPUT = re.compile(r"\.T[12]$")
 RESAMPLED = "resampled"
 """Space of a subject's own surface on the mesh of a template."""
 WHOLE_BRAIN_ML = (15.0, 700.0)
-"""Range of volumes in which a closed surface is accepted as that of a brain."""
+"""Smallest and largest volume of a closed surface that is accepted as a brain."""
 UNSET = "CHOOSE"
 """Placeholder for values that the files do not give; `gyriflow check` then asks for them."""
 
@@ -127,14 +127,14 @@ def recognise(
     pattern: str = "*",
     scheme: str | None = None,
     notation: WeekNotation | None = None,
-    participants: Collection[str] = (),
-    sessions: Collection[str] = (),
+    participants: Collection[str] | None = None,
+    sessions: Collection[str] | None = None,
 ) -> Recognised:
     """Return the scans of a folder and of those in it, from files whose paths match a pattern.
 
-    Results and data sets of gyriflow itself are left out. If a `scheme` is named, all labels are of it. With labels of
-    `participants` or `sessions`, files of others are not read. InputError if no scan is found, or none of a named
-    participant or session.
+    Results and data sets of gyriflow itself are left out. If a `scheme` is named, all labels are of it. If
+    `participants` or `sessions` are named, with or without `sub-` and `ses-`, files of others are not read. InputError
+    if no scan is found, or none of a named participant or session.
     """
     paths = [path.relative_to(folder) for path in files_in(folder)]
     own = [file.parent for file in paths if file.name == "dataset_description.json" and _is_own(folder / file)]
@@ -152,10 +152,11 @@ def recognise(
         expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
         names = f"{len(files)} files" + "".join(f"\n  {file}" for file in files[:10]) + ("\n  …" * (len(files) > 10))
         raise InputError("no brain was recognised", path=folder, found=names, expected=expected)
-    selection = {"sub": participants, "ses": sessions}
-    for entity, labels in selection.items():
+    selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
+    selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
+    for entity, labels in selected.items():
         existing = {candidate.label(entity) for group in found.values() for candidate in group}
-        if absent := sorted(set(labels) - existing):
+        if absent := sorted(labels - existing):
             problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
             names = ", ".join(sorted(f"{entity}-{label}" for label in existing if label)[:20]) or "none"
             remedy = "Labels must be equal, with their zeros and case."
@@ -163,7 +164,7 @@ def recognise(
     unused: dict[str, str] = {}
     brains = []
     for name, group in found.items():
-        if any(labels and group[0].label(entity) not in labels for entity, labels in selection.items()):
+        if any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
             continue
         preferred = _preferred_files(group, unused)
         for number, candidate in enumerate(preferred, start=1):
@@ -298,7 +299,7 @@ def _found_brain(
     elif owners:
         is_only_scan = subject is None or len(sessions_of[subject]) < 2
         facts = tables.facts(owners[0], session, is_only_scan, folder / candidate.file)
-        cause = "" if facts else _similar_ids(owners[0], tables)
+        cause = "" if facts or subject is None else _similar_ids(subject, tables)
     age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(candidate.file.parts)
     if age.week is not None and named.week is not None and not _agree(age.week, named.week):
         age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
@@ -306,9 +307,8 @@ def _found_brain(
         age = named
     entry = {"id": name, "week": UNSET if age.week is None else age.week}
     entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
-    brain = FoundBrain(
-        entry | (covariates(facts.values) if facts else {}) | candidate.source, age.source, candidate.problem
-    )
+    entry |= (covariates(facts.values) if facts else {}) | candidate.source
+    brain = FoundBrain(entry, age.source, candidate.problem)
     if age.week is None:
         brain.contradiction = age.cause
         brain.notes += [] if age.cause else ["week: neither its name nor a table gives the week"]
@@ -318,7 +318,7 @@ def _found_brain(
     elif candidate.space and candidate.space != RESAMPLED:
         brain.problem = f"is in the space {candidate.space}; expected the subject's own"
     elif candidate.space:
-        brain.warnings.append("a surface on a template's mesh is used, since there is no native one")
+        brain.warnings.append("a surface on a template's mesh is used, since no native one was found")
     if brain.problem:
         return brain
     try:

@@ -1,16 +1,16 @@
 """The table of scans with which `init`, `check` and the BIDS app end."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ..io.files import read_table
-from .recognition import UNSET, FoundBrain, Recognised
+from .recognition import UNSET, Recognised
 
 HEADINGS = ("scan", "age", "from", "data", "scheme", "verdict")
 UNUSABLE = {"not read": "could not be read", "refused": "cannot be used", "fill in": "to fill in"}
-"""Verdicts on scans that are not usable as they are, and what the last line calls them."""
+"""Verdicts on scans that cannot be used yet, and their words in the last line."""
 
 
 class ScanRow(NamedTuple):
@@ -25,8 +25,9 @@ class ScanRow(NamedTuple):
     reasons: Sequence[str] = ()
 
 
-def scan_lines(rows: Sequence[ScanRow]) -> Iterator[str]:
+def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
     """Yield the lines of a table of scans, and at the end how many of them can be used."""
+    rows = list(scans)
     table: list[Sequence[str]] = [HEADINGS, *([str(text) for text in row[: len(HEADINGS)]] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]
@@ -50,21 +51,18 @@ def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
     return {str(row["subject"]): (str(row["verdict"]), str(row.get("cause", ""))) for _, row in table.iterrows()}
 
 
-def found_rows(found: Recognised, verdicts: dict[str, tuple[str, str]] | None = None) -> list[ScanRow]:
-    """Return the rows of recognised scans; `verdicts` has verdict and cause of those that were run, by id."""
-    return [_row(brain, (verdicts or {}).get(brain.entry["id"])) for brain in found.brains]
-
-
-def _row(brain: FoundBrain, quality: tuple[str, str] | None) -> ScanRow:
-    week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
-    reasons = [*brain.causes, *brain.warnings]
-    verdict = "not read" if brain.is_unreadable else "refused" if brain.problem or brain.contradiction else "ok"
-    verdict = "fill in" if verdict == "ok" and brain.notes else verdict
-    if quality and verdict == "ok":
-        verdict, cause = quality
-        reasons += [cause] if cause else []
-    elif verdict == "ok" and brain.warnings:
-        verdict = "warning"
-    data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
-    age, scheme = "–" if week == UNSET else f"{week:g}", "–" if scheme == UNSET else scheme
-    return ScanRow(brain.entry["id"], age, brain.age_source or "–", data, scheme, verdict, reasons)
+def found_rows(found: Recognised, verdicts: Mapping[str, tuple[str, str]]) -> Iterator[ScanRow]:
+    """Yield the rows of recognised scans; `verdicts` has verdict and cause of those that were run, by id."""
+    for brain in found.brains:
+        week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
+        reasons = [*brain.causes, *brain.warnings]
+        verdict = "not read" if brain.is_unreadable else "refused" if brain.problem or brain.contradiction else "ok"
+        verdict = "fill in" if verdict == "ok" and brain.notes else verdict
+        if verdict == "ok" and brain.entry["id"] in verdicts:
+            verdict, cause = verdicts[brain.entry["id"]]
+            reasons += [cause] if cause else []
+        elif verdict == "ok" and brain.warnings:
+            verdict = "warning"
+        data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
+        age, scheme = "–" if week == UNSET else f"{week:g}", "–" if scheme == UNSET else scheme
+        yield ScanRow(brain.entry["id"], age, brain.age_source or "–", data, scheme, verdict, reasons)

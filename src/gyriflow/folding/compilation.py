@@ -1,4 +1,4 @@
-"""Compilation of forms and C code. Each kind of processor has a cache, in which one process compiles at a time."""
+"""Compilation of forms and C code. Each kind of processor has a cache, where one process compiles at a time."""
 
 import hashlib
 import os
@@ -33,13 +33,14 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     """Yield the options of the form compiler, for all ranks to compile forms within the block.
 
     Rank 0 locks the cache during the block, since concurrent runs share it, and removes what a killed compilation has
-    left there: later ones would wait for it to finish. For ranks on different processors, code uses what all have.
+    left there: later ones would wait for it to finish. Ranks on different processors share code without `NATIVE`.
     """
-    native, *others = sorted(set(comm.allgather(processor())))
-    kind = platform.machine() if others else hashlib.sha256(native.encode()).hexdigest()[:8]
+    processors = sorted(set(comm.allgather(processor())))
+    is_mixed = len(processors) > 1
+    kind = platform.machine() if is_mixed else hashlib.sha256(processors[0].encode()).hexdigest()[:8]
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     cache = base / "gyriflow" / f"forms-{kind}-{sys.version_info.major}.{sys.version_info.minor}"
-    arguments = [argument for argument in COMPILER_ARGUMENTS if not others or argument != NATIVE]
+    arguments = [argument for argument in COMPILER_ARGUMENTS if not is_mixed or argument != NATIVE]
     options = {"cffi_extra_compile_args": arguments, "cache_dir": str(cache)}
     with ExitStack() as stack:
         if comm.rank == 0:

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-# faces that meet at a smaller angle (radians) coincide
+# faces whose angle (radians) is smaller coincide
 COINCIDENCE_TOL = 1e-3
 
 
@@ -149,20 +149,20 @@ def face_components(mesh: TriangleMesh) -> Ints:
 
 
 def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
-    """Split a surface into manifold sheets at edges of more than two faces, and at vertices where fans of faces meet.
+    """Split a surface into manifold sheets at edges of more than two faces, and at vertices where sheets meet.
 
-    At such an edge the faces are paired that have the inside of one sheet between them, as at the wall that two closed
-    pieces share: faces in opposite directions, with the smallest sum of angles inside. A face without a partner is open
-    there. A surface without such places is returned as it is.
+    At such an edge, as of the wall that two closed pieces share, two faces belong to one sheet if they use the edge in
+    opposite directions and have the inside between them: those with the smallest sum of angles inside are paired. The
+    sheet of a face without partner ends there. A manifold surface is returned unchanged.
     """
     faces, count = mesh.faces, len(mesh.vertices)
-    # half-edge 3 f + k leads from corner k of face f to the next
+    # half-edge 3 f + k starts at corner k of face f
     start, end, apex = (np.roll(faces, -k, axis=1).ravel() for k in range(3))
     following = np.roll(np.arange(faces.size).reshape(-1, 3), -1, axis=1).ravel()
     keys = np.minimum(start, end) * count + np.maximum(start, end)
     order = np.argsort(keys, kind="stable")
     _, first, uses = np.unique(keys[order], return_index=True, return_counts=True)
-    pairs, unclear = [order[first[uses == 2, None] + [0, 1]]], []
+    pairs, ambiguous = [order[first[uses == 2, None] + [0, 1]]], []
     is_forward = (start < end) == (signed_volume(mesh) >= 0)
     for place, number in zip(first[uses > 2], uses[uses > 2], strict=True):
         around = order[place : place + number]
@@ -170,23 +170,23 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         low, high = mesh.vertices[np.sort([start[around[0]], end[around[0]]])]
         axis = (high - low) / np.linalg.norm(high - low)
         arms = [mesh.vertices[apex[side]] - low for side in (around[:1], *sides)]
-        across = arms[0][0] - (arms[0][0] @ axis) * axis
-        backward, forward = (np.arctan2(arm @ np.cross(axis, across), arm @ across) for arm in arms[1:])
+        radial = arms[0][0] - (arms[0][0] @ axis) * axis
+        backward, forward = (np.arctan2(arm @ np.cross(axis, radial), arm @ radial) for arm in arms[1:])
         inside = (forward - backward[:, None] - COINCIDENCE_TOL) % (2.0 * np.pi)
         matched = scipy.optimize.linear_sum_assignment(inside)
         if inside[matched].sum() <= 2.0 * np.pi:
             pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
         else:
-            unclear.append(sides)
-    # at other edges the faces overlap: those belong together that do so elsewhere
+            ambiguous.append(sides)
+    # where faces overlap, faces of the same sheet elsewhere are paired
     sheet = _connected(np.concatenate(pairs) // 3, len(faces))
-    for sides in unclear:
+    for sides in ambiguous:
         matched = scipy.optimize.linear_sum_assignment(sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3])
         pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
-    one, other = np.concatenate(pairs).T
-    turned = start[one] != start[other]
-    joined = np.where(turned, [following[other], other], [other, following[other]])
-    corner = _connected(np.concatenate([[one, following[one]], joined]).reshape(2, -1).T, faces.size)
+    edge, partner = np.concatenate(pairs).T
+    is_opposite = start[edge] != start[partner]
+    joined = np.where(is_opposite, [following[partner], partner], [partner, following[partner]])
+    corner = _connected(np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size)
     _, first = np.unique(corner, return_index=True)
     if len(first) == len(np.unique(faces)):
         return mesh
@@ -199,16 +199,16 @@ def _connected(pairs: Ints, count: int) -> Ints:
 
 
 def smallest_patch(mesh: TriangleMesh, loop: Ints) -> Ints:
-    """Return the (n - 2, 3) faces of the smallest area that close a hole, whose (n,) vertices are given in order.
+    """Return the (n - 2, 3) faces of the smallest area that close a hole with the (n,) vertices `loop`, in order.
 
-    They have no edge of the surface inside (Barequet and Sharir 1995, doi 10.1016/0167-8396(94)00011-G).
+    No edge of the surface is used inside the patch (Barequet and Sharir 1995, doi 10.1016/0167-8396(94)00011-G).
     """
     count, points = len(loop), mesh.vertices[loop]
     place = np.full(len(mesh.vertices), -1)
     place[loop] = np.arange(count)
     pairs = np.sort(place[edges(mesh)[0]], axis=1)
     low, high = pairs[pairs[:, 0] >= 0].T
-    # smallest areas between two vertices and the edge that joins them, and the third vertices of the faces there
+    # smallest area that the loop from vertex i to j and the edge j-i enclose, and the third vertex of the face there
     cost, third = np.zeros((count, count)), np.zeros((count, count), dtype=int)
     for gap in range(2, count):
         first = np.arange(count - gap)

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and what a file was."""
+"""Files that appear whole or not at all: temporary names and renames, JSON, tables, HDF5; and fingerprints of files."""
 
 import csv
 import gzip
@@ -36,15 +36,15 @@ EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
 
 def companion_files(path: AnyPath) -> list[str]:
     """Return the further files that readers open with a file: the second of a pair, the external data of GIFTI."""
-    name, names = Path(path).name, set[bytes]()
-    if pair := PAIR.search(name):
-        return [str(Path(path).with_name(name[: pair.start()] + end + (pair[1] or ""))) for end in PAIR_ENDINGS]
-    if name.lower().endswith((".gii", ".gii.gz")):
-        opener: Any = gzip.open if name.lower().endswith(".gz") else Path.open
+    path, names = Path(path), set[bytes]()
+    if pair := PAIR.search(path.name):
+        return [str(path.with_name(path.name[: pair.start()] + end + (pair[1] or ""))) for end in PAIR_ENDINGS]
+    if path.name.lower().endswith((".gii", ".gii.gz")):
+        opener: Any = gzip.open if path.name.lower().endswith(".gz") else Path.open
         # damaged files are reported by their readers
         with suppress(OSError, EOFError, zlib.error), opener(path, "rb") as file:
             names = set(EXTERNAL.findall(file.read()))
-    return [str(Path(path).parent / html.unescape(found.decode(errors="replace"))) for found in sorted(names)]
+    return [str(path.parent / html.unescape(name.decode(errors="replace"))) for name in sorted(names)]
 
 
 def require_content(path: AnyPath) -> None:
@@ -68,7 +68,7 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
         if isinstance(error, InputError):
             raise
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
-        # of a pair of files the one that is not there
+        # of a pair, the missing file
         path = getattr(error, "filename", None) or path
         raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
 
@@ -150,30 +150,30 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
 
 
 def read_text_table(path: AnyPath) -> list[dict[str, str]]:
-    """Return the rows of a table with a heading, as texts by column; separated by tabs, semicolons or commas.
+    """Return the rows of a table with a heading, separated by tabs, semicolons or commas, as texts by column.
 
-    InputError where it is none, or where a column occurs twice with different values.
+    InputError for other files, and if a column occurs twice with different values.
     """
     with reading(path, "a table of text", remedy=None):
         text = Path(path).read_text(encoding="utf-8-sig")
         separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
         lines = csv.reader(text.splitlines(keepends=True), delimiter=separator)
         head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]
-    # names of the rows without a heading, as R writes them
-    named = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)
+    # R writes names of rows in a first column without a heading
+    has_names = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)
     rows = []
-    for number, cells in enumerate((cells[named:] for cells in body), start=2):
+    for number, cells in enumerate((cells[has_names:] for cells in body), start=2):
         if any(cells[len(head) :]):
             found, expected = f"{len(cells)} cells in row {number}", f"{len(head)}, as in the heading"
             raise InputError("has a row that is longer than its heading", path=path, found=found, expected=expected)
         row: dict[str, str] = {}
-        # each of a heading that occurs twice
-        spelled: dict[str, str] = {}
+        # columns whose names differ only in case are one
+        names: dict[str, str] = {}
         for name, value in zip(head, [*cells, *[""] * len(head)], strict=False):
             if not value.isprintable():
                 problem = f"has a line break or another character that is not printed in row {number}, {name}"
                 raise InputError(problem, path=path, found=repr(value), expected="one line of text in each cell")
-            first = spelled.setdefault(name.lower(), name)
+            first = names.setdefault(name.lower(), name)
             if row.setdefault(first, value) != value:
                 found = f"{row[first]} and {value} in row {number}"
                 raise InputError(f"has two columns {name}", path=path, found=found, expected="one value")
@@ -231,21 +231,21 @@ def sha256_of(path: AnyPath) -> str:
 
 
 def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
-    """Return for each file that can be read, and for its companions, its SHA-256, size, times and `companion_files`.
+    """Return SHA-256, size, times and `companion_files` of each file that can be read, companions included, by path.
 
-    A file whose size (bytes) and times of writing and any change (ns, of the epoch) are those in `earlier`, an answer
-    from before, is not read again.
+    A file with the same size (bytes) and times of writing and of any change (ns since the epoch) as in `earlier`, an
+    earlier result, is not read again.
     """
     by_path: dict[str, list[Any]] = {}
-    waiting = list(map(str, files))
-    for path in waiting:
+    paths = list(map(str, files))
+    for path in paths:
         with suppress(OSError, StorageError):
             state = Path(path).stat()
-            # one that takes another's place keeps its date, but has been renamed
+            # a file that was moved here keeps its time of writing, not that of its last change
             current = [state.st_size, state.st_mtime_ns, state.st_ctime_ns]
             found = earlier.get(path, [])
             by_path[path] = found if found[1:-1] == current else [sha256_of(path), *current, companion_files(path)]
-            waiting += [companion for companion in by_path[path][-1] if companion not in waiting]
+            paths += [companion for companion in by_path[path][-1] if companion not in paths]
     return by_path
 
 
@@ -275,8 +275,8 @@ def files_below(folder: AnyPath) -> list[Path]:
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []
-        # links whose target is missing are named when they are read
-        files = (here / name for name in names if real not in entered)
+        # links without a target are reported by their readers
+        files = [here / name for name in names if real not in entered]
         found += [file for file in files if file.is_file() or not file.exists()]
         entered.add(real)
     return sorted(found)

@@ -1,4 +1,4 @@
-"""Locks of files between processes, where the file system has them."""
+"""Locks of files between processes, if the file system has them."""
 
 import fcntl
 import sys

@@ -165,9 +165,8 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
-        raise InputError(
-            problem, path=surface_path, expected=f"the GIFTI, PLY, OBJ or OFF file that {path} was made on"
-        )
+        expected = f"the GIFTI, PLY, OBJ or OFF file that {path} was made on"
+        raise InputError(problem, path=surface_path, expected=expected)
     surface = read_surface(surface_path)
     arrays = load_gifti(path).darrays
     if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):

@@ -31,7 +31,7 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
-# labels stored through a slope or as floats may be this far off whole numbers
+# labels stored as floats or with a slope may differ by this from whole numbers
 MAX_LABEL_ERROR = 0.05
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
@@ -187,20 +187,19 @@ def _require_its_size(image: SpatialImage, path: AnyPath) -> None:
 
 
 def _stored_values(image: SpatialImage, path: AnyPath) -> NDArray[np.number]:
-    """Return the values of an image, with compressed files read to their ends, where their checksums are."""
-    streams: dict[str, Any] = {}
+    """Return the values of an image; compressed files are read to the end, so that checksums are verified."""
+    packed: dict[str, Any] = {}
     with ExitStack() as opened:
         for part, holder in image.file_map.items():
             name = str(holder.filename).lower()
             if name.endswith(PACKED_SUFFIXES):
-                # nibabel's own reader of gzip may be one that checks nothing
+                # nibabel's own reader of gzip may not verify checksums
                 opener: Any = gzip.open if name.endswith(GZIP_SUFFIXES) else ImageOpener
-                streams[part] = opened.enter_context(opener(holder.filename))
-        holders = {part: FileHolder(fileobj=stream) for part, stream in streams.items()}
-        values = np.asanyarray(type(image).from_file_map({**image.file_map, **holders}).dataobj)
-        for stream in streams.values():
+                packed[part] = FileHolder(fileobj=opened.enter_context(opener(holder.filename)))
+        values = np.asanyarray(type(image).from_file_map({**image.file_map, **packed}).dataobj)
+        for holder in packed.values():
             try:
-                while stream.read(2**20):
+                while holder.fileobj.read(2**20):
                     pass
             except gzip.BadGzipFile as error:
                 if not str(error).startswith("Not a gzipped file"):
@@ -284,12 +283,12 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
         require_finite(values.ravel(), path, "values", "voxels")
         errors = np.abs(values - np.rint(values))
         if (broken := errors > MAX_LABEL_ERROR).any():
-            problem = f"contains values that are more than {MAX_LABEL_ERROR:g} off whole numbers, so not labels"
+            problem = f"contains values that differ by more than {MAX_LABEL_ERROR:g} from whole numbers, so not labels"
             broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
             remedy = "Resample labels with nearest neighbour. gyriflow does not segment images."
             raise InputError(problem, path=path, found=broken_values, remedy=remedy)
         if (error := errors.max(initial=0)) > 1e-3:
-            log.warning("%s: labels are up to %.3g off whole numbers and were rounded", path, error)
+            log.warning("%s: labels differ by up to %.3g from whole numbers and were rounded", path, error)
         values = np.rint(values)
     least, largest, bounds = values.min(initial=0), values.max(initial=0), np.iinfo(np.int32)
     if least < bounds.min or largest > bounds.max:

@@ -16,7 +16,7 @@ MAX_VALUES = 1_000_000
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Loader that refuses duplicate keys, of which YAML would silently keep the last."""
+    """Loader that refuses duplicate keys, since YAML would silently keep the last one."""
 
 
 def _size(value: Any, sizes: dict[int, int]) -> int:

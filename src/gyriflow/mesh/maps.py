@@ -58,8 +58,8 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     """Return a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
 
     In the outer half of the outermost voxels the value is constant outwards. `data` are (i, j, k), `affine` (4, 4)
-    leads to the mesh's coordinates. InputError, with the volume's `path`, where vertices lie outside it, or between
-    voxels of which one is NaN or infinite.
+    leads to the mesh's coordinates. InputError, with the volume's `path`, if vertices lie outside it, or between
+    voxels with NaN or infinite values.
     """
     matrix = np.asarray(affine, dtype=float)
     index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
@@ -77,13 +77,10 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     undefined = ~np.isfinite(values)
     if undefined.any():
-        raise InputError(
-            "a map has no number in parts of the start brain",
-            path=path,
-            found=f"{int(undefined.sum())} vertices at voxels that are NaN or infinite",
-            expected=expected,
-            remedy="Fill these voxels, and a voxel or two around the brain, as with the nearest values.",
-        )
+        problem = "a map has no number in parts of the start brain"
+        found = f"{int(undefined.sum())} vertices at voxels that are NaN or infinite"
+        remedy = "Fill these voxels, and a voxel or two around the brain, for example with the nearest values."
+        raise InputError(problem, path=path, found=found, expected=expected, remedy=remedy)
     return values
 
 

@@ -267,8 +267,8 @@ def measure_brain(
     """Measure a brain.
 
     A cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
-    curvature within `curvature_radius_mm` of it out of the means. What is said of the whole but its volume and area
-    is of both hemispheres: Σ area over Σ area of the hulls, and means over both.
+    curvature within `curvature_radius_mm` of it out of the means. Except for volume and area, values of the whole
+    are those of both hemispheres: Σ area over Σ area of the hulls, and means over both.
 
     Parameters
     ----------

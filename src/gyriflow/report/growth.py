@@ -41,8 +41,8 @@ def growth_chart(
 ) -> Figure:
     """Draw cortical area and volume over weeks, and the tangential growth rate of each interval as bars.
 
-    Series of brains share the panels of area and volume. Up to four have a panel of bars each, on one scale. Series
-    without rates have none.
+    Series of brains share the panels of area and volume. Up to four series with rates have a panel of bars each, on one
+    scale.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ def clear_stale_lock(directory: Path) -> None:
             raise StorageError(problem, path=directory.resolve(), remedy=remedy)
         time.sleep(0.2)
     with file:
-        # without locks of files, those of Snakemake may be of a live run
+        # if files cannot be locked, Snakemake's locks may be those of a live run
         stale = [] if file.name in UNLOCKABLE else list((directory / ".snakemake" / "locks").glob("*.lock"))
         for lock in stale:
             lock.unlink()
@@ -136,7 +136,7 @@ def unknown_target_error(name: str) -> InputError:
     """Return the error for a target that no rule makes."""
     rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
     targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
-    return InputError(f"there is no stage or result {name}; {did_you_mean(name, targets)}")
+    return InputError(f"no stage or result is named {name}; {did_you_mean(name, targets)}")
 
 
 def redirect_output(log: Path) -> None:
@@ -170,7 +170,7 @@ def stop_jobs() -> None:
     """Stop all processes below this one, MPI ranks included. Simulations keep their last checkpoint."""
     jobs: set[psutil.Process] = set()
     for stop in (psutil.Process.terminate, psutil.Process.kill):
-        # a job that ends may leave its own processes behind
+        # the processes of a job that has ended may still run
         jobs.update(psutil.Process().children(recursive=True))
         for job in jobs:
             with suppress(psutil.Error):
@@ -234,8 +234,8 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
 
 
 @contextmanager
-def unwritten_state(directory: Path) -> Iterator[None]:
-    """Let Snakemake read the records of a directory, which may be read-only, and write elsewhere."""
+def temporary_records(directory: Path) -> Iterator[None]:
+    """Let Snakemake read the records of a directory, which may be read-only, and write them to a temporary folder."""
     from snakemake import workflow
     from snakemake.persistence.file import FilePersistence
 
@@ -277,7 +277,7 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         # `nohup` has SIGHUP ignored
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
-    # by itself, Snakemake waits for running jobs: at SIGTERM, and unless a signal reaches these too
+    # Snakemake's own handlers wait for running jobs to end
     JobScheduler.exit_gracefully = lambda _, number, frame: interrupt(number, frame)
     Executor.cancel = cancel
     logging.getLogger("snakemake.logging").addFilter(is_shown)
@@ -320,7 +320,7 @@ def main(arguments: Sequence[str]) -> int:
         redirect_output(details)
     began_s = time.time()
     try:
-        with unwritten_state(directory) if runs_nothing else nullcontext():
+        with temporary_records(directory) if runs_nothing else nullcontext():
             code = call_snakemake(complete)
     finally:
         recorded = recorded_exit_code(exit_file)

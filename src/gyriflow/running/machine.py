@@ -1,4 +1,4 @@
-"""Cores and memory that a run may use: those of the machine, within the limits of a container and of a Slurm job."""
+"""Cores and memory that a run may use: those of the machine, or less in a container or a Slurm job."""
 
 import os
 import resource
@@ -30,7 +30,7 @@ def _slurm(name: str) -> int:
 
 
 def _cgroup_limits(cgroups: Path, own: Path) -> Iterator[int]:
-    # version 2 has one tree, version 1 one for each kind of limit; inside a container, its own group is the root
+    # version 2 has one tree, version 1 a tree for each kind of limit; in a container, its group is the root
     groups = [line.split(":", 2) for line in own.read_text().splitlines()] if own.exists() else []
     for _, controllers, name in groups:
         group = cgroups / (controllers or ".") / name.lstrip("/")

@@ -86,5 +86,5 @@ def input_contents(
     if record and files != recorded:
         write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
-    together = {name: [path for path in dict.fromkeys([name, *files[name][-1]]) if path in files] for name in files}
-    return expected | {name: " ".join(files[path][0] for path in paths) for name, paths in together.items()}
+    groups = {name: [path for path in dict.fromkeys([name, *files[name][-1]]) if path in files] for name in files}
+    return expected | {name: " ".join(files[path][0] for path in group) for name, group in groups.items()}

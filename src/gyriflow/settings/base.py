@@ -134,7 +134,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
 
 
 def keys_at(kind: Any, path: Key) -> list[str]:
-    """Return the keys of the settings at `path` inside the type `kind`; empty if there are no settings."""
+    """Return the keys of the settings at `path` inside the type `kind`; empty if no settings are there."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         if not path:
             return list(kind.model_fields)
@@ -165,18 +165,21 @@ def located(folder: Path | str, path: str) -> Path:
 
 
 def own_name(path: Path) -> Path:
-    """Return an absolute path without links, except that a link to a file keeps its name, which gives the format."""
+    """Return an absolute path with folders resolved; a link to a file keeps its name, which has the format."""
     return path.resolve() if path.is_dir() else path.parent.resolve() / path.name
 
 
 def folder_of(path: Path) -> Path:
-    """Return the folder of a configuration: of a link, that of its target, unless this is in a store of git-annex."""
+    """Return the folder of a configuration: for a link, the folder of its target, unless git-annex stores that."""
     real = path.resolve()
     return (own_name(path) if "annex/objects" in real.as_posix() else real).parent
 
 
 def absent_content(path: Path, start: bytes = b"") -> str:
-    """Return how to get the content of a broken link or a pointer, by its `start`, of git-annex or Git LFS, or ""."""
+    """Return how to get the content of a file of git-annex or Git LFS that is not here: a broken link or a pointer.
+
+    Return "" for other files. A pointer is recognised by the `start` of the file.
+    """
     if start.startswith(b"version https://git-lfs.github.com"):
         return f"its content is not here (Git LFS). Get it with `git lfs pull --include {path}`"
     is_broken = path.is_symlink() and not path.exists() and "annex/objects" in path.readlink().as_posix()

@@ -21,7 +21,7 @@ AT_SCAN = re.compile(rf"{_SCAN}_{_AGE}|{_AGE}_(?:at_)?{_SCAN}|pma|post_?menstrua
 GESTATIONAL = re.compile(r"gestational_age|gest_age|gestation|ga|gw|weeks?|gestational_weeks?")
 Kind = Literal["scan", "gestational", "age"]
 KINDS: dict[Kind, re.Pattern[str]] = {"scan": AT_SCAN, "gestational": GESTATIONAL, "age": re.compile("age")}
-"""Kinds of ages by the names of their columns: at the scan, gestational, or any."""
+"""Names of columns by the kind of their ages: at the scan, gestational, or plain."""
 OTHER_AGE = re.compile(
     r".*(birth|delivery).*|(post_?natal|chronological|corrected|(?:post_?)?concept\w*)(?:_age)?|pna|pca"
 )
@@ -33,7 +33,7 @@ WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d?)")
 NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 MIN_AMBIGUOUS_AGES = 3
-"""Ages in tenths of a week, all with digits from 0 to 6, from which on the digits may be days."""
+"""Number of ages in tenths of a week with digits from 0 to 6 that is enough to suspect days."""
 MAX_DIFFERENCE_WEEKS = 0.1
 """Two ages of a scan agree if they differ by rounding."""
 WEEK_NAME = re.compile(
@@ -100,8 +100,8 @@ def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[A
             continue
         for kind in (kind for kind, pattern in KINDS.items() if pattern.fullmatch(base)):
             kind = "gestational" if kind == "age" and ending else kind
-            unit, problem = _unit(kind, ending[1] if ending else "", described.get(key, {}), sidecar_name)
-            columns.append(AgeColumn(name, kind, unit, problem))
+            unit_and_problem = _unit(kind, ending[1] if ending else "", described.get(key, {}), sidecar_name)
+            columns.append(AgeColumn(name, kind, *unit_and_problem))
     return columns
 
 
@@ -131,7 +131,7 @@ def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanA
         return ScanAge(None)
     at_scan = [age for age in used if age.column.kind == "scan"]
     used = at_scan or [age for age in used if age.has_session] or used
-    # an age of no kind may be the mother's
+    # a plain age may be the mother's
     used = at_scan or [age for age in used if age.column.kind == "gestational"] or used
     weeks = []
     for age in used:

@@ -114,11 +114,11 @@ def read_table_of_scans(path: Path) -> Table:
         name = values[ids] if ids is not None else empty.subject or ""
         label = values[session] if session is not None else ""
         label_or_none = None if label in MISSING_VALUES else label.removeprefix("ses-")
-        others = {key: text for key, text in values.items() if key not in (ids, session)}
-        rows.append(Row(f"{path.name} row {number}", name, label_or_none, others))
+        texts_by_column = {key: text for key, text in values.items() if key not in (ids, session)}
+        rows.append(Row(f"{path.name} row {number}", name, label_or_none, texts_by_column))
     common = path.stem.rpartition("_")[2] + ".json"
     sidecars = (path.with_suffix(".json"), path.parent / common, path.parent.parent / common)
-    sidecar = next((read_json(place) for place in sidecars if os.path.lexists(place)), {})
+    sidecar: Any = next((read_json(place) for place in sidecars if os.path.lexists(place)), {})
     ages = age_columns(columns, sidecar, f"{path.stem}.json")
     return replace(empty, rows=rows, columns=columns, ages=ages)
 

@@ -69,26 +69,18 @@ class Study:
 
     @cached_property
     def series_with_rates(self) -> list[str]:
-        """The series whose differences between weeks are growth: of a subject, of an atlas, or used by a run.
-
-        Other brains may be different fetuses.
-        """
+        """The series whose differences between weeks are growth: of a subject, of an atlas, or used by a run."""
         simulations = self.simulations.values()
         starts = {simulation.start for simulation in simulations}
         grown = [self.chains[simulation.start.id, simulation.shapes] for simulation in simulations if simulation.shapes]
         used = {simulation.followed_series for simulation in simulations}
         used |= {self.series.with_brain(brain) for chain in grown for brain in chain.later}
-        return [
-            name
-            for name, brains in self.series.brains.items()
-            if name in used
-            or (
-                not several_subjects(brains)
-                and (
-                    brains[0].config.subject or starts & {*brains} or all(brain.id in self.atlases for brain in brains)
-                )
-            )
-        ]
+        for name, brains in self.series.brains.items():
+            is_of_atlas = all(brain.id in self.atlases for brain in brains)
+            # brains without a subject may be different fetuses
+            if not several_subjects(brains) and (brains[0].config.subject or is_of_atlas or starts & {*brains}):
+                used.add(name)
+        return [name for name in self.series.brains if name in used]
 
     @property
     def with_thickness_curve(self) -> list[str]:

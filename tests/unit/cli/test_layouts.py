@@ -26,123 +26,65 @@ DHCP = "derivatives/dhcp/sub-CC00856XX15/ses-3530/anat/sub-CC00856XX15_ses-3530"
 HCP = "100307/{}/100307.@.{}"
 
 
+FETPYPE = "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
+TABLE = "participants.tsv"
+KEEP_ONE = Facts("2 files", "keep one")
+
+
 @pytest.mark.parametrize(
     ("contents", "expected"),
     [
         # FeTA 2.x
-        (
-            {
-                "labels": [f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz" for n in (26, 27)],
-                "text": {
-                    "participants.tsv": "participant_id\tPathology\tGestational age\nsub-026\tNeurotypical\t23.3\n"
-                    "sub-027\tPathological\t26.9"
-                },
-            },
-            {
-                f"sub-0{n}": (week, f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz", "")
-                for n, week in ((26, 23.3), (27, 26.9))
-            },
-        ),
+        ({"labels": [f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz" for n in (26, 27)],
+          "text": {TABLE: "participant_id\tPathology\tGestational age\n"
+                   "sub-026\tNeurotypical\t23.3\nsub-027\tPathological\t26.9"}},
+         {f"sub-0{n}": (week, f"sub-0{n}/anat/sub-0{n}_rec-mial_dseg.nii.gz", "")
+          for n, week in ((26, 23.3), (27, 26.9))}),
         # dHCP: several kinds of one scan are asked for, with ages at the scan of sessions
-        (
-            {
-                "labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"],
-                "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
-                "tables": {
-                    "participants.tsv": ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
-                    "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv": ["session_id scan_age", "3530 29.71"],
-                },
-            },
-            {
-                "sub-CC00856XX15_ses-3530": (
-                    29.71,
-                    ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")),
-                    Facts("2 files", "keep one"),
-                ),
-                "sub-CC00856XX15_ses-3530-2": (29.71, f"{DHCP}_desc-drawem9_dseg.nii.gz", Facts("2 files", "keep one")),
-            },
-        ),
+        ({"labels": [f"{DHCP}_desc-drawem9_dseg.nii.gz"], "surfaces": both(f"{DHCP}_hemi-@_pial.surf.gii"),
+          "tables": {TABLE: ["participant_id sex birth_age", "CC00856XX15 F 39.1"],
+                     "sub-CC00856XX15/sub-CC00856XX15_sessions.tsv": ["session_id scan_age", "3530 29.71"]}},
+         {"sub-CC00856XX15_ses-3530": (29.71, ", ".join(both(f"{DHCP}_hemi-@_pial.surf.gii")), KEEP_ONE),
+          "sub-CC00856XX15_ses-3530-2": (29.71, f"{DHCP}_desc-drawem9_dseg.nii.gz", KEEP_ONE)}),
         # fetpype's derivatives
-        (
-            {
-                "labels": [
-                    "derivatives/nesvor_bounti/sub-01/ses-01/anat/sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"
-                ],
-                "tables": {"participants.tsv": ["participant_id session_id ga", "sub-01 ses-01 24+3"]},
-            },
-            {"sub-01_ses-01": (24.43, Facts("sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"), "")},
-        ),
+        ({"labels": [FETPYPE], "tables": {TABLE: ["participant_id session_id ga", "sub-01 ses-01 24+3"]}},
+         {"sub-01_ses-01": (24.43, Facts("sub-01_ses-01_rec-nesvor_seg-bounti_dseg.nii.gz"), "")}),
         # NiBabies: a template's space and meshes beside the subject's own
-        (
-            {
-                "labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
-                "surfaces": [
-                    *both(f"{NIBABIES}_hemi-@_pial.surf.gii"),
-                    *both(f"{NIBABIES}_hemi-@_white.surf.gii"),
-                    *both(f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii"),
-                ],
-                "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
-                "tables": {"participants.tsv": ["participant_id pma", "sub-01 41.2"]},
-            },
-            {"sub-01_ses-1": (41.2, ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")), "")},
-        ),
+        ({"labels": [f"{NIBABIES}_space-MNIInfant_cohort-1_dseg.nii.gz"],
+          "surfaces": [*both(f"{NIBABIES}_hemi-@_pial.surf.gii"), *both(f"{NIBABIES}_hemi-@_white.surf.gii"),
+                       *both(f"{NIBABIES}_hemi-@_space-fsLR_den-32k_pial.surf.gii")],
+          "text": {f"{NIBABIES}_label-GM_probseg.nii.gz": "no labels"},
+          "tables": {TABLE: ["participant_id pma", "sub-01 41.2"]}},
+         {"sub-01_ses-1": (41.2, ", ".join(both(f"{NIBABIES}_hemi-@_pial.surf.gii")), "")}),
         # FreeSurfer, with its template
-        (
-            {
-                "surfaces": [
-                    *both("subjects/sub-01/surf/@.pial"),
-                    *both("subjects/sub-01/surf/@.pial.T1"),
-                    *both("subjects/sub-01/surf/@.white"),
-                    *both("subjects/sub-01/surf/@.sphere"),
-                    *both("subjects/sub-02/surf/@.pial.T1"),
-                    *both("subjects/fsaverage/surf/@.pial"),
-                ],
-                "labels": ["subjects/sub-01/mri/aseg.mgz", "subjects/sub-01/mri/aparc+aseg.mgz"],
-                "tables": {"subjects/participants.tsv": ["participant_id week", "sub-01 36", "sub-02 37"]},
-            },
-            {
-                "sub-01": (36.0, "subjects/sub-01/surf/lh.pial, subjects/sub-01/surf/rh.pial", ""),
-                "sub-02": (37.0, "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1", ""),
-                "fsaverage": ("CHOOSE", Facts("fsaverage/surf/lh.pial"), Facts("of a template, fsaverage")),
-            },
-        ),
+        ({"surfaces": [path for layer in ("pial", "pial.T1", "white", "sphere")
+                       for path in both(f"subjects/sub-01/surf/@.{layer}")]
+          + both("subjects/sub-02/surf/@.pial.T1") + both("subjects/fsaverage/surf/@.pial"),
+          "labels": ["subjects/sub-01/mri/aseg.mgz", "subjects/sub-01/mri/aparc+aseg.mgz"],
+          "tables": {f"subjects/{TABLE}": ["participant_id week", "sub-01 36", "sub-02 37"]}},
+         {"sub-01": (36.0, "subjects/sub-01/surf/lh.pial, subjects/sub-01/surf/rh.pial", ""),
+          "sub-02": (37.0, "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1", ""),
+          "fsaverage": ("CHOOSE", Facts("fsaverage/surf/lh.pial"), Facts("of a template, fsaverage"))}),
         # Infant FreeSurfer, without sub-
-        (
-            {
-                "surfaces": [*both("case7/surf/@.pial"), *both("case8/surf/@.pial")],
-                "labels": ["case7/mri/aseg.mgz"],
-                "tables": {"participants.tsv": ["participant_id week", "case7 36", "case8 37"]},
-            },
-            {f"case{n}": (29.0 + n, f"case{n}/surf/lh.pial, case{n}/surf/rh.pial", "") for n in (7, 8)},
-        ),
+        ({"surfaces": [*both("case7/surf/@.pial"), *both("case8/surf/@.pial")], "labels": ["case7/mri/aseg.mgz"],
+          "tables": {TABLE: ["participant_id week", "case7 36", "case8 37"]}},
+         {f"case{n}": (29.0 + n, f"case{n}/surf/lh.pial, case{n}/surf/rh.pial", "") for n in (7, 8)}),
         # HCP
-        (
-            {
-                "surfaces": [
-                    *both(HCP.format("T1w/Native", "pial.native.surf.gii")),
-                    *both(HCP.format("T1w/Native", "white.native.surf.gii")),
-                    *both(HCP.format("T1w/fsaverage_LR32k", "pial.32k_fs_LR.surf.gii")),
-                    *both(HCP.format("MNINonLinear/Native", "pial.native.surf.gii")),
-                ],
-                "tables": {"participants.tsv": ["participant_id week", "100307 36"]},
-            },
-            {"100307": (36.0, ", ".join(both(HCP.format("T1w/Native", "pial.native.surf.gii"))), "")},
-        ),
+        ({"surfaces": [*both(HCP.format("T1w/Native", "pial.native.surf.gii")),
+                       *both(HCP.format("T1w/Native", "white.native.surf.gii")),
+                       *both(HCP.format("T1w/fsaverage_LR32k", "pial.32k_fs_LR.surf.gii")),
+                       *both(HCP.format("MNINonLinear/Native", "pial.native.surf.gii"))],
+          "tables": {TABLE: ["participant_id week", "100307 36"]}},
+         {"100307": (36.0, ", ".join(both(HCP.format("T1w/Native", "pial.native.surf.gii"))), "")}),
         # a clone of git-annex with and without contents
-        (
-            {
-                "lost": ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/@.pial")],
-                "labels": ["sub-03_week26_dseg.nii.gz"],
-            },
-            {
-                "sub-01": (24.0, "sub-01_week24_dseg.nii.gz", Facts("sub-01_week24_dseg.nii.gz")),
-                "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
-                "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", ""),
-            },
-        ),
+        ({"lost": ["sub-01_week24_dseg.nii.gz", *both("sub-02_week25/surf/@.pial")],
+          "labels": ["sub-03_week26_dseg.nii.gz"]},
+         {"sub-01": (24.0, "sub-01_week24_dseg.nii.gz", Facts("sub-01_week24_dseg.nii.gz")),
+          "sub-02": (25.0, Facts("lh.pial"), Facts("lh.pial")),
+          "sub-03": (26.0, "sub-03_week26_dseg.nii.gz", "")}),
     ],
     ids=["FeTA", "dHCP", "fetpype", "NiBabies", "FreeSurfer", "Infant FreeSurfer", "HCP", "git-annex"],
-)
+)  # fmt: skip
 @pytest.mark.fault(81)
 def test_a_data_set_is_read_as_it_is(tmp_path, contents, expected):
     assert brains(make_tree(tmp_path, **contents)) == expected

@@ -25,189 +25,96 @@ def ages(folder, **options):
 
 TWO = {"sub-01_ses-1": 22.0, "sub-01_ses-2": 28.0}
 BOTH = [FIRST, SECOND]
-WEEKS = {"gestational_age": {"Units": "weeks"}}
+
+
+def tree(folder, labels, tables, sidecar=None):
+    """Write a data set with tables of rows, separated by |, and the description of columns, by name."""
+    rows = {path: text.split(" | ") for path, text in tables.items()}
+    return make_tree(folder, labels=labels, tables=rows, json={SIDECAR: sidecar} if sidecar else {})
 
 
 @pytest.mark.parametrize(
-    ("labels", "tables", "sidecars", "expected"),
+    ("rows", "sidecar", "age"),
+    [
+        # a file without a session, of a subject with several
+        ("participant_id visit ga | sub-01 1 22 | sub-01 2 28", {}, Facts("row 2", "row 3", "session_id")),
+        # at the scan comes before at birth
+        *(
+            (f"participant_id gestational_age {column} | sub-01 33.1 29.4", {}, 29.4)
+            for column in ("scan_age", "pma", "ga_at_scan", "age_at_mri", "PMA", "postmenstrual_age_at_scan",
+                           "scan_ga_weeks")
+        ),
+        ("participant_id birth_age scan_age | sub-01 33.1 n/a", {}, Facts("scan_age", "n/a")),
+        # postnatal ages
+        ("participant_id age | sub-01 24", {"age": {"Units": "weeks", "AgeReference": "birth"}},
+         Facts("age", "birth", SIDECAR)),
+        ("participant_id age age_type | sub-01 24 postnatal", {"age": {"Units": "weeks"}},
+         Facts("age", "age_type", "postnatal")),
+        ("participant_id gestational_age | sub-01 39.4",
+         {"gestational_age": {"Units": "weeks", "Description": "gestational age at birth"}}, Facts("at birth")),
+        ("participant_id postnatal_age_weeks | sub-01 24", {}, Facts("postnatal_age_weeks", "scan_age")),
+        # units
+        ("participant_id gestational_age | sub-01 24", {"gestational_age": {"Units": "months"}},
+         Facts("gestational_age", "months", SIDECAR)),
+        ("participant_id age | sub-01 170", {"age": {"Units": "day"}}, 24.29),
+        ("participant_id age_months | sub-01 6", {}, Facts("age_months", "months")),
+        ("participant_id ga_days | sub-01 170", {"ga_days": {"Units": "weeks"}}, Facts("days", "weeks")),
+        # whole ids only
+        ("participant_id ga | SUB-01 22", {}, Facts("SUB-01")),
+        # given twice
+        ("participant_id ga | sub-01 22 | sub-01 28", {}, Facts(22, "row 2", 28, "row 3", "session_id")),
+        ("participant_id ga week | sub-01 22 28", {}, Facts("ga", 22, "week", 28)),
+        ("participant_id ga ga | sub-01 22 28", {}, Facts("ga", 22, 28)),
+        ("participant_id ga GA | sub-01 22 22", {}, 22.0),
+        ("participant_id sex ga | sub-01 F 22 | sub-01 M 22", {}, Facts("sex", "F", "M")),
+    ],
+)  # fmt: skip
+def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(tmp_path, rows, sidecar, age):
+    assert ages(tree(tmp_path, [LONE], {TABLE: rows}, sidecar)) == {"sub-01": age}
+
+
+@pytest.mark.parametrize(
+    ("labels", "tables", "expected"),
     [
         # a row for each session, under several names of the column
         *(
-            (BOTH, {TABLE: [f"participant_id {column} gestational_age", "sub-01 1 22", "sub-01 ses-2 28"]}, {}, TWO)
+            (BOTH, {TABLE: f"participant_id {column} gestational_age | sub-01 1 22 | sub-01 ses-2 28"}, TWO)
             for column in ("session_id", "session", "ses", "visit", "Visit")
         ),
-        # a file without a session, of a subject with several
-        (
-            [LONE],
-            {TABLE: ["participant_id visit ga", "sub-01 1 22", "sub-01 2 28"]},
-            {},
-            {"sub-01": Facts("row 2", "row 3", "session_id")},
-        ),
         # one age of a subject with two scans is of neither
-        (
-            BOTH,
-            {TABLE: ["participant_id ga", "sub-01 22"]},
-            {},
-            dict.fromkeys(TWO, Facts("ga 22", "row 2", "session_id")),
-        ),
-        # at the scan comes before at birth, in two tables or one
-        (
-            [FIRST],
-            {TABLE: ["participant_id gestational_age", "sub-01 33.1"], SESSIONS: ["session_id scan_age", "ses-1 29.4"]},
-            {},
-            {"sub-01_ses-1": 29.4},
-        ),
-        *(
-            (
-                [LONE],
-                {TABLE: [f"participant_id gestational_age {column}", "sub-01 33.1 29.4"]},
-                {},
-                {"sub-01": 29.4},
-            )
-            for column in (
-                "scan_age",
-                "pma",
-                "ga_at_scan",
-                "age_at_mri",
-                "PMA",
-                "postmenstrual_age_at_scan",
-                "scan_ga_weeks",
-            )
-        ),
-        (
-            [LONE],
-            {TABLE: ["participant_id birth_age scan_age", "sub-01 33.1 n/a"]},
-            {},
-            {"sub-01": Facts("scan_age", "n/a")},
-        ),
-        # postnatal ages
-        (
-            [LONE],
-            {TABLE: ["participant_id age", "sub-01 24"]},
-            {SIDECAR: {"age": {"Units": "weeks", "AgeReference": "birth"}}},
-            {"sub-01": Facts("age", "birth", SIDECAR)},
-        ),
-        (
-            [LONE],
-            {TABLE: ["participant_id age age_type", "sub-01 24 postnatal"]},
-            {SIDECAR: {"age": {"Units": "weeks"}}},
-            {"sub-01": Facts("age", "age_type", "postnatal")},
-        ),
-        (
-            [LONE],
-            {TABLE: ["participant_id gestational_age", "sub-01 39.4"]},
-            {SIDECAR: {"gestational_age": {"Units": "weeks", "Description": "gestational age at birth"}}},
-            {"sub-01": Facts("at birth")},
-        ),
-        (
-            [LONE],
-            {TABLE: ["participant_id postnatal_age_weeks", "sub-01 24"]},
-            {},
-            {"sub-01": Facts("postnatal_age_weeks", "scan_age")},
-        ),
-        # units
-        (
-            [LONE],
-            {TABLE: ["participant_id gestational_age", "sub-01 24"]},
-            {SIDECAR: {"gestational_age": {"Units": "months"}}},
-            {"sub-01": Facts("gestational_age", "months", SIDECAR)},
-        ),
-        (
-            [LONE],
-            {TABLE: ["participant_id age", "sub-01 170"]},
-            {SIDECAR: {"age": {"Units": "day"}}},
-            {"sub-01": 24.29},
-        ),
-        ([LONE], {TABLE: ["participant_id age_months", "sub-01 6"]}, {}, {"sub-01": Facts("age_months", "months")}),
-        (
-            [LONE],
-            {TABLE: ["participant_id ga_days", "sub-01 170"]},
-            {SIDECAR: {"ga_days": {"Units": "weeks"}}},
-            {"sub-01": Facts("days", "weeks")},
-        ),
+        (BOTH, {TABLE: "participant_id ga | sub-01 22"}, dict.fromkeys(TWO, Facts("ga 22", "row 2", "session_id"))),
+        # at the scan comes before at birth, in two tables
+        ([FIRST], {TABLE: "participant_id gestational_age | sub-01 33.1", SESSIONS: "session_id scan_age | ses-1 29.4"},
+         {"sub-01_ses-1": 29.4}),
         # whole ids only
-        (
-            ["sub-01/ses-1/sub-01_ses-1_dseg.nii.gz", "sub-02/ses-1/sub-02_ses-1_dseg.nii.gz"],
-            {TABLE: ["participant_id ga", "1 22", "2 28"]},
-            {},
-            {f"sub-0{n}_ses-1": Facts(f"0{n}", str(n), "row") for n in (1, 2)},
-        ),
-        (
-            ["a/case7_dseg.nii.gz", "a/case7_b_dseg.nii.gz", "a/x/case8_dseg.nii.gz"],
-            {TABLE: ["participant_id ga", "case7 22", "case7_b 23", "a 24", "x 25"]},
-            {},
-            {"case7": 22.0, "case7_b": 23.0, "case8": Facts("a, x")},
-        ),
-        ([LONE], {TABLE: ["participant_id ga", "SUB-01 22"]}, {}, {"sub-01": Facts("SUB-01")}),
+        ([f"sub-0{n}/ses-1/sub-0{n}_ses-1_dseg.nii.gz" for n in (1, 2)], {TABLE: "participant_id ga | 1 22 | 2 28"},
+         {f"sub-0{n}_ses-1": Facts(f"0{n}", str(n), "row") for n in (1, 2)}),
+        (["a/case7_dseg.nii.gz", "a/case7_b_dseg.nii.gz", "a/x/case8_dseg.nii.gz"],
+         {TABLE: "participant_id ga | case7 22 | case7_b 23 | a 24 | x 25"},
+         {"case7": 22.0, "case7_b": 23.0, "case8": Facts("a, x")}),
         # given twice
-        (
-            [LONE],
-            {TABLE: ["participant_id ga", "sub-01 22", "sub-01 28"]},
-            {},
-            {"sub-01": Facts(22, "row 2", 28, "row 3", "session_id")},
-        ),
-        (
-            [FIRST],
-            {SESSIONS: ["session_id ga", "ses-1 22", "1 28"]},
-            {},
-            {"sub-01_ses-1": Facts(22, 28, "row 2", "row 3")},
-        ),
-        ([LONE], {TABLE: ["participant_id ga week", "sub-01 22 28"]}, {}, {"sub-01": Facts("ga", 22, "week", 28)}),
-        ([LONE], {TABLE: ["participant_id ga ga", "sub-01 22 28"]}, {}, {"sub-01": Facts("ga", 22, 28)}),
-        ([LONE], {TABLE: ["participant_id ga GA", "sub-01 22 22"]}, {}, {"sub-01": 22.0}),
-        (
-            [LONE],
-            {TABLE: ["participant_id sex ga", "sub-01 F 22", "sub-01 M 22"]},
-            {},
-            {"sub-01": Facts("sex", "F", "M")},
-        ),
+        ([FIRST], {SESSIONS: "session_id ga | ses-1 22 | 1 28"}, {"sub-01_ses-1": Facts(22, 28, "row 2", "row 3")}),
         # tables of sessions
-        (
-            [FIRST],
-            {TABLE: ["participant_id ga", "sub-01 22"], SESSIONS: ["session_id age", "ses-1 24"]},
-            {},
-            {"sub-01_ses-1": Facts("age", "no unit", "sub-01_sessions.json")},
-        ),
-        (
-            ["derivatives/seg/" + FIRST],
-            {TABLE: ["participant_id ga", "sub-01 22"], "derivatives/seg/" + SESSIONS: ["session_id ga", "1 24"]},
-            {},
-            {"sub-01_ses-1": 24.0},
-        ),
-        (
-            BOTH,
-            {"sessions.tsv": ["participant_id session_id ga", "01 1 22", "sub-01 ses-2 28"]},
-            {},
-            TWO,
-        ),
-        (
-            [FIRST],
-            {
-                SESSIONS: ["session_id scan_age", "1 22"],
-                "sessions.tsv": ["participant_id session_id scan_age", "01 1 28"],
-            },
-            {},
-            {"sub-01_ses-1": Facts(22, 28, "sub-01_sessions.tsv", "sessions.tsv")},
-        ),
+        ([FIRST], {TABLE: "participant_id ga | sub-01 22", SESSIONS: "session_id age | ses-1 24"},
+         {"sub-01_ses-1": Facts("age", "no unit", "sub-01_sessions.json")}),
+        (["derivatives/seg/" + FIRST],
+         {TABLE: "participant_id ga | sub-01 22", "derivatives/seg/" + SESSIONS: "session_id ga | 1 24"},
+         {"sub-01_ses-1": 24.0}),
+        (BOTH, {"sessions.tsv": "participant_id session_id ga | 01 1 22 | sub-01 ses-2 28"}, TWO),
+        ([FIRST],
+         {SESSIONS: "session_id scan_age | 1 22", "sessions.tsv": "participant_id session_id scan_age | 01 1 28"},
+         {"sub-01_ses-1": Facts(22, 28, "sub-01_sessions.tsv", "sessions.tsv")}),
         # formats
-        (
-            [LONE],
-            {"participants.csv": ["participant_id;Gestational;Age", "sub-01;24;x"]},
-            {},
-            {"sub-01": Facts("participants.csv")},
-        ),
+        ([LONE], {"participants.csv": "participant_id;Gestational;Age | sub-01;24;x"},
+         {"sub-01": Facts("participants.csv")}),
         # the name of the file and the table
-        (["sub-01_GA-26_dseg.nii.gz"], {TABLE: ["participant_id ga", "sub-01 26.4"]}, {}, {"sub-01": 26.4}),
-        (
-            ["sub-01_GA-26_dseg.nii.gz"],
-            {TABLE: ["participant_id ga", "sub-01 28"]},
-            {},
-            {"sub-01": Facts(28, "26", "participants.tsv")},
-        ),
+        (["sub-01_GA-26_dseg.nii.gz"], {TABLE: "participant_id ga | sub-01 26.4"}, {"sub-01": 26.4}),
+        (["sub-01_GA-26_dseg.nii.gz"], {TABLE: "participant_id ga | sub-01 28"},
+         {"sub-01": Facts(28, "26", "participants.tsv")}),
     ],
-)
-def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, sidecars, expected):
-    assert ages(make_tree(tmp_path, labels=labels, tables=tables, json=sidecars)) == expected
+)  # fmt: skip
+def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, expected):
+    assert ages(tree(tmp_path, labels, tables)) == expected
 
 
 @pytest.mark.parametrize(
