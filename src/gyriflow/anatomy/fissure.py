@@ -440,11 +440,9 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
         side = side ^ strays
     share = float(areas[reassigned].sum() / areas.sum())
     if share > MAX_BULGE_SHARE:
-        raise InputError(
-            "the surface cannot be split at the fissure",
-            found=f"several pieces on each side; {100 * share:.0f} % of the area is not in the two largest",
-            expected=f"at most {100 * MAX_BULGE_SHARE:.0f} %",
-        )
+        found = f"several pieces on each side; {100 * share:.0f} % of the area is not in the two largest"
+        expected = f"at most {100 * MAX_BULGE_SHARE:.0f} %"
+        raise InputError("the surface cannot be split at the fissure", found=found, expected=expected)
     return side
 
 
@@ -470,11 +468,9 @@ def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, Triang
 def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMesh]:
     """Return the surfaces of the left faces, given as an (m,) mask, and of the others; InputError if one is empty."""
     if left.all() or not left.any():
-        raise InputError(
-            "the brain lies on one side of the interhemispheric fissure",
-            found=f"{int(left.sum())} of {len(left)} faces on the left",
-            expected="two hemispheres",
-        )
+        problem = "the brain lies on one side of the interhemispheric fissure"
+        found = f"{int(left.sum())} of {len(left)} faces on the left"
+        raise InputError(problem, found=found, expected="two hemispheres")
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
 
 
@@ -503,11 +499,9 @@ def separate(
         step = max(0.5 * (gap_mm - gap), 0.05)
         moved += step
         if moved > MAX_SEPARATION_MM:
-            raise InputError(
-                "the hemispheres overlap too much to belong to one brain in one pose",
-                found=f"an overlap beyond {2 * MAX_SEPARATION_MM:g} mm",
-                expected="hemispheres side by side",
-            )
+            problem = "the hemispheres overlap too much to belong to one brain in one pose"
+            found = f"an overlap beyond {2 * MAX_SEPARATION_MM:g} mm"
+            raise InputError(problem, found=found, expected="hemispheres side by side")
         left = TriangleMesh(left.vertices - step * to_right, left.faces)
         right = TriangleMesh(right.vertices + step * to_right, right.faces)
         gap = smallest_gap(left, right)

@@ -428,7 +428,7 @@ def _pial_surface(
     surface: RepairedSurface, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, week: float
 ) -> PialSurface:
     whole = surface.mesh
-    areas = {side: area_cm2(part) for side, part in sides.items()}
+    areas: dict[str, float] = {side: area_cm2(part) for side, part in sides.items()}
     measures = {
         "pose": pose.plain(),
         "week": week,

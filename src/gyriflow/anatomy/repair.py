@@ -102,7 +102,7 @@ def sound_pieces(
     can be checked only after posing.
     """
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
-    mesh, is_cap, repairs = _clean(mesh, max_hole_mm, single, caps_walls)
+    mesh, repairs, is_cap = clean(mesh, max_hole_mm, single=single, caps_walls=caps_walls)
     warnings, dropped, remaining = [], repairs["area_dropped_mm2"], area(mesh)
     if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
         warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
@@ -207,21 +207,17 @@ def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh
     return smooth
 
 
-def clean(mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Return the surface as closed, outward, manifold pieces of comparable size, and the count of each repair.
+def clean(
+    mesh: TriangleMesh, max_hole_mm: float, *, single: bool = False, caps_walls: bool = False
+) -> tuple[TriangleMesh, dict[str, Any], Mask]:
+    """Return the surface as closed, outward, manifold pieces of similar size, counts of repairs, and the mask of caps.
 
     Equal vertices are merged, degenerate and duplicate faces removed, edges of more than two faces split, holes up to
     `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
-    all but the largest. MeshError for larger holes and for surfaces that stay open.
+    all but the largest; with `caps_walls`, larger holes are capped as in `sound_pieces`. MeshError for other larger
+    holes and for surfaces that stay open.
     """
-    mesh, _, counts = _clean(mesh, max_hole_mm, single, caps_walls=False)
-    return mesh, counts
-
-
-def _clean(
-    mesh: TriangleMesh, max_hole_mm: float, single: bool, caps_walls: bool
-) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
-    # before merging, which may join pieces, but where each face may also be a piece
+    # before vertices are merged, which may join pieces; without shared vertices, each face is a piece
     mesh, turned = _turn_outward(mesh, 2)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
@@ -229,13 +225,13 @@ def _clean(
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh, single)
     # a brain in one piece has no medial walls that could be open
-    mesh, is_cap, holes = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
+    mesh, holes, is_cap = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
     mesh, turned_later = _turn_outward(mesh, dropped["pieces"])
     if not is_closed(mesh):
         found = f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair"
         raise MeshError("the surface cannot be closed", found=found, expected="a closed surface")
     counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + turned_later}
-    return mesh, is_cap, doubles | opened | dropped | holes | counts
+    return mesh, doubles | opened | dropped | holes | counts, is_cap
 
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
@@ -325,7 +321,7 @@ def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[s
     return merged(*main), {"pieces": len(main)} | dropped
 
 
-def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tuple[TriangleMesh, Mask, dict[str, Any]]:
+def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tuple[TriangleMesh, dict[str, Any], Mask]:
     by_size = sorted(
         (float(np.ptp(mesh.vertices[loop], axis=0).max()), list(loop)) for loop in igl.boundary_loop_all(mesh.faces)
     )
@@ -351,7 +347,8 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
         centre = mesh.vertices[loop].mean(axis=0, keepdims=True)
         mesh = TriangleMesh(np.concatenate([mesh.vertices, centre]), np.concatenate([mesh.faces, fan]))
     counts = {"holes_closed": small, "largest_hole_mm": max(sizes[:small], default=0.0), "medial_walls_capped_mm": wide}
-    return *(_with_caps(mesh, loops[small:]) if wide else (mesh, np.zeros(len(mesh.faces), dtype=bool))), counts
+    mesh, is_cap = _with_caps(mesh, loops[small:]) if wide else (mesh, np.zeros(len(mesh.faces), dtype=bool))
+    return mesh, counts, is_cap
 
 
 def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:

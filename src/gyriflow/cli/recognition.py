@@ -80,7 +80,7 @@ class FoundBrain:
 
     @property
     def files(self) -> str:
-        """Its files."""
+        """Its files, separated by commas."""
         source = self.entry.get("labels") or self.entry.get("pial") or self.entry.get("hemisphere", {}).get("file")
         return str(source or ", ".join(self.entry["hemispheres"].values()))
 

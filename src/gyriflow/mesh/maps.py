@@ -42,12 +42,9 @@ def vertex_map_on_mesh(
     far = float(np.quantile(distance, QUANTILE))
     log.info("the surface of %s is %.2f mm from the mesh's (median; 95 %%: %.2f mm)", path, np.median(distance), far)
     if far > FARTHEST_MM:
-        raise InputError(
-            "the surface of a map lies far from that of the start brain's mesh",
-            path=path,
-            found=f"{far:.1f} mm for a twentieth of the mesh's surface, {np.median(distance):.1f} mm for half of it",
-            expected=f"at most {FARTHEST_MM:g} mm",
-        )
+        problem = "the surface of a map lies far from that of the start brain's mesh"
+        found = f"{far:.1f} mm for a twentieth of the mesh's surface, {np.median(distance):.1f} mm for half of it"
+        raise InputError(problem, path=path, found=found, expected=f"at most {FARTHEST_MM:g} mm")
     on_pial = np.einsum("ij,ij->i", barycentric(nearest, corners(surface)[faces]), values[surface.faces[faces]])
     mapped = on_pial[_nearest_vertices(mesh_vertices_mm, points)]
     mapped[pial] = on_pial
@@ -68,12 +65,8 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
     outside = np.linalg.norm((index - covered) @ matrix[:3, :3].T, axis=1)
     expected = f"values at all {len(index)} vertices of the start brain's mesh"
     if (outside > 0).any():
-        raise InputError(
-            "a map's volume does not cover the start brain",
-            path=path,
-            found=f"{int((outside > 0).sum())} vertices outside it, by up to {outside.max():.1f} mm",
-            expected=expected,
-        )
+        found = f"{int((outside > 0).sum())} vertices outside it, by up to {outside.max():.1f} mm"
+        raise InputError("a map's volume does not cover the start brain", path=path, found=found, expected=expected)
     values = map_coordinates(data, index.T, order=1, mode="nearest")
     undefined = ~np.isfinite(values)
     if undefined.any():
@@ -94,12 +87,9 @@ def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> No
     outside = ~np.logical_and.reduce([holds[name](values, bound) for name, bound in bounds.items()])
     if outside.any():
         wrong = values[outside]
-        raise InputError(
-            "holds values that the parameter cannot have",
-            path=path,
-            found=f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to {wrong.max():g}",
-            expected=" and ".join(f"{signs[name]} {bound:g}" for name, bound in bounds.items()),
-        )
+        found = f"{len(wrong)} of {len(values)} vertices, from {wrong.min():g} to {wrong.max():g}"
+        expected = " and ".join(f"{signs[name]} {bound:g}" for name, bound in bounds.items())
+        raise InputError("holds values that the parameter cannot have", path=path, found=found, expected=expected)
 
 
 def move_to_mesh(points: Floats, surface: TriangleMesh, pose: ArrayLike) -> TriangleMesh:

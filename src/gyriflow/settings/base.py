@@ -176,10 +176,7 @@ def folder_of(path: Path) -> Path:
 
 
 def absent_content(path: Path, start: bytes = b"") -> str:
-    """Return how to get the content of a file of git-annex or Git LFS that is not here: a broken link or a pointer.
-
-    Return "" for other files. A pointer is recognised by the `start` of the file.
-    """
+    """Return how to get the content of a broken link of git-annex or of a pointer with this `start`, or ""."""
     if start.startswith(b"version https://git-lfs.github.com"):
         return f"its content is not here (Git LFS). Get it with `git lfs pull --include {path}`"
     is_broken = path.is_symlink() and not path.exists() and "annex/objects" in path.readlink().as_posix()

@@ -113,9 +113,9 @@ def read_table_of_scans(path: Path) -> Table:
     for number, values in enumerate(texts, start=2):
         name = values[ids] if ids is not None else empty.subject or ""
         label = values[session] if session is not None else ""
-        label_or_none = None if label in MISSING_VALUES else label.removeprefix("ses-")
-        texts_by_column = {key: text for key, text in values.items() if key not in (ids, session)}
-        rows.append(Row(f"{path.name} row {number}", name, label_or_none, texts_by_column))
+        own_session = None if label in MISSING_VALUES else label.removeprefix("ses-")
+        further = {key: text for key, text in values.items() if key not in (ids, session)}
+        rows.append(Row(f"{path.name} row {number}", name, own_session, further))
     common = path.stem.rpartition("_")[2] + ".json"
     sidecars = (path.with_suffix(".json"), path.parent / common, path.parent.parent / common)
     sidecar: Any = next((read_json(place) for place in sidecars if os.path.lexists(place)), {})

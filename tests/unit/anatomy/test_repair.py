@@ -35,7 +35,7 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
 def test_small_hole_is_closed_and_reported():
     whole = ball()
     near = np.linalg.norm(whole.vertices[whole.faces].mean(axis=1) - [0, 0, RADIUS], axis=1) < 1.2
-    mesh, report = clean(submesh(whole, ~near)[0], 3.0)
+    mesh, report, _ = clean(submesh(whole, ~near)[0], 3.0)
     assert is_closed(mesh)
     assert report["holes_closed"] == 1
     assert 1.5 < report["largest_hole_mm"] < 3.0
@@ -114,7 +114,7 @@ SOME_TURNED = np.concatenate([WHOLE.faces[:100], WHOLE.faces[100:300, ::-1], WHO
     ids=["all inside out", "some inside out", "separate triangles", "degenerate and double faces", "a fin"],
 )
 def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, counts):
-    mesh, report = clean(TriangleMesh(vertices, faces), 3.0)
+    mesh, report, _ = clean(TriangleMesh(vertices, faces), 3.0)
     assert is_closed(mesh)
     assert signed_volume(mesh) == pytest.approx(signed_volume(WHOLE), rel=1e-6)
     assert (len(mesh.vertices), len(mesh.faces)) == (len(WHOLE.vertices), COUNT)
@@ -123,7 +123,7 @@ def test_what_is_wrong_with_triangles_is_repaired_and_counted(vertices, faces, c
 
 @pytest.mark.fault(21)
 def test_crumbs_and_inner_pieces_are_dropped_hemispheres_kept():
-    mesh, report = clean(
+    mesh, report, _ = clean(
         merged(ball((-11, 0, 0)), ball((11, 0, 0), 9.5), ball((0, 30, 0), 1.0), flipped(ball((-11, 0, 0), 7.0))), 3.0
     )
     assert (report["pieces"], report["pieces_dropped"]) == (2, 2)
@@ -150,7 +150,7 @@ def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
         # as readers of STL join them
         vertices, places = np.unique(both.vertices.round(9), axis=0, return_inverse=True)
         both = TriangleMesh(vertices, places[both.faces])
-    mesh, report = clean(flipped(both) if kind == "all inside out" else both, 3.0)
+    mesh, report, _ = clean(flipped(both) if kind == "all inside out" else both, 3.0)
     assert is_closed(mesh)
     assert [euler_number(piece) for piece in pieces(mesh)] == [2, 2]
     assert [signed_volume(piece) for piece in pieces(mesh)] == pytest.approx([3200.0, 3200.0])
@@ -158,7 +158,7 @@ def test_closed_pieces_that_share_a_wall_are_separated(shared, kind):
 
 
 def test_a_surface_with_every_face_in_both_directions_is_one():
-    mesh, report = clean(merged(WHOLE, flipped(WHOLE)), 3.0)
+    mesh, report, _ = clean(merged(WHOLE, flipped(WHOLE)), 3.0)
     assert (len(pieces(mesh)), report["double_faces_removed"]) == (1, COUNT)
     assert area(mesh) == pytest.approx(area(WHOLE))
 
@@ -188,7 +188,7 @@ def test_overlapping_balls_are_made_one_surface():
 
 @pytest.mark.fault(21)
 def test_handle_of_a_torus_is_closed_when_remade():
-    mesh, _ = clean(torus(10.0, 7.5, 60, 40), 3.0)
+    mesh, _, _ = clean(torus(10.0, 7.5, 60, 40), 3.0)
     assert euler_number(mesh) == 0
     simple, report = rebuild(remesh(mesh, 1.0), 0.8)
     assert euler_number(simple) == 2
