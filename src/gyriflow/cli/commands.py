@@ -17,7 +17,7 @@ from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED
 
 if TYPE_CHECKING:
-    from .recognition import Recognised
+    from .recognition import FoundScans
 
 LEVELS = ("participant", "group")
 BIDS_LEVELS = [[level] for level in LEVELS]
@@ -147,7 +147,7 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
     sys.exit(_show_scans(found))
 
 
-def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any) -> "Recognised":
+def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any) -> "FoundScans":
     from .recognition import recognise, scheme_reasons
 
     notation: Any = {None: None, True: "decimal", False: "days"}[decimal_weeks]
@@ -157,7 +157,7 @@ def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, *
     return found
 
 
-def _show_scans(found: "Recognised", verdicts: dict[str, tuple[str, str]] | None = None) -> int:
+def _show_scans(found: "FoundScans", verdicts: dict[str, tuple[str, str]] | None = None) -> int:
     """Print the table of scans and the unused files; return the exit code."""
     from .scans import found_rows, scan_lines
 

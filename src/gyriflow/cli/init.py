@@ -16,7 +16,7 @@ from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
 from ..study.loading import FOLDING_SECTIONS, load
 from ..study.series import unmatched_reason
-from .recognition import UNSET, FoundBrain, Recognised, recognise_labels
+from .recognition import UNSET, FoundBrain, FoundScans, recognise_labels
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -49,7 +49,7 @@ QUICK: dict[str, Any] = {
 
 
 def write_configuration(
-    found: Recognised, folder: Path, path: Path, *, force: bool = False, only_measured: bool = False
+    found: FoundScans, folder: Path, path: Path, *, force: bool = False, only_measured: bool = False
 ) -> None:
     """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
 
@@ -150,7 +150,7 @@ def store_options(path: Path, options: dict[str, Any]) -> None:
 
 
 def write_bids(
-    found: Recognised, folder: Path, path: Path, *, settings: str | None = None, fold: bool | None = None
+    found: FoundScans, folder: Path, path: Path, *, settings: str | None = None, fold: bool | None = None
 ) -> list[str]:
     """Write a configuration for the scans of a BIDS data set that can be used; return their ids.
 

@@ -86,7 +86,7 @@ class FoundBrain:
 
 
 @dataclass
-class Recognised:
+class FoundScans:
     """The scans of a folder, the youngest first, and files that are not used, with the reasons."""
 
     brains: list[FoundBrain]
@@ -129,7 +129,7 @@ def recognise(
     notation: WeekNotation | None = None,
     participants: Collection[str] | None = None,
     sessions: Collection[str] | None = None,
-) -> Recognised:
+) -> FoundScans:
     """Return the scans of a folder and of those in it, from files whose paths match a pattern.
 
     Results and data sets of gyriflow itself are left out. If a `scheme` is named, all labels are of it. If
@@ -179,7 +179,7 @@ def recognise(
     _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     brains.sort(key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
-    return Recognised(brains, unused)
+    return FoundScans(brains, unused)
 
 
 def _is_own(description: Path) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..io.files import read_table
-from .recognition import UNSET, Recognised
+from .recognition import UNSET, FoundScans
 
 HEADINGS = ("scan", "age", "from", "data", "scheme", "verdict")
 UNUSABLE = {"not read": "could not be read", "refused": "cannot be used", "fill in": "to fill in"}
@@ -51,7 +51,7 @@ def measured_verdicts(directory: Path) -> dict[str, tuple[str, str]]:
     return {str(row["subject"]): (str(row["verdict"]), str(row.get("cause", ""))) for _, row in table.iterrows()}
 
 
-def found_rows(found: Recognised, verdicts: Mapping[str, tuple[str, str]]) -> Iterator[ScanRow]:
+def found_rows(found: FoundScans, verdicts: Mapping[str, tuple[str, str]]) -> Iterator[ScanRow]:
     """Yield the rows of recognised scans; `verdicts` has verdict and cause of those that were run, by id."""
     for brain in found.brains:
         week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
