@@ -36,8 +36,10 @@ def remesh(
     Edges at which faces meet at more than `sharp_deg` are kept.
     """
     document = in_meshlab(mesh)
+    length = pymeshlab.PureValue(edge_length_mm)
+    # MeshLab remembers `selectedonly` of an earlier call
     document.meshing_isotropic_explicit_remeshing(
-        iterations=rounds, targetlen=pymeshlab.PureValue(edge_length_mm), featuredeg=sharp_deg, checksurfdist=False
+        iterations=rounds, targetlen=length, featuredeg=sharp_deg, checksurfdist=False, selectedonly=False
     )
     return from_meshlab(document)
 
