@@ -26,7 +26,9 @@ def dangers(source):
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else [name.name for name in node.names]
-            found += [module for module in modules if module.split(".")[0] in UNPICKLING]
+            names = {name.name for name in node.names}
+            unpickles = names != {"cpu_count"}
+            found += [module for module in modules if module.split(".")[0] in UNPICKLING and unpickles]
         elif isinstance(node, ast.Call):
             called = ast.unparse(node.func)
             given = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}

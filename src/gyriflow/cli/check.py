@@ -33,6 +33,7 @@ from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
 from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
+from .init import commented_scans
 from .recognition import scheme_fits
 from .scans import ScanRow, scan_lines
 
@@ -75,6 +76,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     if valid:
         yield "  input files: all are readable and fit their label schemes", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
+    yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
 

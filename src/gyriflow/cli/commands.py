@@ -144,7 +144,7 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
     found = _recognise(folder, **selection)
     write_configuration(found, folder, path, force=force)
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
-    sys.exit(_show_scans(found))
+    sys.exit(_show_scans(found, may_fill_in=True))
 
 
 def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, **selection: Any) -> "FoundScans":
@@ -157,15 +157,18 @@ def _recognise(folder: Path, *, decimal_weeks: bool | None, files: str | None, *
     return found
 
 
-def _show_scans(found: "FoundScans", verdicts: dict[str, tuple[str, str]] | None = None) -> int:
-    """Print the table of scans and the unused files; return the exit code."""
+def _show_scans(
+    found: "FoundScans", verdicts: dict[str, tuple[str, str]] | None = None, *, may_fill_in: bool = False
+) -> int:
+    """Print the table of scans and the unused files; return the exit code, 0 if values `may_fill_in` only."""
     from .scans import found_rows, scan_lines
 
     for file, reason in found.unused.items():
         click.echo(f"not used: {file} ({reason})")
     for line in scan_lines(found_rows(found, verdicts or {})):
         click.echo(line)
-    return InputError.exit_code if any(brain.problem or brain.contradiction for brain in found.brains) else 0
+    causes = (brain.problem or brain.contradiction or (brain.notes and not may_fill_in) for brain in found.brains)
+    return InputError.exit_code if any(causes) else 0
 
 
 @main.command()
@@ -242,7 +245,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
     that of the first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
-    from .init import write_configuration
+    from .init import commented_scans, write_configuration
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
@@ -253,6 +256,10 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
             found = _recognise(data, **selection)
             write_configuration(found, data, config, only_measured=True)
             refused = _show_scans(found)
+        elif data.is_dir():
+            for line in commented_scans(config):
+                click.echo(f"not used, by {config}: {line}")
+                refused = InputError.exit_code
         code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")
     sys.exit(code or refused)
 

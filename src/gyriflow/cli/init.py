@@ -1,5 +1,6 @@
 """Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -77,6 +78,12 @@ def write_configuration(
     measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
     rest = "" if only_measured else REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
     write_text(path, HEAD + "".join(lines) + rest)
+
+
+def commented_scans(path: Path) -> list[str]:
+    """Return the scans that are comments in a configuration as of `write_configuration`: id and cause."""
+    lines = re.findall(r"^  # - \{id: ([^,]+),.*?\}  # (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return [f"{scan}: {cause}" for scan, cause in lines]
 
 
 def _causes(brains: Iterable[FoundBrain]) -> str:
@@ -163,11 +170,11 @@ def write_bids(
     found.brains = [brain for brain in found.brains if brain.entry["id"].startswith("sub-")]
     brains = [brain for brain in found.brains if not brain.causes]
     if not brains:
-        remedy = (
-            "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz', and labels with --scheme."
-        )
         causes = _causes(found.brains) or "no files named sub-…"
-        raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
+        choice = "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz'."
+        raise InputError(
+            "no scan can be used", path=folder, found=causes, remedy=choice if "keep one" in causes else None
+        )
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     followed = [scans for scans in _by_subject(brains).values() if len(_weeks(scans)) > 1]

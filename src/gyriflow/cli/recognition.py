@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
@@ -21,11 +21,11 @@ from ..settings.base import did_you_mean
 from ..settings.participants import WeekNotation
 from ..settings.terms import SIDES, Side
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
-from ..study.participants import TABLE_NAME, ScanTables, covariates
+from ..study.participants import TABLE_NAME, ScanTables, ambiguity_of, covariates, data_set_of
 
 LABEL_NAME = re.compile(r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE)
 SIDE_NAME = re.compile(
-    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=\.)L(?=\.))|(right|rh|hemi-R|(?<=\.)R(?=\.)))(?=[._-])", re.IGNORECASE
+    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=[._])L)|(right|rh|hemi-R|(?<=[._])R))(?=[._-])", re.IGNORECASE
 )
 LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
 NO_BRAIN_NAME = re.compile(
@@ -36,6 +36,7 @@ NO_BRAIN_NAME = re.compile(
 RESAMPLED_NAME = re.compile(r"[._-]?(?:(?:space-\w+?_)?den-\w+?|\d+k_fs_LR)(?=[._]|$)", re.IGNORECASE)
 SPACE_NAME = re.compile(r"(?<![A-Za-z0-9])space-([A-Za-z0-9]+)")
 NATIVE_SPACES = ("orig", "native", "individual", "subject", "anat", "scanner", "acpc", "t1w", "t2w")
+SIDE_FOLDER = re.compile(r"lh|rh|left|right|l|r|hemi-[lr]", re.IGNORECASE)
 TEMPLATE_FOLDER = re.compile(r"tpl-.*|MNINonLinear|fsaverage(?!_LR).*")
 GENERIC_FOLDER = re.compile(r"surf|mri|anat|labels?|seg|segmentation|native|t[12]w|derivatives", re.IGNORECASE)
 """Folders that do not name a subject."""
@@ -45,7 +46,7 @@ SUFFIXES = re.compile(
     rf"|{'|'.join(_SUFFIX_WORDS)})(?=[._-]|$)",
     re.IGNORECASE,
 )
-ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([A-Za-z0-9]+)")
+ENTITY = re.compile(r"(?<![A-Za-z0-9])(sub|ses)-([^_/.]+)")
 FREESURFER_INPUT = re.compile(r"\.T[12]$")
 """Suffix for the image that a surface was made with: lh.pial is often a link to lh.pial.T1."""
 RESAMPLED = "resampled"
@@ -61,7 +62,8 @@ class FoundBrain:
     """A recognised scan: its entry of `brains`, the source of its age, and reasons why it cannot be used.
 
     `problem` is about its files, `contradiction` about its age; `notes` are values to fill in. It `is_unreadable` if
-    files are damaged or missing. `fits` is the result of `scheme_fits` for its labels.
+    files are damaged or missing, `is_template` if its folder is that of a template. `fits` is the result of
+    `scheme_fits` for its labels.
     """
 
     entry: dict[str, Any]
@@ -72,6 +74,7 @@ class FoundBrain:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     fits: dict[str, str] | None = None
+    is_template: bool = False
 
     @property
     def causes(self) -> list[str]:
@@ -110,6 +113,13 @@ class _Candidate:
         return next(iter(self.labels(entity)), None)
 
     @property
+    def data_set(self) -> Path:
+        """The data set that a subject's folder is in."""
+        parts = self.file.parts
+        before = next((number for number, part in enumerate(parts) if part.startswith("sub-")), 0)
+        return data_set_of(Path(*parts[:before]))
+
+    @property
     def scan(self) -> str:
         subject, session = self.label("sub"), self.label("ses")
         if subject:
@@ -143,15 +153,15 @@ def recognise(
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
     found: dict[str, list[_Candidate]] = defaultdict(list)
-    sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
     for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)):
-        sessions_of[candidate.label("sub")].add(candidate.label("ses"))
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
+    # sessions without labels or surfaces count
+    sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
+    for candidate in (_Candidate(file, {}) for file in files):
+        sessions_of[candidate.label("sub")] |= {candidate.label("ses")} - {None}
     if not found:
-        expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
-        names = f"{len(files)} files" + "".join(f"\n  {file}" for file in files[:10]) + ("\n  …" * (len(files) > 10))
-        raise InputError("no brain was recognised", path=folder, found=names, expected=expected)
+        raise _no_brain(folder, {str(file): _rejection(file) for file in files})
     selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
     selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
     for entity, labels in selected.items():
@@ -162,24 +172,71 @@ def recognise(
             remedy = "Labels must be equal, with their zeros and case."
             raise InputError(problem, path=folder, found=names, remedy=remedy)
     unused: dict[str, str] = {}
-    brains = []
+    brains: list[FoundBrain] = []
     for name, group in found.items():
-        if any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
-            continue
-        preferred = _preferred_files(group, unused)
-        for number, candidate in enumerate(preferred, start=1):
-            brain = _found_brain(folder, candidate, tables, sessions_of, name if number == 1 else f"{name}-{number}")
-            brains.append(brain)
-            if len(preferred) > 1:
-                # several files of one scan do not make a series
-                brain.entry.pop("subject", None)
-                brain.notes.append(f"{len(preferred)} files are of {name}: keep one")
+        if not any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
+            brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
+    # templates beside subjects are no scans
+    if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (0, len(brains)):
+        unused |= {brain.files: brain.problem for brain in brains if brain.is_template}
+        brains = own_scans
     if not brains:
+        if unused:
+            raise _no_brain(folder, unused)
         raise InputError("has no scan of these participants in these sessions", path=folder)
+    named = [brain.age_source[len("name (") : -1] for brain in brains if brain.age_source.startswith("name (")]
+    by_name = "" if notation else ambiguity_of(named)
+    if ambiguity := tables.ambiguity or by_name:
+        raise InputError(ambiguity, path=folder)
     _refuse_equal_weeks(brains)
     choose_schemes([brain for brain in brains if brain.fits is not None], scheme)
     brains.sort(key=lambda brain: (brain.entry["week"] == UNSET, brain.entry["week"], brain.entry["id"]))
     return FoundScans(brains, unused)
+
+
+def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
+    expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
+    names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + ["\n  …"] * (len(reasons) > 10)
+    return InputError(
+        "no brain was recognised", path=folder, found=f"{len(reasons)} files{''.join(names)}\n", expected=expected
+    )
+
+
+def _rejection(file: Path) -> str:
+    name = file.name.lower()
+    if name.endswith(VOLUME_SUFFIXES):
+        return "its name has no label, seg, parcellation or tissue"
+    return "its name is not that of a pial surface" if name.endswith(SURFACE_SUFFIXES) else "not a volume or surface"
+
+
+def _brains_of_scan(
+    folder: Path,
+    name: str,
+    group: Sequence[_Candidate],
+    tables: ScanTables,
+    sessions_of: Mapping[str | None, set[str | None]],
+    unused: dict[str, str],
+) -> list[FoundBrain]:
+    """Return a brain for each file of a scan that may be used; of several, one must be kept. Add to the `unused`."""
+    brains = []
+    for candidate in _preferred_files(group, unused):
+        brain = _found_brain(folder, candidate, tables, sessions_of)
+        if brain.is_unreadable and "pial" in brain.entry and not LAYER_NAME.search(candidate.file.name):
+            unused[brain.files] = brain.problem
+        else:
+            brains.append(brain)
+    readable = [brain for brain in brains if not brain.is_unreadable]
+    data_sets = sorted({str(candidate.data_set) for candidate in group})
+    for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
+        brain.entry["id"] = name if number == 1 else f"{name}-{number}"
+        if len(brains) > 1:
+            # several files of one scan do not make a series
+            brain.entry.pop("subject", None)
+        if len(data_sets) > 1:
+            brain.problem = f"several data sets have this scan; found {', '.join(data_sets)}; run each by itself"
+        elif len(readable) > 1 and brain in readable:
+            brain.notes.append(f"{len(readable)} files are of {name}: keep one")
+    return brains
 
 
 def _is_own(description: Path) -> bool:
@@ -229,19 +286,25 @@ def _space(file: Path, *, is_surface: bool) -> str:
 
 def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
     surfaces: dict[tuple[str, str], dict[Side, Path]] = {}
-    files_of: dict[tuple[Path, str], dict[Side, Path]] = defaultdict(dict)
+    files_of: dict[str, dict[Side, Path]] = defaultdict(dict)
     existing = set(files)
     for file in files:
         if not (match := SIDE_NAME.search(file.name)):
             continue
         side: Side = "left" if match[1] else "right"
-        files_of[file.parent, SIDE_NAME.split(file.name)[0]].setdefault(side, file)
+        files_of[_Candidate(file, {}).scan].setdefault(side, file)
         name = FREESURFER_INPUT.sub("", file.name)
         layer = LAYER_NAME.search(name)
+        # GIFTI files may have other data than pial surfaces
+        is_pial = (
+            layer[1] if layer else not NO_BRAIN_NAME.search(name) and not name.lower().endswith((".gii", ".gii.gz"))
+        )
         is_double = name != file.name and file.with_name(name) in existing
-        if layer and name.lower().endswith(SURFACE_SUFFIXES) and not is_double:
-            rest = str(file.parent / LAYER_NAME.sub("", SIDE_NAME.sub("", name)))
-            surfaces.setdefault((rest, "pial" if layer[1] else "white"), {})[side] = file
+        if (layer or is_pial) and name.lower().endswith(SURFACE_SUFFIXES) and not is_double:
+            # sides may be in other folders or in another order of parts
+            folders = [part for part in file.parts[:-1] if not SIDE_FOLDER.fullmatch(part)]
+            parts = sorted(re.split(r"[._]+", LAYER_NAME.sub("", SIDE_NAME.sub("", name))))
+            surfaces.setdefault(("/".join([*folders, *parts]), "pial" if is_pial else "white"), {})[side] = file
     for (rest, kind), sides in surfaces.items():
         pair = {side: str(sides[side]) for side in SIDES if side in sides}
         first = next(iter(pair))
@@ -254,7 +317,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
             problem = "white surfaces alone; pial ones are needed"
         elif len(pair) == 1:
             source = {"hemisphere": {"file": str(file), "side": first}}
-            for side, sign in files_of[file.parent, SIDE_NAME.split(file.name)[0]].items():
+            for side, sign in files_of[_Candidate(file, {}).scan].items():
                 if side != first:
                     found = f"found {sign}; expected both sides, or no file of the {side} one"
                     problem = f"has no pial surface of the {side} hemisphere; {found}"
@@ -269,11 +332,11 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
     for file in files:
         name = file.name.lower()
         layer = LAYER_NAME.search(name)
-        has_no_side = not SIDE_NAME.search(name) and not NO_BRAIN_NAME.search(name)
         # GIFTI files may have other data than surfaces
-        is_surface = bool(layer and layer[1]) or not name.endswith((".gii", ".gii.gz"))
-        if name.endswith(SURFACE_SUFFIXES) and has_no_side and is_surface:
-            yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True))
+        is_surface = bool(layer) or not (NO_BRAIN_NAME.search(name) or name.endswith((".gii", ".gii.gz")))
+        if name.endswith(SURFACE_SUFFIXES) and is_surface and not SIDE_NAME.search(name):
+            problem = "a white surface alone; a pial one is needed" if layer and layer[2] else ""
+            yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
 
 
 def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
@@ -282,6 +345,9 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
     for file in volumes:
         if "_T2w." in file.name:
             images[file.parent].append(str(file))
+    for file in files:
+        if ENTITY.fullmatch(file.name):
+            yield _Candidate(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
@@ -289,7 +355,7 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
 
 
 def _found_brain(
-    folder: Path, candidate: _Candidate, tables: ScanTables, sessions_of: dict[str | None, set[str | None]], name: str
+    folder: Path, candidate: _Candidate, tables: ScanTables, sessions_of: Mapping[str | None, set[str | None]]
 ) -> FoundBrain:
     subject, session = candidate.label("sub"), candidate.label("ses")
     owners = _owners(candidate, tables) if subject is None else [subject]
@@ -300,12 +366,14 @@ def _found_brain(
         is_only_scan = subject is None or len(sessions_of[subject]) < 2
         facts = tables.facts(owners[0], session, is_only_scan, folder / candidate.file)
         cause = "" if facts or subject is None else _similar_ids(subject, tables)
-    age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(candidate.file.parts)
+    else:
+        cause = _similar_ids(candidate.scan, tables, only_similar=True)
+    age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(candidate.file.parts, tables.notation)
     if age.week is not None and named.week is not None and not _agree(age.week, named.week):
         age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
     elif age.week is None and not age.cause:
         age = named
-    entry = {"id": name, "week": UNSET if age.week is None else age.week}
+    entry: dict[str, Any] = {"id": candidate.scan, "week": UNSET if age.week is None else age.week}
     entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
     entry |= (covariates(facts.values) if facts else {}) | candidate.source
     brain = FoundBrain(entry, age.source, candidate.problem)
@@ -315,7 +383,10 @@ def _found_brain(
     labels = {entity: candidate.labels(entity) for entity in ("ses", "sub")}
     if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
         brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
+    elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in (*labels["sub"], *labels["ses"])):
+        brain.problem = f"has other characters than letters and digits in {candidate.scan}"
     elif candidate.space and candidate.space != RESAMPLED:
+        brain.is_template = any(TEMPLATE_FOLDER.fullmatch(part) for part in candidate.file.parts)
         brain.problem = f"is in the space {candidate.space}; expected the subject's own"
     elif candidate.space:
         brain.warnings.append("a surface on a template's mesh is used, since no native one was found")
@@ -361,12 +432,18 @@ def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
     return [max(in_name, key=len)] if in_name else in_folders
 
 
-def _similar_ids(subject: str, tables: ScanTables) -> str:
+def _similar_ids(subject: str, tables: ScanTables, *, only_similar: bool = False) -> str:
     """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
     ids = {row.subject: row.place for table in tables.tables for row in table.rows}
-    similar = [f"{name} ({ids[name]})" for name in ids if name.lower().lstrip("0") == subject.lower().lstrip("0")]
-    found = ", ".join(similar or [*list(ids)[:5], "…"])
-    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if ids else ""
+    similar = [f"{name} ({ids[name]})" for name in ids if _plain_id(name) == _plain_id(subject)]
+    found = ", ".join(similar or ([] if only_similar else [*list(ids)[:5], "…"]))
+    return (
+        f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if ids and found else ""
+    )
+
+
+def _plain_id(name: str) -> str:
+    return re.sub(r"(?<!\d)0+(?=\d)", "", name.lower())
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:

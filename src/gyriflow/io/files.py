@@ -156,6 +156,8 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     """
     with reading(path, "a table of text", remedy=None):
         text = Path(path).read_text(encoding="utf-8-sig")
+        if not text.strip():
+            raise InputError("is empty", path=path, expected="a heading and a row for each brain")
         separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
         lines = csv.reader(text.splitlines(keepends=True), delimiter=separator)
         head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]

@@ -282,8 +282,10 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     if values.dtype.kind == "f":
         require_finite(values.ravel(), path, "values", "voxels")
         errors = np.abs(values - np.rint(values))
-        if (broken := errors > MAX_LABEL_ERROR).any():
-            problem = f"contains values that differ by more than {MAX_LABEL_ERROR:g} from whole numbers, so not labels"
+        # small values of which nothing is left were divided by their slope
+        broken = (errors > MAX_LABEL_ERROR) | (not np.rint(values).any() and values != 0)
+        if broken.any():
+            problem = f"contains values that are not labels, whole numbers within {MAX_LABEL_ERROR:g}"
             broken_values = f"{np.count_nonzero(broken)} voxels, for example {values[broken][0]:.4g}"
             remedy = "Resample labels with nearest neighbour. gyriflow does not segment images."
             raise InputError(problem, path=path, found=broken_values, remedy=remedy)

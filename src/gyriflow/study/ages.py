@@ -8,39 +8,51 @@ from typing import Any, Literal
 from ..settings.participants import WeekNotation
 from ..settings.varying import WEEK_RANGE
 
-MISSING_VALUES = frozenset(("", "n/a"))
-"""Missing values in BIDS."""
-UNITS = {
-    **dict.fromkeys(("weeks", "week", "wks", "wk", "w", "gw", "gestational weeks"), "weeks"),
-    **dict.fromkeys(("days", "day", "d"), "days"),
-}
-UNIT_ENDING = re.compile(r"(?<=[a-z])_(?:in_)?(weeks?|wks?|w|days?|d|months?|mo|years?|yrs?|y)$")
-_AGE = r"(?:age|ga|pma|gestational_age|post_?menstrual_age)"
-_SCAN = r"(?:scan|mri|mr|imaging|acquisition|session|visit|exam)"
-AT_SCAN = re.compile(rf"{_SCAN}_{_AGE}|{_AGE}_(?:at_)?{_SCAN}|pma|post_?menstrual_age")
-GESTATIONAL = re.compile(r"gestational_age|gest_age|gestation|ga|gw|weeks?|gestational_weeks?")
-Kind = Literal["scan", "gestational", "age"]
-KINDS: dict[Kind, re.Pattern[str]] = {"scan": AT_SCAN, "gestational": GESTATIONAL, "age": re.compile("age")}
-"""Names of columns by the kind of their ages: at the scan, gestational, or plain."""
-OTHER_AGE = re.compile(
-    r".*(birth|delivery).*|(post_?natal|chronological|corrected|(?:post_?)?concept\w*)(?:_age)?|pna|pca"
+MISSING_VALUES = frozenset(("", "n/a", "na", "nan", "none", "null", "-"))
+"""Missing values, in lower case: those of BIDS and of R and Python."""
+WEEKS_UNIT = re.compile(r"((completed|gestational|post-?menstrual) )?(weeks?|wks?|w|gw)\b.*")
+DAYS_UNIT = re.compile(r"days?|d")
+UNIT_WORDS = frozenset(
+    ("week", "weeks", "wk", "wks", "w", "day", "days", "d", "month", "months", "mo", "year", "years")
 )
-"""Ages that are not gestational ages at the scan."""
-OTHER_REFERENCE = re.compile(r"birth|deliver|born|natal|chronolog|correct|concept", re.IGNORECASE)
+SCAN_WORDS = frozenset(
+    ("scan", "scanning", "mri", "mr", "imaging", "acquisition", "acq", "session", "visit", "exam", "examination")
+)
+AGE_WORDS = frozenset(("age", "ga", "pma", "gw", "gestational", "gestation", "gest", "week", "weeks"))
+OTHER_WORDS = frozenset(
+    ("postnatal", "chronological", "corrected", "conception", "postconception", "postconceptional", "pna", "pca")
+)
+"""Words in names of columns whose ages are no gestational ages at the scan."""
+PARENT_WORDS = frozenset(["mother", "maternal", "father", "paternal", "parental", "parent"])
+Kind = Literal["scan", "gestational", "age", "postnatal"]
+SINCE_BIRTH = (
+    r"(?<![a-z])(post|neo)[- ]?natal|chronolog|(since|after|from) (the )?(birth|delivery|term)|mother|maternal"
+)
+OTHER_TYPE = re.compile(
+    rf"{SINCE_BIRTH}|birth|born|deliver|\bdob\b|correct|concept|\bpna\b|\bpca\b|\bterm\b", re.IGNORECASE
+)
+"""References and types of ages that are not gestational ages at the scan."""
+OTHER_DESCRIPTION = {
+    "scan": re.compile(r"mother|maternal|(?<![a-z])(post|neo)[- ]?natal age|chronological age", re.IGNORECASE),
+    "gestational": re.compile(rf"{SINCE_BIRTH}|at (birth|delivery)", re.IGNORECASE),
+    "age": OTHER_TYPE,
+}
 EXPECTED_COLUMNS = "scan_age, gestational_age, ga, pma or week, or age with Units weeks or days in"
 EXPECTED_AGE = "the gestational age in weeks, such as 24.3, 24+2 or 24w2d"
-WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+([0-6])|w([0-6])d?)")
-NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
+WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+|w(?:eeks?|k)?)([0-6])(?:d(?:ays?)?|w(?:eeks?)?)?|(\d{2})\+?([0-6])/7")
+NUMBER = re.compile(r"(\d+(?:[.,]\d+)?)(?:gw|w(?:eeks?|ks?)?)?")
 TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 MIN_AMBIGUOUS_AGES = 3
 """Number of ages in tenths of a week with digits from 0 to 6 that is enough to suspect days."""
 MAX_DIFFERENCE_WEEKS = 0.1
 """Two ages of a scan agree if they differ by rounding."""
 WEEK_NAME = re.compile(
-    r"(?<![A-Za-z])(?:weeks?|wk|ga|gw)[-_]?(?P<age>\d{2}(?:\.\d+|\+[0-6]|w[0-6]d)?)(?!\d)(?=(?P<more>.*))",
+    r"(?<![A-Za-z])(?:weeks?|wk|ga|gw)[-_]?(?P<age>\d{2}(?:[.,]\d+|\+[0-6]|w[0-6]d?)?)(?!\d)(?=(?P<more>.*))",
     re.IGNORECASE,
 )
-AMBIGUOUS_ENDING = re.compile(r"[_+-]?[wdp]?\d+[dw]?(?![A-Za-z0-9])|[+-]\d", re.IGNORECASE)
+AMBIGUOUS_ENDING = re.compile(
+    r"(?!_\d+([._]\d+)?(mm|um|T)(?![a-z]))(?:[_+-]?(?:w|d|p|wk)?|\.+|to|and)\d+[dw]?(?![a-z0-9])|[+-]\d", re.IGNORECASE
+)
 """Text after the weeks in a name that may be days, a decimal or another week."""
 
 
@@ -80,73 +92,117 @@ class ScanAge:
 
 def column_key(name: str) -> str:
     """Return the name of a column in lower case, with _ between its words."""
-    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return re.sub(r"[^a-z0-9]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()).strip("_")
+
+
+def is_missing(text: str) -> bool:
+    """Return whether a cell has no value."""
+    return text.lower() in MISSING_VALUES
+
+
+def _kind(words: Sequence[str]) -> Kind | None:
+    """Return the kind of the ages in a column, from the words of its name."""
+    joined, some = "_".join(words), set(words)
+    if some & PARENT_WORDS or some & {"birth", "delivery", "born"}:
+        return None
+    if not (some & AGE_WORDS or "menstrual" in joined or some <= {"day", "days"}):
+        return "postnatal" if some & {"pna", "pca"} else None
+    if some & OTHER_WORDS or "post_natal" in joined or "post_concept" in joined:
+        return "postnatal"
+    if some & SCAN_WORDS or "pma" in some or "menstrual" in joined:
+        return "scan"
+    if some == {"age"}:
+        return "age"
+    return "gestational" if some <= AGE_WORDS | UNIT_WORDS and some - {"d", "w", "y", "mo"} else None
 
 
 def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[AgeColumn]:
     """Return the columns with ages of scans; `sidecar` is the content of the table's JSON file.
 
-    Ages at birth and ages since birth or conception are not ages of scans. If they are named like one, they have a
-    problem, otherwise they are not returned.
+    Ages at birth are not returned. Ages since birth or conception are `postnatal`, or have a problem if only the
+    sidecar says so.
     """
     keys = sidecar.items() if isinstance(sidecar, dict) else ()
-    described = {column_key(str(key)): value for key, value in keys if isinstance(value, dict)}
+    described = {column_key(str(key)): value for key, value in keys}
     columns = []
     for name in names:
-        key = column_key(name)
-        ending = UNIT_ENDING.search(key)
-        base = key[: ending.start()] if ending else key
-        if OTHER_AGE.fullmatch(base):
-            continue
-        for kind in (kind for kind, pattern in KINDS.items() if pattern.fullmatch(base)):
-            kind = "gestational" if kind == "age" and ending else kind
-            unit_and_problem = _unit(kind, ending[1] if ending else "", described.get(key, {}), sidecar_name)
-            columns.append(AgeColumn(name, kind, *unit_and_problem))
+        words = column_key(name).split("_")
+        if kind := _kind(words):
+            facts = described.get("_".join(words), {})
+            facts = facts if isinstance(facts, dict) else {"Description": facts}
+            ending = words[-1] if (len(words) > 1 and words[-1] in UNIT_WORDS) or words[-1].startswith("day") else ""
+            columns.append(AgeColumn(name, kind, *_unit(kind, ending, facts, sidecar_name)))
     return columns
 
 
-def _unit(kind: str, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str]:
-    unit = str(described.get("Units", "")).strip().lower()
-    names = [text for text in (ending, unit) if text]
-    units = {UNITS.get(text) for text in names} or {None if kind == "age" else "weeks"}
-    text = " ".join(str(described.get(key, "")) for key in ("LongName", "Description"))
-    reference = str(described.get("AgeReference", "")) or ("" if re.search("scan|MRI|imaging", text) else text)
+def _unit(kind: Kind, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str]:
+    facts = {column_key(key): str(value).strip() for key, value in described.items()}
+    text = f"{facts.get('long_name', facts.get('longname', ''))} {facts.get('description', '')}"
+    in_text = re.search(r"\b(months?|years?)\b", text, re.IGNORECASE)
+    named = [ending, facts.get("units", facts.get("unit", "")), in_text[0] if in_text else ""]
+    names = [name for name in named if name]
+    units = {unit_of(name) for name in names} or {None if kind == "age" else "weeks"}
+    reference = facts.get("age_reference", facts.get("agereference", ""))
     if len(units) > 1 or None in units:
         found = f"found the unit {' and '.join(names)}" if names else "has no unit"
         return "weeks", f"{found}; expected Units weeks or days in {sidecar_name}"
-    if OTHER_REFERENCE.search(reference):
-        return "weeks", f"is not a gestational age at the scan: {sidecar_name} has {reference.strip()!r}"
+    is_other = kind in OTHER_DESCRIPTION and OTHER_DESCRIPTION[kind].search(text) and "plus" not in text
+    if is_other or OTHER_TYPE.search(reference):
+        found = reference or text.strip()
+        return "weeks", f"is not a gestational age at the scan: {sidecar_name} has {found!r}"
     return str(units.pop()), ""
 
 
-def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None) -> ScanAge:
-    """Return the age of a scan from all its ages in tables.
+def unit_of(name: str) -> str | None:
+    """Return the unit with a name, weeks or days, or None."""
+    name = name.lower().strip(" .")
+    return "weeks" if WEEKS_UNIT.fullmatch(name) else "days" if DAYS_UNIT.fullmatch(name) else None
 
-    Ages at the scan take precedence, since the table's gestational age is then the one at birth; next are ages of the
-    scan's session. If all are missing, or if two differ, the age is None, with the cause.
+
+def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None, marks: Sequence[TableAge] = ()) -> ScanAge:
+    """Return the age of a scan from all its ages in tables; `marks` are ages at the scan of other scans.
+
+    Ages at the scan take precedence, since a gestational age beside them is the one at birth, also if they are missing
+    or given for other scans only; next are ages of the scan's session. If all are missing, or if two differ, the age is
+    None, with the cause.
     """
-    ages = [age for age in ages if age.text not in MISSING_VALUES]
-    used = [age for age in ages if not age.is_shared]
-    if not used:
-        return ScanAge(None)
-    at_scan = [age for age in used if age.column.kind == "scan"]
-    used = at_scan or [age for age in used if age.has_session] or used
-    # a plain age may be the mother's
+    present = [age for age in ages if not is_missing(age.text)]
+    own = [age for age in present if not age.is_shared]
+    at_scan = [age for age in own if age.column.kind == "scan"]
+    # next those of the session; a plain age may be the mother's
+    used = [age for age in own if age.column.kind != "postnatal"]
+    used = [age for age in used if age.has_session] or used
     used = at_scan or [age for age in used if age.column.kind == "gestational"] or used
+    if not used:
+        found = " and ".join(f"{age.column.name} {age.text} ({age.place})" for age in own)
+        return ScanAge(None, cause=f"found {found}; expected the age at the scan, such as scan_age" if own else "")
+    later = [age for age in ages if _shows_birth(age) and age not in used] or marks
+    if not at_scan and later and not any(age.column.problem for age in used):
+        found = " and ".join(f"{age.column.name} {age.text or 'n/a'} ({age.place})" for age in (*used, *later))
+        cause = f"found {found}: the gestational age is probably at birth; expected the age at the scan as scan_age"
+        return ScanAge(None, cause=cause)
+    days = [age for age in used if age.column.unit == "days" and age.text in "0123456"]
+    wholes = [age for age in used if age not in days]
     weeks = []
-    for age in used:
+    for age in wholes if days and all(age.text.isdigit() for age in wholes) else used:
         week, problem = read_week(age.text, age.column.unit, notation)
         if problem := age.column.problem or problem:
             return ScanAge(None, cause=f"{age.column.name}: {problem} ({age.place})")
-        weeks.append(week or 0.0)
+        weeks.append((week or 0.0) + (int(days[0].text) / 7 if days else 0.0))
     if max(weeks) - min(weeks) > MAX_DIFFERENCE_WEEKS:
         values = " and ".join(f"{age.text} ({age.place}, {age.column.name})" for age in used)
         remedy = " Give each scan a row with its session_id." if len({age.place for age in used}) > 1 else ""
         return ScanAge(None, cause=f"found two ages, {values}; expected one.{remedy}")
-    at_birth = [f"{age.column.name} {age.text}" for age in ages if at_scan and age.column.kind == "gestational"]
+    at_birth = [f"{age.column.name} {age.text}" for age in present if at_scan and age.column.kind == "gestational"]
     source = f"{used[0].place.partition(' row')[0]}, {used[0].column.name}"
     source += f" ({', '.join(dict.fromkeys(at_birth))} is at birth)" if at_birth else ""
-    return ScanAge(weeks[0], source, columns=frozenset(age.column.name for age in used))
+    return ScanAge(round(weeks[0], 2), source, columns=frozenset(age.column.name for age in used))
+
+
+def _shows_birth(age: TableAge) -> bool:
+    """Return whether an age shows that a gestational one beside it is at birth: one at the scan, or since birth."""
+    is_since_birth = age.column.kind == "postnatal" or "not a gestational age" in age.column.problem
+    return age.column.kind == "scan" or (is_since_birth and not is_missing(age.text))
 
 
 def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = None) -> tuple[float | None, str]:
@@ -154,15 +210,16 @@ def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = No
 
     By `notation`, 24.3 is a decimal (default), or 24 weeks and 3 days.
     """
-    tenths = TENTHS.fullmatch(text)
-    if whole := WEEKS_AND_DAYS.fullmatch(text):
-        week = int(whole[1]) + int(whole[2] or whole[3]) / 7
-    elif notation == "days" and unit == "weeks" and NUMBER.fullmatch(text) and not text.isdigit():
+    plain = re.sub(r"\s", "", text.lower())
+    tenths, number = TENTHS.fullmatch(plain), NUMBER.fullmatch(plain)
+    if whole := WEEKS_AND_DAYS.fullmatch(plain):
+        week = int(whole[1] or whole[3]) + int(whole[2] or whole[4]) / 7
+    elif number and notation == "days" and unit == "weeks" and not number[1].isdigit():
         if tenths is None or int(tenths[1]) > 6:
             return None, f"found {text}; expected weeks and 0 to 6 days, such as 24.3"
-        week = int(text[:2]) + int(tenths[1]) / 7
-    elif NUMBER.fullmatch(text):
-        week = float(text.replace(",", ".")) / (7 if unit == "days" else 1)
+        week = int(plain[:2]) + int(tenths[1]) / 7
+    elif number:
+        week = float(number[1].replace(",", ".")) / (7 if unit == "days" else 1)
     else:
         return None, f"found {text or 'n/a'}; expected {EXPECTED_AGE}"
     if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
@@ -174,21 +231,27 @@ def may_be_days(texts: Iterable[str]) -> list[str]:
     """Return examples if the decimals of all ages in weeks may be days: tenths from 0 to 6, not only halves."""
     decimals = [(text, TENTHS.fullmatch(text)) for text in texts if re.search("[.,]", text)]
     tenths = [(text, match[1]) for text, match in decimals if match and match[1] in "0123456"]
-    several = len({digit for _, digit in tenths} - {"0"}) > 1
-    return [text for text, _ in tenths[:3]] if len(decimals) == len(tenths) >= MIN_AMBIGUOUS_AGES and several else []
+    are_halves = {digit for _, digit in tenths} <= {"0", "5"}
+    is_ambiguous = len(decimals) == len(tenths) >= MIN_AMBIGUOUS_AGES and not are_halves
+    return [text for text, _ in tenths[:3]] if is_ambiguous else []
 
 
-def week_in_name(parts: Sequence[str]) -> ScanAge:
-    """Return the age that a file's name or else its folders give, such as week24, GA24.3, week24+3 or GA24w3d."""
+def week_in_name(parts: Sequence[str], notation: WeekNotation | None = None) -> ScanAge:
+    """Return the age that the names of a file and its folders give, such as week24, GA24.3, week24+3 or GA24w3d."""
+    found: dict[str, tuple[float | None, str]] = {}
+    unclear = ""
     for part in reversed(parts):
-        matches = list(WEEK_NAME.finditer(part))
-        for match in matches:
+        for match in WEEK_NAME.finditer(part):
             if ending := AMBIGUOUS_ENDING.match(match["more"]):
-                found = f"found {match[0]}{ending[0]}; expected one such as week24.4 or week24+3"
-                return ScanAge(None, cause=f"the name gives an ambiguous age: {found}")
-        weeks = {match["age"]: read_week(match["age"].lower()) for match in matches}
-        if len({week for week, _ in weeks.values()}) > 1:
-            return ScanAge(None, cause=f"the name gives two ages: found {' and '.join(weeks)}; expected one")
-        for text, (week, problem) in weeks.items():
-            return ScanAge(week, f"name ({text})", f"the name: {problem}" if problem else "")
+                # folders may be of several weeks
+                unclear = unclear or ("" if found else f"{match[0]}{ending[0]}")
+            else:
+                found.setdefault(match["age"], read_week(match["age"], notation=notation))
+    if unclear:
+        cause = f"the name gives an ambiguous age: found {unclear}; expected one such as week24.4 or week24+3"
+        return ScanAge(None, cause=cause)
+    if len({week for week, _ in found.values()}) > 1:
+        return ScanAge(None, cause=f"the names give several ages: found {' and '.join(found)}; expected one")
+    for text, (week, problem) in found.items():
+        return ScanAge(week, f"name ({text})", f"the name: {problem}" if problem else "")
     return ScanAge(None)

@@ -18,23 +18,33 @@ from ..settings.participants import ParticipantsSettings, WeekNotation
 from .ages import (
     EXPECTED_AGE,
     EXPECTED_COLUMNS,
-    MISSING_VALUES,
+    OTHER_TYPE,
     AgeColumn,
     ScanAge,
     TableAge,
     age_columns,
     choose_age,
     column_key,
+    is_missing,
     may_be_days,
+    unit_of,
 )
 
 IDS = ("participant_id", "id")
 """Possible names of the column of participants."""
-SESSIONS = ("session_id", "session", "ses", "visit", "visit_id", "session_label")
+SESSIONS = (
+    *("session_id", "session", "ses", "ses_id", "session_label", "session_number", "visit", "visit_id"),
+    *("visit_number", "timepoint", "time_point", "tp", "wave"),
+)
 """Possible names of the column of sessions; the first one of a table counts."""
-SUBJECT_FOLDER = re.compile(r"sub-[A-Za-z0-9]+")
-TABLE_NAME = re.compile(r"participants\.(tsv|csv)|(?:(sub-[A-Za-z0-9]+)_)?sessions\.(tsv|csv)", re.IGNORECASE)
-POSTNATAL = re.compile(r"birth|natal|chronolog|correct|concept|pna", re.IGNORECASE)
+SUBJECT_FOLDER = re.compile(r"sub-[^_/.]+")
+TABLE_NAME = re.compile(
+    r"participants\.(?:tsv|csv)|(?:(sub-[^_/.]+)_)?(?:(ses-[^_/.]+)_)?(?:sessions|(scans))\.(?:tsv|csv)", re.IGNORECASE
+)
+SHARED_FOLDERS = ("rawdata", "sourcedata", "derivatives", "phenotype")
+"""Folders of a data set whose tables apply to all of it."""
+AGE_TYPES = ("age_type", "age_reference", "type_of_age", "age_ref")
+AGE_UNITS = ("age_unit", "age_units", "unit_of_age")
 
 
 @dataclass(frozen=True)
@@ -69,11 +79,17 @@ class Table:
 
     def ages_in(self, row: Row) -> Iterator[TableAge]:
         """Yield the ages in one of its rows."""
-        kind = next((name for name in self.columns if column_key(name) == "age_type"), "")
-        is_postnatal = POSTNATAL.search(row.values.get(kind, ""))
+        kinds, units = (
+            [row.values[name] for name in self.columns if column_key(name) in names and name in row.values]
+            for names in (AGE_TYPES, AGE_UNITS)
+        )
         for column in self.ages:
-            if is_postnatal and column_key(column.name).startswith("age"):
-                column = replace(column, problem=f"is not a gestational age: {kind} is {row.values[kind]}")
+            if kinds and OTHER_TYPE.search(kinds[0]):
+                column = replace(column, problem=f"is not a gestational age: its type (age_type) is {kinds[0]}")
+            elif units and column_key(column.name) == "age":
+                unit = unit_of(units[0])
+                problem = "" if unit else f"found the unit {units[0]}; expected weeks or days"
+                column = replace(column, unit=unit or "weeks", problem=problem)
             yield TableAge(row.place, column, row.values[column.name], row.session is not None)
 
     @property
@@ -109,25 +125,44 @@ def read_table_of_scans(path: Path) -> Table:
         expected = " or ".join(IDS)
         raise InputError("has no column of ids", path=path, found=", ".join(columns), expected=expected)
     session = next((names[key] for key in SESSIONS if key in names), None)
+    common = path.stem.rpartition("_")[2].lower() + ".json"
+    folders = dict.fromkeys((path.parent, *(parent for parent in path.parents[1:3] if path.stem != common)))
+    beside = (file for folder in folders for file in sorted(folder.glob("*.[jJ][sS][oO][nN]")))
+    sidecar: Any = next(
+        (read_json(file) for file in beside if file.name.lower() in (f"{path.stem.lower()}.json", common)), {}
+    )
+    ages = age_columns(columns, sidecar, f"{path.stem}.json")
+    name_parts = TABLE_NAME.fullmatch(path.name)
+    is_of_scans = bool(name_parts and name_parts[3])
     rows = []
     for number, values in enumerate(texts, start=2):
         name = values[ids] if ids is not None else empty.subject or ""
-        label = values[session] if session is not None else ""
-        own_session = None if label in MISSING_VALUES else label.removeprefix("ses-")
+        if empty.subject not in (None, name.removeprefix("sub-")):
+            raise InputError("is named as of another subject", path=path, found=name, expected=f"sub-{empty.subject}")
+        label = values[session] if session is not None else (name_parts and name_parts[2]) or ""
+        own_session = None if is_missing(label) else label.removeprefix("ses-")
         further = {key: text for key, text in values.items() if key not in (ids, session)}
+        if is_of_scans:
+            # other columns are those of files
+            further = {column.name: values[column.name] for column in ages}
         rows.append(Row(f"{path.name} row {number}", name, own_session, further))
-    common = path.stem.rpartition("_")[2] + ".json"
-    sidecars = (path.with_suffix(".json"), path.parent / common, path.parent.parent / common)
-    sidecar: Any = next((read_json(place) for place in sidecars if os.path.lexists(place)), {})
-    ages = age_columns(columns, sidecar, f"{path.stem}.json")
     return replace(empty, rows=rows, columns=columns, ages=ages)
 
 
 def _empty_table(path: Path) -> Table:
-    name, folder = TABLE_NAME.fullmatch(path.name), SUBJECT_FOLDER.fullmatch(path.parent.name)
-    subject = name[2] if name and name[2] else folder[0] if folder else None
-    scope = path.parent.parent if folder else path.parent
-    return Table(path, scope, subject.removeprefix("sub-") if subject else None)
+    name = TABLE_NAME.fullmatch(path.name)
+    folders = [part for part in path.parent.parts if SUBJECT_FOLDER.fullmatch(part)]
+    subject = name[1] if name and name[1] else folders[-1] if folders else None
+    scope = path.parent
+    while folders and any(SUBJECT_FOLDER.fullmatch(part) for part in scope.parts[-3:]):
+        scope = scope.parent
+    return Table(path, data_set_of(scope), subject.removeprefix("sub-") if subject else None)
+
+
+def data_set_of(folder: Path) -> Path:
+    """Return the data set that a folder is of: the one around its raw data or derivatives."""
+    shared = [number for number, part in enumerate(folder.parts) if part.lower() in SHARED_FOLDERS]
+    return Path(*folder.parts[: shared[0]]) if shared else folder
 
 
 class ScanTables:
@@ -146,13 +181,16 @@ class ScanTables:
     def ambiguity(self) -> str:
         """The problem that all ages may be either decimals or weeks and days, or ""."""
         ages = [age for table in self.tables for row in table.rows for age in table.ages_in(row)]
-        kinds = {age.column.kind for age in ages}
-        first = "scan" if "scan" in kinds else "gestational" if "gestational" in kinds else "age"
+        kinds = [age.column.kind for age in ages if age.column.kind != "postnatal"]
+        first = min(kinds, key=["scan", "gestational", "age"].index, default="age")
         texts = [age.text for age in ages if age.column.kind == first and age.column.unit == "weeks"]
-        if self.notation is None and (examples := may_be_days(texts)):
-            choice = "--decimal-weeks or --weeks-days (in a configuration, participants.ages: decimal or days)"
-            return f"ages such as {', '.join(examples)} may be decimals, or weeks and days; choose {choice}"
-        return ""
+        return ambiguity_of(texts) if self.notation is None else ""
+
+    @cached_property
+    def ages_at_scans(self) -> list[TableAge]:
+        """The ages that are named as at a scan."""
+        ages = (age for table in self.tables for row in table.rows for age in table.ages_in(row))
+        return [age for age in ages if age.column.kind == "scan" and not is_missing(age.text)]
 
     def rows_of(self, subject: str, place: Path | None = None) -> list[tuple[Table, Row]]:
         """Return the rows of a subject, with their tables, in the tables that apply to a file (default: in all)."""
@@ -189,16 +227,22 @@ class ScanTables:
             is_shared = label != session and not is_only_scan
             ages += [replace(age, is_shared=is_shared) for table, row in rows_of_scan for age in table.ages_in(row)]
             values |= {key: text for _, row in rows_of_scan for key, text in row.values.items()}
-        age = choose_age(ages, self.notation)
+        age = choose_age(ages, self.notation, self.ages_at_scans[:1])
         # a table that cannot be read may have the age of exactly this scan
         is_certain = age.week is not None and any(age.has_session for age in ages)
         if unread := [table for table in unread if table.subject or not is_certain]:
             return _unknown(unread[0].problem)
         if age.week is None and not age.cause:
             return _unknown(_missing_age(own, ages, session, sessions))
-        if age.week is not None and self.ambiguity:
-            return _unknown(self.ambiguity)
         return ScanFacts(age, {key: text for key, text in values.items() if key not in age.columns})
+
+
+def ambiguity_of(texts: Iterable[str]) -> str:
+    """Return the problem that all of several ages may be either decimals or weeks and days, or ""."""
+    if examples := may_be_days(texts):
+        choice = "--decimal-weeks or --weeks-days (in a configuration, participants.ages: decimal or days)"
+        return f"ages such as {', '.join(examples)} may be decimals, or weeks and days; choose {choice}"
+    return ""
 
 
 def _unknown(cause: str) -> ScanFacts:
@@ -211,7 +255,7 @@ def _missing_age(
     if session is not None and sessions and session not in sessions:
         found = ", ".join(f"{row.session} ({row.place})" for _, row in own if row.session is not None)
         return f"no row of its session; found {found}; expected {session}"
-    for age in (age for age in ages if age.text not in MISSING_VALUES):
+    for age in (age for age in ages if not is_missing(age.text)):
         found = f"{age.column.name} {age.text} ({age.place})"
         expected = f"a row with session_id {session}" if session is not None else "a row for each, with session_id"
         return f"one age is given for several sessions; found {found}; expected {expected}"
@@ -268,6 +312,13 @@ def participants_brains(
             else:
                 entries.append(entry)
                 sources[scan] = facts.age.source
+    for entry in entries:
+        source = [entry["subject"], *(entry.get(key) for key in SOURCES)]
+        same = [each["id"] for each in entries if [each["subject"], *(each.get(key) for key in SOURCES)] == source]
+        if len(same) > 1:
+            cause = f"{path}: {entry['id']}: {' and '.join(same)} have the same files; expected files of each session"
+            left_out[entry["id"]] = {"week": entry["week"], "cause": cause}
+    entries = [entry for entry in entries if entry["id"] not in left_out]
     return entries, left_out, sources
 
 
@@ -293,7 +344,7 @@ def _difference(rows: Sequence[Row]) -> str:
 def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the key `covariates` of a scan's brain: the values of its tables without another meaning."""
     keys = {FILES, SIDE, *BRAIN_KEYS}
-    further = {key: text for key, text in values.items() if key not in keys and text not in MISSING_VALUES}
+    further = {key: text for key, text in values.items() if key not in keys and not is_missing(text)}
     return {"covariates": further} if further else {}
 
 
@@ -306,7 +357,7 @@ def _entry(
     }
     # after the table's columns, and without replacing them
     texts = {**facts.values, **added, **facts.values}
-    values = {key: text for key, text in texts.items() if text not in MISSING_VALUES}
+    values = {key: text for key, text in texts.items() if not is_missing(text)}
     entry: dict[str, Any] = {"id": scan, "week": facts.age.week, "subject": name, **covariates(values)}
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)

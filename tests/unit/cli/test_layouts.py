@@ -63,8 +63,7 @@ KEEP_ONE = Facts("2 files", "keep one")
           "labels": ["subjects/sub-01/mri/aseg.mgz", "subjects/sub-01/mri/aparc+aseg.mgz"],
           "tables": {f"subjects/{TABLE}": ["participant_id week", "sub-01 36", "sub-02 37"]}},
          {"sub-01": (36.0, "subjects/sub-01/surf/lh.pial, subjects/sub-01/surf/rh.pial", ""),
-          "sub-02": (37.0, "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1", ""),
-          "fsaverage": ("CHOOSE", Facts("fsaverage/surf/lh.pial"), Facts("of a template, fsaverage"))}),
+          "sub-02": (37.0, "subjects/sub-02/surf/lh.pial.T1, subjects/sub-02/surf/rh.pial.T1", "")}),
         # Infant FreeSurfer, without sub-
         ({"surfaces": [*both("case7/surf/@.pial"), *both("case8/surf/@.pial")], "labels": ["case7/mri/aseg.mgz"],
           "tables": {TABLE: ["participant_id week", "case7 36", "case8 37"]}},
@@ -135,8 +134,48 @@ def test_closed_surfaces_of_whole_brains_are_recognised(tmp_path):
     assert brains(tmp_path) == {
         "week25": (25.0, "week25.ply", ""),
         "24": ("CHOOSE", "24.stl", Facts("week")),
-        "nut": ("CHOOSE", "nut.stl", Facts("nut.stl", "mL", 15, 700)),
     }
+
+    assert recognise(tmp_path).unused == {"nut.stl": Facts("mL", 15, 700)}
+
+
+@pytest.mark.fault(81)
+@pytest.mark.parametrize(
+    "contents",
+    [
+        # sides in other folders, in another order of parts, as single letters
+        {"surfaces": ["sub-01/lh/lh.pial", "sub-01/rh/rh.pial"]},
+        {"surfaces": ["sub-01_run-1_hemi-L_pial.surf.gii", "sub-01_hemi-R_run-1_pial.surf.gii"]},
+        {"surfaces": ["sub-01_L.stl", "sub-01_R.stl"]},
+        # a torn file beside a good one, and a mesh of something else
+        {"labels": ["sub-01_dseg.nii.gz"], "text": {"sub-01_desc-x_dseg.nii.gz": "torn", "sub-01_placenta.stl": "x"}},
+    ],
+)
+def test_what_belongs_to_a_scan_is_found_and_nothing_else(tmp_path, contents):
+    first, *others = recognise(make_tree(tmp_path, **contents)).brains
+    assert (first.entry["id"], first.problem, len(others)) == ("sub-01", "", "text" in contents)
+    assert not [note for note in first.notes if "keep one" in note]
+    assert len(first.entry.get("hemispheres", ())) in (0, 2)
+
+
+@pytest.mark.fault(82)
+@pytest.mark.parametrize(
+    ("contents", "facts"),
+    [
+        ({"labels": ["siteA/sub-01_dseg.nii.gz", "siteB/sub-01_dseg.nii.gz"]}, [1, "siteA", "siteB"]),
+        ({"labels": ["sub-mü_dseg.nii.gz"]}, ["sub-mü"]),
+        ({"surfaces": ["sub-01/surf/lh.pial"], "text": {"sub-01/label/rh.aparc.annot": ""}}, ["rh.aparc.annot"]),
+    ],
+)
+def test_what_is_not_of_one_scan_is_refused(tmp_path, contents, facts):
+    assert all(brain.problem == Facts(*facts[-2:]) for brain in recognise(make_tree(tmp_path, **contents)).brains)
+
+
+@pytest.mark.fault(82)
+def test_links_to_folders_that_are_not_there_are_scans_that_cannot_be_read(tmp_path):
+    make_tree(tmp_path, labels=["sub-01_week24_dseg.nii.gz"])
+    (tmp_path / "sub-02").symlink_to("nowhere")
+    assert brains(tmp_path)["sub-02"] == ("CHOOSE", "sub-02", Facts("link"))
 
 
 def test_only_results_of_gyriflow_are_passed_over(tmp_path):

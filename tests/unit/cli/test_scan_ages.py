@@ -42,7 +42,7 @@ def tree(folder, labels, tables, sidecar=None):
         *(
             (f"participant_id gestational_age {column} | sub-01 33.1 29.4", {}, 29.4)
             for column in ("scan_age", "pma", "ga_at_scan", "age_at_mri", "PMA", "postmenstrual_age_at_scan",
-                           "scan_ga_weeks")
+                           "scan_ga_weeks", "week_at_scan", "AgeAtScan", "age_at_fetal_mri", "ga_first_scan")
         ),
         ("participant_id birth_age scan_age | sub-01 33.1 n/a", {}, Facts("scan_age", "n/a")),
         # postnatal ages
@@ -53,7 +53,24 @@ def tree(folder, labels, tables, sidecar=None):
         ("participant_id gestational_age | sub-01 39.4",
          {"gestational_age": {"Units": "weeks", "Description": "gestational age at birth"}}, Facts("at birth")),
         ("participant_id postnatal_age_weeks | sub-01 24", {}, Facts("postnatal_age_weeks", "scan_age")),
+        *((f"participant_id gestational_age {column} | sub-01 33.1 4", {}, Facts("gestational_age 33.1", f"{column} 4"))
+          for column in ("postnatal_age", "chronological_age_days", "pna")),
+        ("participant_id week age_reference | sub-01 24 DOB", {}, Facts("week", "DOB")),
+        ("participant_id week age_type | sub-01 24 prenatal", {}, 24.0),
+        ("participant_id ga | sub-01 39.4", {"ga": {"Description": "GA at birth, see scan_age for that at the scan"}},
+         Facts("at birth")),
+        ("participant_id pma | sub-01 39.4", {"pma": {"Description": "age at birth plus chronological age"}}, 39.4),
+        ("participant_id ga | sub-01 24.4", {"ga": {"Description": "antenatal age, corrected by ultrasound"}}, 24.4),
         # units
+        *(("participant_id ga | sub-01 24", {"ga": facts}, Facts("ga", "months"))
+          for facts in ({"units": "months"}, {"LongName": "GA (months)"}, "in months")),
+        ("participant_id ga | sub-01 24", {"ga": {"Units": "completed weeks"}}, 24.0),
+        ("participant_id age age_unit | sub-01 170 days", {}, 24.29),
+        ("participant_id ga days | sub-01 24 3", {}, 24.43),
+        *((f"participant_id ga | sub-01 {text}", {}, week) for text, week in (("24w", 24.0), ("24.3GW", 24.3),
+          ("24+3weeks", 24.43), ("24+3/7", 24.43), ("NaN", Facts("n/a")))),
+        ("participant_id Gestational-Weeks | sub-01 24", {}, 24.0),
+        ("participant_id timepoint ga | sub-01 2 24", {}, 24.0),
         ("participant_id gestational_age | sub-01 24", {"gestational_age": {"Units": "months"}},
          Facts("gestational_age", "months", SIDECAR)),
         ("participant_id age | sub-01 170", {"age": {"Units": "day"}}, 24.29),
@@ -105,8 +122,25 @@ def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(tmp_path, rows
          {SESSIONS: "session_id scan_age | 1 22", "sessions.tsv": "participant_id session_id scan_age | 01 1 28"},
          {"sub-01_ses-1": Facts(22, 28, "sub-01_sessions.tsv", "sessions.tsv")}),
         # formats
-        ([LONE], {"participants.csv": "participant_id;Gestational;Age | sub-01;24;x"},
-         {"sub-01": Facts("participants.csv")}),
+        ([LONE], {"participants.csv": "participant_id;Sex;Age | sub-01;F;24"}, {"sub-01": Facts("Age", "no unit")}),
+        # a data set that has ages at the scan has others at birth
+        (["sub-01_dseg.nii.gz", "sub-02_dseg.nii.gz"],
+         {TABLE: "participant_id ga scan_age | sub-01 33.1 29.4 | sub-02 35 n/a"},
+         {"sub-01": 29.4, "sub-02": Facts("ga 35", "scan_age")}),
+        (["sub-01/ses-1/sub-01_ses-1_dseg.nii.gz", "sub-02/sub-02_dseg.nii.gz"],
+         {TABLE: "participant_id ga | sub-01 33.1 | sub-02 39", SESSIONS: "session_id scan_age | 1 29.4"},
+         {"sub-01_ses-1": 29.4, "sub-02": Facts("ga 39", "scan_age")}),
+        # ids end where the next part begins
+        (["sub-01-A_dseg.nii.gz"], {TABLE: "participant_id ga | sub-01 22 | sub-01-A 28"}, {"sub-01-A": 28.0}),
+        (["case01_dseg.nii.gz"], {TABLE: "participant_id ga | case1 22"}, {"case01": Facts("case1", "row 2")}),
+        # tables of the same data set, wherever they lie
+        (["derivatives/seg/" + FIRST],
+         {TABLE: "participant_id ga | sub-01 33", "rawdata/" + SESSIONS: "session_id ga | 1 22"},
+         {"sub-01_ses-1": 22.0}),
+        ([FIRST], {TABLE: "participant_id ga | sub-01 33", "sub-01/ses-1/sub-01_ses-1_scans.tsv":
+                   "filename scan_age | anat/a.nii.gz 24 | anat/b.nii.gz 24"}, {"sub-01_ses-1": 24.0}),
+        ([FIRST], {TABLE: "participant_id ga | sub-01 33", SESSIONS: "participant_id session_id ga | sub-02 1 22"},
+         {"sub-01_ses-1": Facts("sub-02", "sub-01")}),
         # the name of the file and the table
         (["sub-01_GA-26_dseg.nii.gz"], {TABLE: "participant_id ga | sub-01 26.4"}, {"sub-01": 26.4}),
         (["sub-01_GA-26_dseg.nii.gz"], {TABLE: "participant_id ga | sub-01 28"},
@@ -122,7 +156,8 @@ def test_an_age_is_that_of_exactly_this_scan(tmp_path, labels, tables, expected)
     [
         ("week24+3", 24.43), ("GA24w3d", 24.43), ("ga-26.4", 26.4), ("week21_T2", 21.0), ("week24_1mm", 24.0),
         ("week24_5", Facts("week24_5")), ("week24-26", Facts("week24-26")), ("week24_ga26", Facts("24", "26")),
-        ("week99", Facts(99, 15, 45)),
+        ("week99", Facts(99, 15, 45)), ("GA24,3", 24.3), ("GA24w3", 24.43), ("week24to26", Facts("week24to26")),
+        ("week24_0.5mm", 24.0), ("week24_1_5T", 24.0), ("GA24/week26", Facts("24", "26")),
     ],
 )  # fmt: skip
 def test_names_give_ages_or_are_refused_as_ambiguous(tmp_path, name, age):
@@ -154,11 +189,19 @@ def test_decimals_that_may_be_days_are_asked_for_once(tmp_path):
     names = [f"sub-0{number}" for number in range(3)]
     rows = ["participant_id ga", *(" ".join(row) for row in zip(names, texts, strict=True))]
     make_tree(tmp_path, labels=[f"{name}_dseg.nii.gz" for name in names], tables={TABLE: rows})
-    assert ages(tmp_path) == dict.fromkeys(names, Facts("24.3", "--decimal-weeks", "--weeks-days"))
+    with pytest.raises(InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")):
+        ages(tmp_path)
     assert list(ages(tmp_path, notation="decimal").values()) == [24.3, 25.1, 26.6]
     assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
     (tmp_path / TABLE).write_text("participant_id\tga\nsub-00\t24.5\nsub-01\t25.0\nsub-02\t26.5\n")
     assert list(ages(tmp_path).values()) == [24.5, 25.0, 26.5]
+
+
+def test_decimals_in_names_that_may_be_days_are_asked_for_too(tmp_path):
+    make_tree(tmp_path, labels=[f"week{age}_dseg.nii.gz" for age in ("24.3", "25.1", "26.6")])
+    with pytest.raises(InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")):
+        ages(tmp_path)
+    assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
 
 
 def test_the_age_at_birth_is_said_beside_that_of_the_scan(tmp_path):

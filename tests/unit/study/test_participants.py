@@ -126,19 +126,25 @@ def test_an_age_has_its_unit_in_the_sidecar_or_is_refused_by_file_and_column(fol
     sidecar.write_text('{"age": {"Units": "years"}}')
     with pytest.raises(InputError, check=without_unit):
         config(folder)
-    write(folder, ("id", "week", "labels", "scheme"), ("sub-1", "24 weeks", "a.nii.gz", "feta-7"))
-    with pytest.raises(InputError, check=Facts("participants.tsv: sub-1: week:", "24 weeks")):
+    write(folder, ("id", "week", "labels", "scheme"), ("sub-1", "soon", "a.nii.gz", "feta-7"))
+    with pytest.raises(InputError, check=Facts("participants.tsv: sub-1: week:", "soon")):
         config(folder)
 
 
 @pytest.mark.fault(80)
 def test_ages_of_a_table_follow_the_rules_of_a_data_set(folder):
     head = ("participant_id", "visit", "gestational_age", "scan_age", "labels", "scheme")
-    rows = [("sub-1", visit, "33.1", age, "a.nii.gz", "feta-7") for visit, age in (("1", "22.3"), ("2", "28.1"))]
+    for number in (1, 2):
+        (folder / "bids" / f"{number}.nii.gz").touch()
+    visits = (("1", "22.3"), ("2", "28.1"))
+    rows = [("sub-1", visit, "33.1", age, f"{visit}.nii.gz", "feta-7") for visit, age in visits]
     write(folder, head, *rows)
     found = load(RAW | {"start": "first"}, folder)
     assert [(brain.id, brain.week) for brain in found.brains] == [("sub-1_ses-1", 22.3), ("sub-1_ses-2", 28.1)]
     assert found.age_sources["sub-1_ses-1"] == Facts("participants.tsv", "scan_age", "gestational_age", 33.1)
+    same = [(*row[:4], "a.nii.gz", row[-1]) for row in rows]
+    write(folder, head, *same)
+    assert refusal(RAW, folder) == Facts("sub-1_ses-1", "sub-1_ses-2", "same files")
     write(folder, head, *rows, ("sub-1", "1", "33.1", "22.8", "a.nii.gz", "feta-7"))
     assert refusal(RAW, folder) == Facts("sub-1_ses-1", "scan_age", 22.3, 22.8, "row 2", "row 4")
     write(folder, head, *rows, ("sub-2", "1", "33.1", "26.6", "a.nii.gz", "feta-7"))
