@@ -43,7 +43,7 @@ BY_TESTS = {
     "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],
     "study/test_studies.py": [("src/gyriflow/study/checks.py", '"logs", ', "")],
-    "study/test_participants.py": [("src/gyriflow/study/ages.py", "whole[3]) / 7", "whole[3]) / 10")],
+    "study/test_participants.py": [("src/gyriflow/study/ages.py", "whole[4]) / 7", "whole[4]) / 10")],
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
     "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "HORIZON_GW = 1.5", "HORIZON_GW = 0.5")],
