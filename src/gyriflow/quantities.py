@@ -4,6 +4,7 @@ Whatever measures, draws, tabulates or exports a quantity looks it up here by na
 Units are written as in the tables: "1/mm2" for mm⁻², "1" for none.
 """
 
+import re
 from dataclasses import dataclass
 
 
@@ -56,7 +57,13 @@ class Metric:
     has_norm: bool = True
     is_reported: bool = True
 
+    @property
+    def is_signed(self) -> bool:
+        """Whether it may be negative."""
+        return SIGNED_NAMES.fullmatch(self.name) is not None
 
+
+SIGNED_NAMES = re.compile(r"(white_)?mean_shape_index|mean_curvature(_q\d\d)?|distance|log_area|thickness_difference")
 POSITIVE_COLOURS, SIGNED_COLOURS = "YlGnBu", "RdBu_r"
 
 _BRAIN_MAPS = (

@@ -4,7 +4,7 @@ WITH_WHITE = [brain.id for brain in study.brains.values() if brain.has_white]
 LABELLED = [brain for brain in study.brains.values() if brain.labels]
 METRICS_TABLES = [
     *("metrics", "spectra", "metrics_long", "metrics_wide", "change", "asymmetry"),
-    *("norms", "norm_curves", "centiles", "spectral_distance"),
+    *("norm_curves", "centiles", "spectral_distance"),
     *(["regions"] if any(row.regions for row in PLACES) else []),
     *(["volumes", "published_centiles"] if LABELLED else []),
 ]
@@ -19,7 +19,10 @@ rule metrics_tables:
         # they contain the volumes of labels
         labelled=[brain.report for brain in LABELLED],
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
+        # norms of another study
+        cohort=[CONFIG.metrics.norms] if CONFIG.metrics.norms else [],
     output:
+        norms=f"{STUDY}/norms.json",
         **{name: f"{STUDY}/{name}.csv" for name in METRICS_TABLES},
     log:
         f"{STUDY}/logs/metrics_tables.log",
@@ -34,6 +37,7 @@ rule metrics_tables:
         reference=study.norm_reference,
         individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
+        norms_made_with=CONFIG.norms_made_with,
     script:
         "../scripts/metrics_tables.py"
 

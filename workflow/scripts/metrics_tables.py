@@ -2,14 +2,15 @@
 
 import pandas as pd
 
-from gyriflow.io.files import read_json, read_tables, write_table
+from gyriflow.io.files import read_json, read_tables, write_json, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.norms import (
     LabelledBrain,
-    measured_norms,
+    cohort_norms,
     measured_scores,
     norm_curves,
     published_norms,
+    read_cohort_norms,
     volume_tables,
 )
 from gyriflow.metrics.spangy import spectral_distances
@@ -21,15 +22,19 @@ with step(snakemake.log[0]):
     tables = {name: read_tables(files[name]) for name in ("metrics", "spectra", "regions") if files[name]}
     metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
+    reference, made_with = [] if files.cohort else params.reference, params.norms_made_with
+    if files.cohort:
+        cohort = read_cohort_norms(files.cohort[0], made_with)
+    else:
+        cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=made_with)
     parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
     tables |= {
         "metrics_long": (long := long_table([metrics, *regions])),
         "metrics_wide": wide_table(long, params.covariates),
         "change": change_between_scans(long, params.scans),
         "asymmetry": pd.concat(parts, ignore_index=True),
-        "norms": measured_norms(people, params.reference),
-        "norm_curves": norm_curves(people, params.reference, individuals=params.individuals),
-        "centiles": measured_scores(people, params.reference, individuals=params.individuals),
+        "norm_curves": norm_curves(cohort),
+        "centiles": measured_scores(people, reference, cohort),
         "spectral_distance": spectral_distances(tables["spectra"]),
     }
     if files.labelled:
@@ -38,5 +43,7 @@ with step(snakemake.log[0]):
         brains = [LabelledBrain(*brain, by_label) for brain, by_label in zip(params.labelled, volumes, strict=True)]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
+    write_json(snakemake.output.norms, cohort.plain)
     for name, path in snakemake.output.items():
-        write_table(path, tables[name])
+        if name in tables:
+            write_table(path, tables[name])

@@ -9,7 +9,7 @@ import pandas as pd
 from ..geometry.diffusion import diffuse
 from ..geometry.matching import match_surface, values_at
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas, vertex_normals
-from ..metrics.norms import measured_scores
+from ..metrics.norms import cohort_norms, measured_scores
 from ..metrics.regions import region_metrics
 from ..metrics.thickness import at_part
 from ..settings.terms import MEASURED
@@ -128,6 +128,6 @@ def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataF
         # scores are computed by hemisphere, so each region is passed as a hemisphere of its own
         parts = table["hemisphere"] + " " + table["region"].fillna("")
         rows, subjects = table.assign(run=MEASURED, hemisphere=parts), list(table["subject"])
-        scores = measured_scores(rows, subjects, individuals=individuals)
+        scores = measured_scores(rows, subjects, cohort_norms(rows, subjects, individuals=individuals))
         tables.append(table.reset_index(drop=True).join(scores[SCORES]))
     return pd.concat(tables, ignore_index=True)

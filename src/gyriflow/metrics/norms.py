@@ -1,8 +1,9 @@
 """Norms of published curves and of measured brains over gestational weeks, and the scores of brains against them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,28 +11,34 @@ from scipy import stats
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
+from ..io.files import AnyPath, read_json, reading
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
+from .lms import FEW_CENTILES, INTERVAL_Z, MIN_SUBJECTS, WeeklyNorm, fit_norm, norm_from
 from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
 
-MIN_BRAINS = 5
-"""Smallest number of subjects near a week for which quantiles are computed."""
-
-MIN_FREEDOM = 3
-"""Degrees of freedom below which the scatter around a curve is unknown."""
+MIN_AVERAGES = 5
+"""Smallest number of averages of an atlas that a curve is fitted to."""
 
 WINDOW_GW = 0.5
-"""Brains at most this far from a week are of that week."""
+"""Brains are scored at most this far before the norm's first week and after its last."""
+
+USUAL_Z = 1.5
+"""Subjects beyond this z are left out of their own norm by another fit, others by one step of one."""
 
 CURVE_POINTS = 41
 """Number of weeks at which a curve is given, from the reference's first to its last."""
 
 OTHER_SIDES = "other hemispheres"
 """The flag of a brain that has other hemispheres than those it would be compared with."""
+
+
+SCORES = (*("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag"),)
+EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -152,55 +159,141 @@ def volume_tables(
     return volumes, pd.concat(scores, ignore_index=True)
 
 
-def measured_norms(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.DataFrame:
-    """Return mean, standard deviation and quantiles of the metrics of reference brains at each of their weeks.
+@dataclass(frozen=True)
+class CohortNorms:
+    """The norms of a cohort by hemisphere and metric, with their units.
+
+    `made_with` are the settings that the numbers depend on.
+
+    Without `individuals`, as for averages of an atlas, the scatter is not that of individuals.
+    """
+
+    norms: Mapping[tuple[str, str], tuple[str, WeeklyNorm]]
+    individuals: bool = True
+    made_with: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        keys = ("hemisphere", "metric", "unit")
+        rows = [dict(zip(keys, (*name, unit), strict=True)) | norm.plain for name, (unit, norm) in self.norms.items()]
+        subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
+        method = "LMS (Cole and Green 1992); sex and site are ignored"
+        return {"subjects": subjects, "method": method, "made_with": dict(self.made_with), "norms": rows}
+
+
+def read_cohort_norms(path: AnyPath, made_with: Mapping[str, Any]) -> CohortNorms:
+    """Return the norms of a file that another study wrote; InputError if it was made with other settings."""
+    content = read_json(path)
+    with reading(path, "norms of a cohort", "the results/study/norms.json of a study", remedy=None):
+        rows = [dict(row) for row in content["norms"]]
+        norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from(row)) for row in rows}
+        given = dict(content["made_with"])
+    for key, own in made_with.items():
+        other = given.get(key)
+        # a study may have fewer label schemes than the cohort
+        if other != own and not (isinstance(own, list) and isinstance(other, list) and set(own) <= set(other)):
+            found, expected = f"{key}: {other}", f"{own}, as in this study"
+            raise InputError("has norms that were made with other settings", path=path, found=found, expected=expected)
+    return CohortNorms(norms, made_with=given)
+
+
+def cohort_norms(
+    metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True, made_with: Mapping[str, Any] = EMPTY
+) -> CohortNorms:
+    """Fit norms to the metrics of reference brains.
 
     `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person (the subject
-    scanned; may be absent if no one was scanned twice). `reference` are ids of brains. Columns of the result:
-    hemisphere, metric, unit, week, brains (number of persons with a scan at most half a week away; several scans of one
-    person are averaged), mean, sd (NaN for one person), q05, q25, q50, q75, q95 (NaN for fewer than five).
+    scanned; may be absent if no one was scanned twice). All scans of a subject together have the weight of one.
+    Individuals need at least `MIN_SUBJECTS` of them, averages five.
     """
-    rows = []
-    for names, brains in _by_metric(metrics, reference):
-        for week in np.unique(brains["week"]):
-            near = brains[(brains["week"] - week).abs() <= WINDOW_GW].groupby("person")["value"].mean()
-            sufficient = near if len(near) >= MIN_BRAINS else near.iloc[:0]
-            quantiles = sufficient.quantile(list(QUANTILES.values()))
-            rows.append((*names, brains["unit"].iloc[0], week, len(near), near.mean(), near.std(), *quantiles))
-    columns = ["hemisphere", "metric", "unit", "week", "brains", "mean", "sd", *QUANTILES]
-    return pd.DataFrame(rows, columns=columns)
+    norms = {}
+    for name, brains in _by_metric(metrics, reference):
+        if brains["person"].nunique() >= (MIN_SUBJECTS if individuals else MIN_AVERAGES):
+            norms[name] = (str(brains["unit"].iloc[0]), _fit(brains, name[1]))
+    return CohortNorms(norms, individuals, made_with)
 
 
-def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
-    """Return the scores of brains against the reference brains, at each brain's own week.
+def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
+    values = brains["value"].to_numpy(dtype=float)
+    is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
+    people = brains["person"].nunique()
+    return fit_norm(brains["week"].to_numpy(float), values, _weights(brains), people, is_positive=is_positive)
 
-    A quadratic in the week (a line for three weeks, the mean for fewer) is fitted to the reference brains by least
-    squares; all scans of a subject together have the weight of one. The centile is that of a new observation under
-    Student's t distribution: t = (x − expected)/(s √(1 + h)), where s is the residual standard deviation and h the
-    leverage of the week. All brains of the table are scored; a brain of the reference is compared with those of other
-    subjects. If the reference brains are not `individuals` but averages, as in an atlas, their scatter is not that of
-    individuals: the expected value is given without sd, z and centile.
 
-    Columns subject, run, week, hemisphere, metric, value, unit, expected, sd (s), z = (value − expected)/s, centile
-    (0 to 100), brains (subjects of the reference), brains_of_week, flag: "ok"; `SPREAD_UNKNOWN`; "outside the
-    reference's weeks", "too few brains" or "other hemispheres" (than the reference), whose scores are NaN.
+def _weights(brains: pd.DataFrame) -> Floats:
+    # the scans of one subject are not independent
+    return 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
+
+
+def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms) -> pd.DataFrame:
+    """Return the scores of brains against the norms of reference brains, at each brain's own week.
+
+    A brain of the reference is compared with the other subjects. Norms from a file have no reference brains here.
+
+    Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd (half the distance between z = −1
+    and 1), z, z_low, z_high, centile (0 to 100), centile_low, centile_high (90 % intervals from the norm's own
+    uncertainty), brains (subjects of the norm), flag: "ok"; "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN`
+    (only expected is given); "outside the reference's weeks", "too few brains" or "other hemispheres" (than the
+    reference), whose scores are NaN.
     """
-    by_metric = dict(_by_metric(metrics, reference))
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
-    table = _with_people(metrics).assign(alike=same_sides(metrics, reference)).dropna(subset=["value"])
+    by_metric = dict(_by_metric(metrics, reference))
+    alike = same_sides(metrics, reference) if len(reference) else True
+    table = _with_people(metrics).assign(alike=alike).dropna(subset=["value"])
+    table = table[table["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)]
     rows = []
     for row, is_comparable, person in zip(
         table[names].to_dict("records"), table["alike"], table["person"], strict=True
     ):
-        norm = by_metric.get((row["hemisphere"], row["metric"]))
-        if norm is None:
+        key = row["hemisphere"], row["metric"]
+        brains = by_metric.get(key)
+        if brains is None and key not in cohort.norms:
             continue
-        # the norm of an observed brain excludes all scans of its own subject
-        norm = norm[is_comparable & ((row["run"] != MEASURED) | (norm["person"] != person))]
-        *score, flag = _score(row["week"], row["value"], norm, individuals)
-        rows.append((*row.values(), *score, flag if is_comparable else OTHER_SIDES))
-    columns = [*names, "expected", "sd", "z", "centile", "brains", "brains_of_week", "flag"]
-    return pd.DataFrame(rows, columns=columns)
+        is_own = row["run"] == MEASURED and brains is not None and (brains["person"] == person).any()
+        score = _score(key, row["week"], row["value"], cohort, brains if is_own else None, person)
+        rows.append((*row.values(), *(score if is_comparable else _no_score(OTHER_SIDES))))
+    return pd.DataFrame(rows, columns=[*names, *SCORES])
+
+
+def _no_score(flag: str, subjects: int = 0) -> tuple[Any, ...]:
+    return (*[np.nan] * (len(SCORES) - 2), subjects, flag)
+
+
+def _score(
+    key: tuple[str, str],
+    week: float,
+    value: float,
+    cohort: CohortNorms,
+    own_reference: pd.DataFrame | None,
+    person: str,
+) -> tuple[Any, ...]:
+    if key not in cohort.norms:
+        return _no_score("too few brains", 0 if own_reference is None else own_reference["person"].nunique())
+    norm = cohort.norms[key][1]
+    if own_reference is not None:
+        is_own = own_reference["person"] == person
+        others = own_reference[~is_own]
+        if others["person"].nunique() < (MIN_SUBJECTS if cohort.individuals else MIN_AVERAGES):
+            return _no_score("too few brains", others["person"].nunique())
+        own = own_reference[is_own]
+        scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
+        # one step is enough for subjects that the norm hardly depends on
+        if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > USUAL_Z:
+            norm = _fit(others, key[1])
+        else:
+            norm = norm.without(*scans, _weights(own))
+    if not norm.first - WINDOW_GW <= week <= norm.last + WINDOW_GW:
+        return _no_score("outside the reference's weeks", norm.subjects)
+    low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
+    if not cohort.individuals:
+        return (expected, *[np.nan] * (len(SCORES) - 3), norm.subjects, SPREAD_UNKNOWN)
+    (z,), (error,) = norm.scores([week], [value])
+    bounds = FEW_CENTILES if norm.freedom is not None else (0.0, 100.0)
+    scores = np.array([z, z - INTERVAL_Z * error, z + INTERVAL_Z * error])
+    scores = np.clip(scores, *stats.norm.ppf(np.array(bounds) / 100))
+    flag = "few brains" if norm.freedom is not None else "ok"
+    return (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores), norm.subjects, flag)
 
 
 def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
@@ -224,66 +317,23 @@ def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[An
     return list(rows[with_norm].groupby(["hemisphere", "metric"], sort=False))
 
 
-class _Curve(NamedTuple):
-    """The curve through reference brains at k weeks, and the scatter around it with its degrees of freedom."""
+def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
+    """Return the curve of each metric over the weeks of its norm.
 
-    expected: Floats
-    leverage: Floats
-    sd: float
-    freedom: int
-
-
-def _curve(brains: pd.DataFrame, at: Floats) -> _Curve | None:
-    weeks, values = brains["week"].to_numpy(dtype=float), brains["value"].to_numpy(dtype=float)
-    # the scans of one subject are not independent
-    weights = 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
-    distinct = len(np.unique(weeks))
-    degree = 2 if distinct > 3 else 1 if distinct == 3 else 0
-    freedom = brains["person"].nunique() - degree - 1
-    if freedom < MIN_FREEDOM:
-        return None
-    centre = float(weeks.mean())
-    powers, here = (np.vander(x - centre, degree + 1) for x in (weeks, at))
-    factors, *_ = np.linalg.lstsq(powers * np.sqrt(weights)[:, None], values * np.sqrt(weights), rcond=None)
-    sd = float(np.sqrt(weights @ (values - powers @ factors) ** 2 / freedom))
-    leverage = np.einsum("ij,jk,ik->i", here, np.linalg.inv(powers.T @ (weights[:, None] * powers)), here)
-    return _Curve(here @ factors, leverage, sd, freedom)
-
-
-def norm_curves(metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True) -> pd.DataFrame:
-    """Return the fitted curve of each metric over the reference's weeks; no rows for metrics with too few brains.
-
-    Columns hemisphere, metric, unit, week, expected, low, high. 90 % of new brains are expected between low and high,
-    by Student's t distribution; both are NaN if the reference brains are not `individuals`.
+    Columns hemisphere, metric, unit, week, brains, expected (median), expected_low, expected_high (its 90 % interval),
+    sd and the quantiles q05, q25, q50, q75, q95 of individuals. Those of averages are NaN.
     """
-    columns = ["hemisphere", "metric", "unit", "week", "expected", "low", "high"]
-    parts = [pd.DataFrame(columns=columns)]
-    for (hemisphere, metric), brains in _by_metric(metrics, reference):
-        weeks = brains["week"].to_numpy(dtype=float)
-        at = np.linspace(weeks.min(), weeks.max(), CURVE_POINTS if np.ptp(weeks) else 1)
-        if (curve := _curve(brains, at)) is not None:
-            sd = curve.sd if individuals else np.nan
-            half = float(stats.t.ppf(0.95, curve.freedom)) * sd * np.sqrt(1 + curve.leverage)
-            band = {"week": at, "expected": curve.expected, "low": curve.expected - half, "high": curve.expected + half}
-            names = {"hemisphere": hemisphere, "metric": metric, "unit": brains["unit"].iloc[0]}
-            parts.append(pd.DataFrame(band).assign(**names)[columns])
-    return pd.concat(parts[1:] or parts, ignore_index=True)
-
-
-def _score(
-    week: float, value: float, brains: pd.DataFrame, individuals: bool
-) -> tuple[float, float, float, float, int, int, str]:
-    weeks = brains["week"].to_numpy(dtype=float)
-    counts = brains["person"].nunique(), brains.loc[np.abs(weeks - week) <= WINDOW_GW, "person"].nunique()
-    curve = _curve(brains, np.array([week])) if len(brains) else None
-    if curve is None or not weeks.min() - WINDOW_GW <= week <= weeks.max() + WINDOW_GW:
-        why = "too few brains" if curve is None else "outside the reference's weeks"
-        return np.nan, np.nan, np.nan, np.nan, *counts, why
-    expected = float(curve.expected[0])
-    if not individuals:
-        return expected, np.nan, np.nan, np.nan, *counts, SPREAD_UNKNOWN
-    if curve.sd == 0:
-        return expected, curve.sd, np.nan, np.nan, *counts, "too few brains"
-    z = (value - expected) / curve.sd
-    centile = 100 * float(stats.t.cdf(z / np.sqrt(1 + curve.leverage[0]), curve.freedom))
-    return expected, curve.sd, z, centile, *counts, "ok"
+    columns = ["hemisphere", "metric", "unit", "week", "brains", "expected", "expected_low", "expected_high", "sd"]
+    parts = [pd.DataFrame(columns=[*columns, *QUANTILES])]
+    for (hemisphere, metric), (unit, norm) in cohort.norms.items():
+        weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
+        low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
+        error = norm.scores(weeks, expected)[1]
+        half = 0.5 * (high - low)
+        margin = INTERVAL_Z * error * half
+        band = {"week": weeks, "brains": norm.subjects, "expected": expected}
+        band |= {"expected_low": expected - margin, "expected_high": expected + margin}
+        spread = {"sd": half} | {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
+        parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
+    return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.triangles import Floats, Ints
+from ..quantities import METRICS
 from ..settings.terms import MEASURED, SIDES
 
 BRAIN = ["subject", "run", "week"]
@@ -50,19 +51,21 @@ def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]])
 
 
 def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Return the asymmetry index 2 (left − right)/(|left| + |right|) of each metric, of each region where there are.
+    """Return the asymmetry of each metric, of each region where there are.
 
-    Between −2 and 2, positive where the left side has more; NaN where both are 0 or one is not known. Metrics have the
-    columns hemisphere, metric, value, and others that rows of both sides share, such as region; these are kept.
+    Columns difference (left − right) with its unit, and asymmetry_index 2 (left − right)/(left + right), between −2 and
+    2; NaN if both are 0, one is unknown or the metric may be negative. Metrics have the columns hemisphere, metric,
+    value, unit, and others that rows of both sides share, such as region; these are kept.
     """
-    keys = [name for name in metrics.columns if name not in {"hemisphere", "value", "unit"}]
+    keys = [name for name in metrics.columns if name not in {"hemisphere", "value"}]
     sides = metrics[metrics["hemisphere"].isin(SIDES)]
     # a single hemisphere has no asymmetry
     wide = sides.pivot_table("value", keys, "hemisphere", aggfunc="first").reindex(columns=list(SIDES))
-    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates()))
-    total = wide["left"].abs() + wide["right"].abs()
-    index = 2.0 * (wide["left"] - wide["right"]) / total.where(total > 0)
-    return index.rename("asymmetry_index").reset_index()
+    wide = wide.reindex(pd.MultiIndex.from_frame(sides[keys].drop_duplicates())).reset_index()
+    difference, total = wide["left"] - wide["right"], wide["left"] + wide["right"]
+    is_signed = wide["metric"].map(lambda name: METRICS[name].is_signed).astype(bool)
+    index = 2.0 * difference / total.where((total > 0) & ~is_signed)
+    return wide[keys].assign(difference=difference, asymmetry_index=index)
 
 
 def change_between_scans(metrics: pd.DataFrame, scans: Mapping[str, Sequence[str]]) -> pd.DataFrame:

@@ -149,7 +149,6 @@ def metrics_chart(
 def norms_chart(
     metrics: pd.DataFrame,
     curves: pd.DataFrame,
-    norms: pd.DataFrame,
     *,
     reference: Sequence[str],
     brains: Sequence[str],
@@ -160,15 +159,13 @@ def norms_chart(
 ) -> Figure:
     """Draw a panel per metric of whole brains: reference brains, their norm curve, other brains and runs.
 
-    The band should contain 90 % of further brains (Student's distribution) and is drawn if their spread is known. Bars
-    are quantiles of weeks with at least five brains. Stars are observed brains: black in the reference, else coloured,
-    as are groups. Lines are runs.
+    Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the spread of individuals is known. Stars
+    are observed brains: black in the reference, else coloured, as are groups. Lines are runs.
 
     Parameters
     ----------
     metrics : columns subject, run, week, hemisphere, metric, value, unit
-    curves : columns hemisphere, metric, week, expected, low, high
-    norms : columns hemisphere, metric, week, brains, q05, q50, q95
+    curves : columns hemisphere, metric, week, expected, q05, q25, q75, q95
     reference
         Brains that the curves were fitted to.
     brains
@@ -186,11 +183,9 @@ def norms_chart(
         rows = whole[whole["metric"] == name]
         # without rows, the columns are not numeric
         if len(band := curves[(curves["hemisphere"] == "whole") & (curves["metric"] == name)]):
-            axes.fill_between(band["week"], band["low"], band["high"], color=NEUTRAL_COLOUR, linewidth=0)
+            for low, high, alpha in (("q05", "q95", 0.6), ("q25", "q75", 1.0)):
+                axes.fill_between(band["week"], band[low], band[high], color=NEUTRAL_COLOUR, alpha=alpha, linewidth=0)
             axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
-        bars = norms[(norms["hemisphere"] == "whole") & (norms["metric"] == name)].dropna(subset=["q50"])
-        axes.vlines(bars["week"], bars["q05"], bars["q95"], color=OBSERVED_COLOUR, linewidth=1.0)
-        axes.plot(bars["week"], bars["q50"], "_", color=OBSERVED_COLOUR, markersize=7)
         _lines(axes, rows, colours)
         observed = rows[rows["run"] == MEASURED]
         within = observed["subject"].isin(reference)
@@ -200,8 +195,8 @@ def norms_chart(
         _title(axes, rows)
         week_axis(axes, rows["week"])
     extra += [star("other observed brains", RUN_COLOURS[-1])] if has_other_brains else []
-    if curves["low"].notna().any():
-        extra.append(Patch(color=NEUTRAL_COLOUR, label="90 % of further brains"))
+    if curves["q05"].notna().any():
+        extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
     elif len(curves):
         extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
     run_legend(figure, colours, observed_name=observed_name, markers=markers, extra=extra)

@@ -33,10 +33,13 @@ FIRST_PAGE_FIGURES = ("predicted_figure", "weekly_figure")
 BRAIN_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """Metrics in the table of brains."""
 NORM_WORDS = {
-    "ok": "Below each number: its centile (and z) for this age among the norm's other subjects.",
+    "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval that "
+    "the norm's own uncertainty leaves, and z. Sex and site are ignored.",
+    "few brains": "Below each number: its centile for this age among the norm's other subjects, with the 90 % "
+    "interval, and z. The norm has fewer than 30 subjects, so centiles end at 5 and 95.",
     SPREAD_UNKNOWN: "Below each number: its difference from the curve of the norm ({norm}). The norm has one average "
     "brain a week, so the spread of individuals around the curve is unknown and there are no centiles.",
-    "too few brains": "There are too few subjects for centiles: a curve over the weeks needs six others.",
+    "too few brains": "There are too few subjects for centiles: a norm needs ten others.",
 }
 """Explanations of the table of brains, by flag of the norm."""
 NOT_COMPARED = "There is no observed brain of the same population and week to compare a simulation with."

@@ -103,11 +103,15 @@ def _signed(percent: float, unit: str = "") -> str:
 
 
 def centile_text(centiles: pd.DataFrame) -> list[str]:
-    """Return the text of each row of centiles: "centile (z)", the difference from the norm in %, or "–"."""
+    """Return the text of each row of centiles: "centile (interval), z", the difference from the norm in %, or "–"."""
     differences = (centiles["value"] / centiles["expected"] - 1).where(centiles["metric"] != AROUND_ZERO)
     return [
-        f"{centile:.0f} ({z:+.1f})".replace("-", "−") if np.isfinite(centile) else _signed(100 * part, " %")
-        for centile, z, part in zip(centiles["centile"], centiles["z"], differences, strict=True)
+        f"{centile:.0f} ({low:.0f} to {high:.0f}), {z:+.1f}".replace("-", "−")
+        if np.isfinite(centile)
+        else _signed(100 * part, " %")
+        for centile, low, high, z, part in zip(
+            *(centiles[name] for name in ("centile", "centile_low", "centile_high", "z")), differences, strict=True
+        )
     ]
 
 
@@ -126,7 +130,7 @@ def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
     scores = centiles[own & (centiles["hemisphere"] == "whole")].assign(name=_named)
     if len(scores):
         scores = scores.assign(text=centile_text(scores)).set_index("name")
-        columns = {"centile (z) or difference": scores["text"], "note": scores["flag"]}
+        columns = {"centile (90 % interval), z; or difference": scores["text"], "note": scores["flag"]}
         table = table.assign(norm=scores["expected"], **columns)
     return table.dropna(how="all").rename_axis("metric")
 

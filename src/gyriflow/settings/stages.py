@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from .base import Settings
+from .base import InputFile, Settings
 from .brains import GivenRegions
 from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
 
@@ -71,6 +71,9 @@ class MetricsSettings(Settings):
     """Ids of the measured brains that others are compared with, or names of atlases. `null`: all observed brains (of
     the start brain's population, if there are several). Brains with other hemispheres than the first start brain are
     left out. Averages, such as those of an atlas, give no centiles."""
+    norms: InputFile | None = None
+    """Norms of another study's cohort, its `results/study/norms.json`, instead of those of the observed brains. They
+    must be made with the same settings."""
     colour_by: str | None = None
     """Covariate that is shown by colour in charts of measured brains. `null`: the first with 2 to 6 values and fewer
     values than subjects."""

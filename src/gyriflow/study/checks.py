@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from pydantic import ValidationError
 
+from ..errors import InputError
 from ..io.yaml_files import SCHEMES
 from ..settings.base import Key, KeyProblem, did_you_mean, messages
 from ..settings.folding import VARYING, value_problems
@@ -158,6 +159,14 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     atlases = {used.atlas.name for used in used_atlases(config)}
     norm = [name for name in settings.norm_reference or () if name not in atlases]
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
+    if settings.norms is not None:
+        # takes a second to import, and few studies have it
+        from ..metrics.norms import read_cohort_norms
+
+        try:
+            read_cohort_norms(settings.norms, config.norms_made_with)
+        except InputError as error:
+            yield KeyProblem(str(error), ("metrics", "norms"))
     values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
     if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
         yield KeyProblem(

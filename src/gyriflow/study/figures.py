@@ -436,11 +436,11 @@ NORMS = Kind(
     section="Metrics",
     title="Norms over the weeks",
     caption=(
-        "Metrics of whole brains over the weeks, and the norm: a quadratic in the week, a grey band that should "
-        "contain 90 % of further brains (Student's distribution), and the 5, 50 and 95 % quantiles of weeks with at "
-        "least five brains (bars). If the norm has one average brain a week, the spread of individuals is unknown: "
-        "there is no band, and brains have a difference from the curve in % instead of a centile and z. Brains with "
-        "other hemispheres than those of the norm are not compared and not drawn."
+        "Metrics of whole brains over the weeks, and the norm: the median (line) and the bands between the centiles 5 "
+        "and 95, 25 and 75, by week (LMS method; of fewer than 30 subjects a quadratic with one relative scatter; of "
+        "fewer than 10 none). Sex and site are ignored. If the norm has one average brain a week, the spread of "
+        "individuals is unknown: there is no band, and brains have a difference from the curve in % instead of a "
+        "centile and z. Brains with other hemispheres than those of the norm are not compared and not drawn."
     ),
     job="metrics_charts",
 )
@@ -448,7 +448,7 @@ NORMS = Kind(
 
 def norms_figure(study: Study, options: Arguments) -> Figure:
     reference = [study.brains[brain] for brain in study.norm_reference]
-    tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv", "norms": f"{STUDY}/norms.csv"}
+    tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv"}
     comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]
     arguments = {"observed_name": observed_name(reference), "reference": study.norm_reference, "brains": comparable}
     return Figure(NORMS, tables, options | arguments)

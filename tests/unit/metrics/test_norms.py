@@ -6,16 +6,21 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from facts import Facts
 from scipy import stats
 
+from gyriflow.errors import InputError
+from gyriflow.io.files import write_json
 from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.metrics.lms import INTERVAL_Z, fit_norm
 from gyriflow.metrics.norms import (
     LabelledBrain,
-    measured_norms,
+    cohort_norms,
     measured_scores,
     norm_curves,
     published_norms,
     published_scores,
+    read_cohort_norms,
     structure_volumes,
     volume_tables,
 )
@@ -51,74 +56,139 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert published_scores({"cortex": 30.0}, 18.0, NORMS)["flag"].tolist() == ["outside the norm's weeks"]
 
 
-def test_quantiles_need_several_brains_of_a_week() -> None:
-    weeks = np.repeat([22.0, 26.0, 30.0], [1, 3, 101])
-    values = np.concatenate([[5.0], [6.0, 8.0, 10.0], np.arange(101.0)])
-    found = measured_norms(*table(weeks, values)).set_index("week")
-    assert found["brains"].tolist() == [1, 3, 101]
-    assert found["mean"].tolist() == [5.0, 8.0, 50.0]
-    assert np.isnan(found.loc[22.0, "sd"])
-    assert found.loc[26.0, "sd"] == pytest.approx(2.0)
-    assert found.loc[[22.0, 26.0], "q50"].isna().all()
-    assert found.loc[30.0, ["q05", "q25", "q50", "q75", "q95"]].tolist() == [5.0, 25.0, 50.0, 75.0, 95.0]
+def scores(metrics, reference, **options):
+    return measured_scores(metrics, reference, cohort_norms(metrics, reference, **options))
 
 
-def test_centiles_of_drawn_brains_are_even() -> None:
+def curves(metrics, reference, **options):
+    return norm_curves(cohort_norms(metrics, reference, **options))
+
+
+def growing(weeks):
+    """Return a mean volume (mL) over the weeks."""
+    return 80 + 270 * ((weeks - 21) / 16) ** 1.3
+
+
+TRUE = {
+    "the same relative scatter": (True, lambda weeks, z: growing(weeks) * (1 + 0.08 * z)),
+    "the same scatter": (True, lambda weeks, z: growing(weeks) + 8.0 * z),
+    "skewed": (True, lambda weeks, z: growing(weeks) * np.exp(0.25 * z)),
+    "signed, wider with age": (False, lambda weeks, z: 0.1 * (weeks - 29) + (0.5 + 0.05 * (weeks - 21)) * z),
+}
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_centiles_mean_what_they_say_at_each_week(name: str) -> None:
+    is_positive, value = TRUE[name]
+    random = np.random.default_rng(1)
+    at, true = (
+        axis.ravel() for axis in np.meshgrid([22.0, 27.0, 32.0, 36.0], stats.norm.ppf([0.01, 0.05, 0.5, 0.95, 0.99]))
+    )
+    found = []
+    for _ in range(200):
+        weeks = random.uniform(21, 37, 200)
+        norm = fit_norm(weeks, value(weeks, random.standard_normal(200)), np.ones(200), 200, is_positive=is_positive)
+        found.append(norm.scores(at, value(at, true)))
+    z, error = np.swapaxes(found, 0, 1)
+    assert np.abs(100 * (stats.norm.cdf(z).mean(axis=0) - stats.norm.cdf(true))).max() < 2.0
+    # a 90 % interval of 200 cohorts, with the chance of 200 draws
+    holds = (np.abs(z - true) <= INTERVAL_Z * error).mean(axis=0)
+    assert 0.83 < holds.min() < holds.max() < 0.975
+    assert 0.88 < holds.mean() < 0.94
+
+
+def test_a_small_head_of_22_weeks_is_found() -> None:
     random = np.random.default_rng(0)
-    weeks = random.uniform(21, 36, 400)
-    values = 0.5 * (weeks - 10) ** 2 + 4.0 * random.standard_normal(400)
-    found = measured_scores(*table(weeks, values))
-    assert (found["flag"] == "ok").all()
-    assert found["sd"].mean() == pytest.approx(4.0, rel=0.05)
-    # each against the others: a tenth of the brains in each tenth
-    counts, _ = np.histogram(found["centile"], np.linspace(0, 100, 11))
-    assert np.abs(counts - 40).max() < 20
+    weeks = random.uniform(21, 37, 100)
+    values = growing(weeks) * (1 + 0.08 * random.standard_normal(100))
+    small = growing(22.0) * (1 + 0.08 * stats.norm.ppf(0.01))
+    found = scores(*table(weeks, values, ("small", 22.0, small))).query("run == 'small'").iloc[0]
+    assert found["centile"] < 5
+    assert found["centile_low"] < 1 < found["centile_high"] < 15
+    assert 100 * stats.norm.cdf(found["z_low"]) == pytest.approx(found["centile_low"])
+    assert (found["flag"], found["brains"]) == ("ok", 100)
+
+
+def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
+    random = np.random.default_rng(0)
+    weeks = random.uniform(21, 36, 60)
+    values = growing(weeks) * (1 + 0.08 * random.standard_normal(60))
+    values[0] *= 1.5
+    metrics, reference = table(weeks, values)
+    found = scores(metrics, reference)
+    assert (found["brains"] == 59).all()
+    counts, _ = np.histogram(found["centile"], np.linspace(0, 100, 5))
+    assert np.abs(counts - 15).max() < 8
+    # as if it had never been there, for the odd one and a usual one
+    for number in (0, 1):
+        others = np.arange(60) != number
+        without = table(weeks[others], values[others], ("it", weeks[number], values[number]))
+        alone = scores(*without).query("run == 'it'").iloc[0]
+        assert found["z"][number] == pytest.approx(alone["z"], abs=0.02)
+
+
+def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> None:
+    random = np.random.default_rng(0)
+    weeks = random.uniform(21, 36, 60)
+    metrics, reference = table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(60)), ("new", 25.0, 120.0))
+    made_with = {"version": "1", "edge_length_mm": 1.0, "schemes": ["a", "b"]}
+    cohort = cohort_norms(metrics, reference, made_with=made_with)
+    write_json(tmp_path / "norms.json", cohort.plain)
+    again = read_cohort_norms(tmp_path / "norms.json", made_with | {"schemes": ["a"]})
+    pd.testing.assert_frame_equal(norm_curves(cohort), norm_curves(again))
+    new = metrics[metrics["run"] == "new"]
+    (score,) = measured_scores(new, [], again).to_dict("records")
+    assert score["centile"] == pytest.approx(scores(metrics, reference).query("run == 'new'")["centile"].iloc[0])
+    for key, other in (("version", "2"), ("edge_length_mm", 0.7), ("schemes", ["c"])):
+        with pytest.raises(InputError, check=Facts(tmp_path / "norms.json", key, other)):
+            read_cohort_norms(tmp_path / "norms.json", made_with | {key: other})
+    (tmp_path / "norms.json").write_text("{}")
+    with pytest.raises(InputError, check=Facts(tmp_path / "norms.json", "norms.json")):
+        read_cohort_norms(tmp_path / "norms.json", made_with)
 
 
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
-    weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 3), np.random.default_rng(1).normal(100, 5, 12)
+    weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 6), np.random.default_rng(1).normal(100, 5, 24)
     metrics, reference = table(weeks, values)
-    three, six = (metrics.assign(person=[f"s{number % few}" for number in range(12)]) for few in (3, 6))
-    # twelve scans of three subjects leave nothing to know a scatter by
-    assert set(measured_scores(three, reference)["flag"]) == {"too few brains"}
-    assert norm_curves(three, reference).empty
-    assert set(measured_scores(six, reference)["brains"]) == {5}
-    norms = measured_norms(metrics.assign(person="s"), reference)
-    assert set(norms["brains"]) == {1}
-    assert norms["sd"].isna().all()
+    few, many = (metrics.assign(person=[f"s{number % count}" for number in range(24)]) for count in (9, 12))
+    # many scans of nine subjects leave nothing to know a scatter by
+    assert set(scores(few, reference)["flag"]) == {"too few brains"}
+    assert curves(few, reference).empty
+    assert set(scores(many, reference)["brains"]) == {11}
     # a scan given twice says no more than once
     own = metrics.assign(person=metrics["subject"])
     twice = pd.concat([own, own.assign(subject=own["subject"] + "again")])
-    both = [norm_curves(metrics, reference), norm_curves(twice, list(twice["subject"]))]
-    np.testing.assert_allclose(both[0][["low", "high"]], both[1][["low", "high"]])
+    both = [curves(metrics, reference), curves(twice, list(twice["subject"]))]
+    np.testing.assert_allclose(both[0][["q05", "q95"]], both[1][["q05", "q95"]])
 
 
 @pytest.mark.parametrize("metric", ["crossing_faces", "curvature_radius", "weyl_number", "spangy_modes", "area_ratio"])
 def test_properties_of_the_mesh_and_of_the_analysis_have_no_norm(metric: str) -> None:
-    weeks = np.arange(21.0, 29.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4))
-    assert len(norm_curves(metrics, reference))
-    assert norm_curves(metrics.assign(metric=metric), reference).empty
-    assert measured_scores(metrics.assign(metric=metric), reference).empty
+    weeks = np.arange(21.0, 33.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6))
+    assert len(curves(metrics, reference))
+    assert curves(metrics.assign(metric=metric), reference).empty
+    assert scores(metrics.assign(metric=metric), reference).empty
 
 
 def test_few_brains_make_centiles_cautious() -> None:
     weeks = np.array([21.0, 23.0, 25.0, 27.0, 29.0, 31.0] * 2)
     values = 10 * weeks + np.tile([1.0, -1.0], 6)
-    metrics, reference = table(weeks, values, ("run", 26.0, 260.0 + 2.5))
-    found = measured_scores(metrics, reference).query("run == 'run'").iloc[0]
-    assert (found["brains"], found["brains_of_week"]) == (12, 0)
-    assert found["expected"] == pytest.approx(260.0, abs=0.3)
+    metrics, reference = table(weeks, values, ("run", 26.0, 260.0 + 1.5), ("far", 26.0, 280.0))
+    found = scores(metrics, reference).set_index("run")
+    assert (found.loc["run", "brains"], found.loc["run", "flag"]) == (12, "few brains")
+    assert found.loc["run", "expected"] == pytest.approx(260.0, abs=0.3)
     # the normal distribution would be surer than twelve brains allow
-    assert 95.0 < found["centile"] < 100 * stats.norm.cdf(found["z"])
+    assert 80.0 < found.loc["run", "centile"] < 100 * stats.norm.cdf(1.5 / found.loc["run", "sd"])
+    assert found.loc["far", "centile"] == pytest.approx(95.0)
 
 
 def test_what_cannot_be_scored_is_said() -> None:
-    weeks = np.arange(21.0, 29.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("a", 33.0, 1.0), ("b", 25.0, 250.0))
-    found = measured_scores(metrics, reference).set_index("run")["flag"]
-    assert (found["a"], found["b"]) == ("outside the reference's weeks", "ok")
-    few = measured_scores(*table(weeks[:4], weeks[:4], ("a", 22.0, 1.0))).set_index("run").loc["a"]
+    weeks = np.arange(21.0, 33.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6), ("a", 33.0, 1.0), ("b", 25.0, 250.0))
+    found = scores(metrics, reference).set_index("run")["flag"]
+    assert (found["a"], found["b"]) == ("outside the reference's weeks", "few brains")
+    few = scores(*table(weeks[:9], weeks[:9], ("a", 22.0, 1.0))).set_index("run").loc["a"]
     assert few["flag"] == "too few brains"
     assert np.isnan(few["centile"])
 
@@ -126,18 +196,18 @@ def test_what_cannot_be_scored_is_said() -> None:
 def test_averages_give_a_curve_and_no_centiles() -> None:
     weeks = np.arange(21.0, 29.0)
     metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("b", 25.0, 260.0))
-    found = measured_scores(metrics, reference, individuals=False).set_index("run").loc["b"]
+    found = scores(metrics, reference, individuals=False).set_index("run").loc["b"]
     assert found["expected"] == pytest.approx(250.0, abs=0.5)
     assert found[["sd", "z", "centile"]].isna().all()
     assert found["flag"] == SPREAD_UNKNOWN
-    curves = norm_curves(metrics, reference, individuals=False)
-    assert curves["expected"].notna().all()
-    assert curves[["low", "high"]].isna().all(axis=None)
+    found = curves(metrics, reference, individuals=False)
+    assert found["expected"].notna().all()
+    assert found[["sd", "q05", "q95"]].isna().all(axis=None)
 
 
 def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
-    weeks = np.arange(21.0, 29.0)
-    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 4), ("half", 25.0, 125.0), ("all", 25.0, 250.0))
+    weeks = np.arange(21.0, 33.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6), ("half", 25.0, 125.0), ("all", 25.0, 250.0))
     sides = [
         metrics.assign(hemisphere=side, value=metrics["value"] / share)[rows]
         for side, share, rows in (
@@ -147,8 +217,8 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
             ("left", 1.0, metrics["run"] == "half"),
         )
     ]
-    found = measured_scores(pd.concat(sides, ignore_index=True), reference).set_index(["run", "hemisphere"])
-    assert found.loc[("all", "whole"), "flag"] == "ok"
+    found = scores(pd.concat(sides, ignore_index=True), reference).set_index(["run", "hemisphere"])
+    assert found.loc[("all", "whole"), "flag"] == "few brains"
     for side in ("whole", "left"):
         assert found.loc[("half", side), "flag"] == "other hemispheres"
         assert found.loc[("half", side), ["z", "centile", "expected"]].isna().all()
@@ -248,10 +318,14 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
 
 def test_asymmetry_of_sides() -> None:
     table = pd.DataFrame({"hemisphere": ["left", "right"] * 2, "region": ["frontal"] * 2 + ["insula"] * 2})
-    table = table.assign(metric="area", value=[30.0, 10.0, 0.0, 0.0])
-    found = asymmetry(table).set_index("region")["asymmetry_index"]
-    assert found["frontal"] == pytest.approx(1.0)
-    assert np.isnan(found["insula"])
+    table = table.assign(metric="area", unit="cm2", value=[30.0, 10.0, 0.0, 0.0])
+    found = asymmetry(table).set_index("region")
+    assert found.loc["frontal", ["difference", "unit", "asymmetry_index"]].tolist() == [20.0, "cm2", 1.0]
+    assert np.isnan(found.loc["insula", "asymmetry_index"])
+    # 0.01 and −0.01 are nearly equal, not as different as can be
+    signed = asymmetry(table.assign(metric="mean_shape_index", value=[0.01, -0.01, 0.1, 0.2]))
+    assert signed["difference"].tolist() == pytest.approx([0.02, -0.1])
+    assert signed["asymmetry_index"].isna().all()
 
 
 def test_norms_per_week_of_all_and_pial_nodes() -> None:

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from pictures import words
 
 from gyriflow.errors import InputError
-from gyriflow.metrics.norms import measured_norms, measured_scores, norm_curves
+from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
 from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
 from gyriflow.report.growth import displacement_chart, growth_chart
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
@@ -172,12 +172,11 @@ def metrics_with_norms() -> pd.DataFrame:
 
 
 def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
-    curves = norm_curves(metrics_with_norms, REFERENCE)
-    norms = measured_norms(metrics_with_norms, REFERENCE)
+    curves = norm_curves(cohort_norms(metrics_with_norms, REFERENCE))
     # half a brain, which is not compared with whole ones
     half = metrics_with_norms[:1].assign(subject="half", value=5.0)
     brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
-    figure = norms_chart(pd.concat([metrics_with_norms, half]), curves, norms, **brains)
+    figure = norms_chart(pd.concat([metrics_with_norms, half]), curves, **brains)
     axes = figure.axes[0]
     stars = {
         (float(x), float(y)): line.get_color()
@@ -192,49 +191,33 @@ def test_norms_show_the_reference_the_band_and_the_others(metrics_with_norms):
     assert low < 210 < 300 < high
     names = [text.get_text() for text in figure.legends[0].texts]
     # of the run, real brains, others than the reference, and the band
-    assert (len(names), names[-1]) == (4, Facts("90 %"))
-
-
-def test_the_band_holds_ninety_per_cent_of_further_brains():
-    # of 400 draws of ten brains and one further brain, in the band of the ten
-    rng = np.random.default_rng(3)
-    inside = 0
-    for _ in range(400):
-        values = 10 * WEEKS + rng.normal(size=len(WEEKS))
-        table = pd.DataFrame({"subject": REFERENCE, "run": "real", "week": WEEKS, "value": values})
-        table = table.assign(hemisphere="whole", metric="area", unit="cm2")
-        curve = norm_curves(table, REFERENCE)
-        low, high = (np.interp(25.0, curve["week"], curve[name]) for name in ("low", "high"))
-        inside += low < 250 + rng.normal() < high
-    assert 0.86 < inside / 400 < 0.94
+    assert (len(names), names[-1]) == (4, Facts(5, 25, 50, 75, 95))
 
 
 def test_norms_of_averages_have_a_curve_without_a_band(metrics_with_norms):
-    curves = norm_curves(metrics_with_norms, REFERENCE, individuals=False)
-    norms = measured_norms(metrics_with_norms, REFERENCE)
+    curves = norm_curves(cohort_norms(metrics_with_norms, REFERENCE, individuals=False))
     brains = {"reference": REFERENCE, "brains": [*REFERENCE, "case"]}
-    figure = norms_chart(metrics_with_norms, curves, norms, **brains, groups={"case": "sex: F"})
+    figure = norms_chart(metrics_with_norms, curves, **brains, groups={"case": "sex: F"})
     curve = next(line for line in figure.axes[0].lines if len(line.get_xdata()) > 20)
     assert curve.get_ydata()[[0, -1]] == pytest.approx([210, 300], abs=1)
     (band,) = (part.get_paths() for part in figure.axes[0].collections[:1])
     assert not band or np.isnan(band[0].vertices).any()
     names = [text.get_text() for text in figure.legends[0].texts]
     assert (len(names), names[2]) == (4, "sex: F")
-    assert Facts("90 %") not in names
+    assert Facts(5, 95) not in names
 
 
 def test_a_brain_has_its_numbers_with_where_they_stand(metrics_with_norms):
     own = metrics_with_norms[metrics_with_norms["subject"] == "case"]
-    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE)).loc["pial area (cm²)"]
-    assert (row["whole"], row["note"]) == (252.0, "ok")
-    centile, z = row.iloc[-2].rstrip(")").split(" (")
-    assert float(centile) > 95
-    assert float(z) > 3
-    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE, individuals=False)).loc["pial area (cm²)"]
+    cohort = cohort_norms(metrics_with_norms, REFERENCE)
+    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE, cohort)).loc["pial area (cm²)"]
+    assert (row["whole"], row["note"], row.iloc[-2]) == (252.0, "few brains", "95 (95 to 95), +1.6")
+    averages = cohort_norms(metrics_with_norms, REFERENCE, individuals=False)
+    row = brain_table(own, measured_scores(metrics_with_norms, REFERENCE, averages)).loc["pial area (cm²)"]
     assert row["norm"] == pytest.approx(250, abs=0.5)
     assert row.iloc[-2] in ("+0.8 %", "+0.9 %", "+0.7 %")
     assert row["note"] == SPREAD_UNKNOWN
-    assert list(brain_table(own, measured_scores(own, []))) == ["whole"]
+    assert list(brain_table(own, measured_scores(own, [], cohort_norms(own, [])))) == ["whole"]
 
 
 AREAS = pd.DataFrame(

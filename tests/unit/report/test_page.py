@@ -74,7 +74,12 @@ METRICS = pd.DataFrame(
     }
 )  # fmt: skip
 CENTILES = METRICS.iloc[:2].assign(
-    expected=[40.0, 100.0], z=[1.2, np.nan], centile=[88.4, np.nan], flag=["ok", SPREAD_UNKNOWN]
+    expected=[40.0, 100.0],
+    z=[1.2, np.nan],
+    centile=[88.4, np.nan],
+    centile_low=[70.0, np.nan],
+    centile_high=[96.0, np.nan],
+    flag=["ok", SPREAD_UNKNOWN],
 )
 MEASURES = {"quality": QUALITY, "metrics": METRICS, "centiles": CENTILES}
 PROVENANCE = {
