@@ -124,7 +124,7 @@ def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
         others = np.arange(60) != number
         without = table(weeks[others], values[others], ("it", weeks[number], values[number]))
         alone = scores(*without).query("run == 'it'").iloc[0]
-        assert found["z"][number] == pytest.approx(alone["z"], abs=0.02)
+        assert found["z"][number] == pytest.approx(alone["z"], abs=0.03)
 
 
 def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> None:

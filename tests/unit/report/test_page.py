@@ -238,7 +238,7 @@ def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings()
     assert old["verdict"] == Facts("refused", "cropped")
     assert young["brain"] == Facts("young", "21 GW", "healthy", "sex: F", "CC0 1.0") != Facts("labels")
     assert old["brain"] == Facts("old", "23 GW", "healthy", "labels")
-    assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (+1.2)", "–"]
+    assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (70 to 96), +1.2", "–"]
     # averages give no centile
     assert Markup(young["pial area (cm²)"]).striptags() == "90−10.0 %"
     assert ("<img " in young[""], old[""], "href" in old["brain"]) == (True, "", False)
