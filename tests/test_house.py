@@ -42,7 +42,7 @@ ARROWS = {
     "anatomy": PLAIN | {"io", "shipped"},
     # the solver is a program of its own, with its own frames and checkpoints
     "folding": PLAIN | {"mechanics", "io", "code_hash"},
-    "study": PLAIN | {"io", "shipped"},
+    "study": PLAIN | {"io", "shipped", "version"},
     "running": PLAIN | {"code_hash", "study", "anatomy", "folding", "io", "shipped", "step", "version"},
     "cli": PLAIN | {"running", "study", "anatomy", "io", "shipped", "version"},
 }

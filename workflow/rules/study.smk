@@ -37,7 +37,7 @@ rule metrics_tables:
         reference=study.norm_reference,
         individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
-        norms_made_with=CONFIG.norms_made_with,
+        made_with=study.norm_settings,
     script:
         "../scripts/metrics_tables.py"
 

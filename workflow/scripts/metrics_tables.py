@@ -6,11 +6,11 @@ from gyriflow.io.files import read_json, read_tables, write_json, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.norms import (
     LabelledBrain,
+    cohort_from,
     cohort_norms,
     measured_scores,
     norm_curves,
     published_norms,
-    read_cohort_norms,
     volume_tables,
 )
 from gyriflow.metrics.spangy import spectral_distances
@@ -22,11 +22,11 @@ with step(snakemake.log[0]):
     tables = {name: read_tables(files[name]) for name in ("metrics", "spectra", "regions") if files[name]}
     metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
-    reference, made_with = [] if files.cohort else params.reference, params.norms_made_with
+    reference = [] if files.cohort else params.reference
     if files.cohort:
-        cohort = read_cohort_norms(files.cohort[0], made_with)
+        cohort = cohort_from(read_json(files.cohort[0]))
     else:
-        cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=made_with)
+        cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=params.made_with)
     parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
     tables |= {
         "metrics_long": (long := long_table([metrics, *regions])),

@@ -11,7 +11,6 @@ from scipy import stats
 
 from ..errors import InputError
 from ..geometry.triangles import Floats
-from ..io.files import AnyPath, read_json, reading
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
@@ -182,20 +181,11 @@ class CohortNorms:
         return {"subjects": subjects, "method": method, "made_with": dict(self.made_with), "norms": rows}
 
 
-def read_cohort_norms(path: AnyPath, made_with: Mapping[str, Any]) -> CohortNorms:
-    """Return the norms of a file that another study wrote; InputError if it was made with other settings."""
-    content = read_json(path)
-    with reading(path, "norms of a cohort", "the results/study/norms.json of a study", remedy=None):
-        rows = [dict(row) for row in content["norms"]]
-        norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from(row)) for row in rows}
-        given = dict(content["made_with"])
-    for key, own in made_with.items():
-        other = given.get(key)
-        # a study may have fewer label schemes than the cohort
-        if other != own and not (isinstance(own, list) and isinstance(other, list) and set(own) <= set(other)):
-            found, expected = f"{key}: {other}", f"{own}, as in this study"
-            raise InputError("has norms that were made with other settings", path=path, found=found, expected=expected)
-    return CohortNorms(norms, made_with=given)
+def cohort_from(content: Mapping[str, Any]) -> CohortNorms:
+    """Return the norms of plain values as of `CohortNorms.plain`."""
+    rows = [dict(row) for row in content["norms"]]
+    norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from(row)) for row in rows}
+    return CohortNorms(norms, made_with=content["made_with"])
 
 
 def cohort_norms(

@@ -4,7 +4,6 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, field_validator
 
-from ..version import version
 from .atlas import AtlasSettings
 from .base import Settings
 from .brains import BrainConfig
@@ -84,14 +83,3 @@ class Config(Settings):
         towards or is compared with must be fused, too.
         """
         return self.surface.open_sulci and not self.runs
-
-    @property
-    def norms_made_with(self) -> dict[str, Any]:
-        """The settings and the version that norms of metrics depend on."""
-        return {
-            "version": version(),
-            "open_sulci": self.opens_sulci,
-            "edge_length_mm": self.surface.edge_length_mm,
-            **self.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes"}),
-            "schemes": sorted({brain.scheme for brain in self.brains if brain.scheme}),
-        }

@@ -2,10 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from pydantic import ValidationError
 
 from ..errors import InputError
+from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
 from ..settings.base import Key, KeyProblem, did_you_mean, messages
 from ..settings.folding import VARYING, value_problems
@@ -26,6 +28,7 @@ from ..settings.runs import (
 )
 from ..settings.terms import AMPLITUDE, MAX_COLOURS, MEASURED, STIFFNESS_RATIO
 from ..settings.varying import Varying
+from ..version import RELEASE
 from .atlases import used_atlases
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
@@ -153,6 +156,34 @@ def growth(config: Config) -> Iterator[KeyProblem]:
         yield KeyProblem(f"found {preferred!r}; the series are {', '.join(series)}", ("growth", "series"))
 
 
+def norm_settings(config: Config) -> dict[str, Any]:
+    """Return the settings and the version that norms of metrics depend on."""
+    return {
+        "version": RELEASE,
+        "open_sulci": config.opens_sulci,
+        "edge_length_mm": config.surface.edge_length_mm,
+        **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes"}),
+        "schemes": sorted({brain.scheme for brain in config.brains if brain.scheme}),
+    }
+
+
+def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[KeyProblem]:
+    try:
+        content = read_json(path)
+    except InputError as error:
+        yield KeyProblem(str(error), ("metrics", "norms"))
+        return
+    found = content.get("made_with") if isinstance(content, dict) else None
+    if not isinstance(found, dict) or not isinstance(content.get("norms"), list):
+        yield KeyProblem(f"{path}: expected the results/study/norms.json of a study", ("metrics", "norms"))
+        return
+    for name, value in expected.items():
+        # a study may have fewer label schemes than the cohort
+        if found.get(name) != value and not (name == "schemes" and set(value) <= set(found.get(name, ()))):
+            text = f"{path}: made with other settings; found {name}: {found.get(name)}; expected {value}, as here"
+            yield KeyProblem(text, ("metrics", "norms"))
+
+
 def metrics(config: Config) -> Iterator[KeyProblem]:
     """Yield unknown brains in the settings of metrics, and scans of a subject in the same week."""
     settings = config.metrics
@@ -160,13 +191,7 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     norm = [name for name in settings.norm_reference or () if name not in atlases]
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
     if settings.norms is not None:
-        # takes a second to import, and few studies have it
-        from ..metrics.norms import read_cohort_norms
-
-        try:
-            read_cohort_norms(settings.norms, config.norms_made_with)
-        except InputError as error:
-            yield KeyProblem(str(error), ("metrics", "norms"))
+        yield from _norms_problems(settings.norms, norm_settings(config))
     values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
     if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
         yield KeyProblem(

@@ -6,26 +6,28 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from configurations import LABELLED, problems, study
 from facts import Facts
 from scipy import stats
 
-from gyriflow.errors import InputError
-from gyriflow.io.files import write_json
+from gyriflow.io.files import read_json, write_json
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.lms import INTERVAL_Z, fit_norm
 from gyriflow.metrics.norms import (
     LabelledBrain,
+    cohort_from,
     cohort_norms,
     measured_scores,
     norm_curves,
     published_norms,
     published_scores,
-    read_cohort_norms,
     structure_volumes,
     volume_tables,
 )
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
 from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
+from gyriflow.study.checks import norm_settings
+from gyriflow.study.loading import load
 
 FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))
@@ -131,20 +133,20 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
     random = np.random.default_rng(0)
     weeks = random.uniform(21, 36, 60)
     metrics, reference = table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(60)), ("new", 25.0, 120.0))
-    made_with = {"version": "1", "edge_length_mm": 1.0, "schemes": ["a", "b"]}
-    cohort = cohort_norms(metrics, reference, made_with=made_with)
-    write_json(tmp_path / "norms.json", cohort.plain)
-    again = read_cohort_norms(tmp_path / "norms.json", made_with | {"schemes": ["a"]})
+    own = load(study())
+    cohort = cohort_norms(metrics, reference, made_with=norm_settings(own) | {"schemes": [LABELLED["scheme"], "more"]})
+    path = tmp_path / "norms.json"
+    write_json(path, cohort.plain)
+    again = cohort_from(read_json(path))
     pd.testing.assert_frame_equal(norm_curves(cohort), norm_curves(again))
-    new = metrics[metrics["run"] == "new"]
-    (score,) = measured_scores(new, [], again).to_dict("records")
+    (score,) = measured_scores(metrics[metrics["run"] == "new"], [], again).to_dict("records")
     assert score["centile"] == pytest.approx(scores(metrics, reference).query("run == 'new'")["centile"].iloc[0])
-    for key, other in (("version", "2"), ("edge_length_mm", 0.7), ("schemes", ["c"])):
-        with pytest.raises(InputError, check=Facts(tmp_path / "norms.json", key, other)):
-            read_cohort_norms(tmp_path / "norms.json", made_with | {key: other})
-    (tmp_path / "norms.json").write_text("{}")
-    with pytest.raises(InputError, check=Facts(tmp_path / "norms.json", "norms.json")):
-        read_cohort_norms(tmp_path / "norms.json", made_with)
+    raw = study(metrics={"norms": str(path)})
+    assert problems(raw) == []
+    other = {"surface": {"edge_length_mm": 0.7}, "metrics": {"norms": str(path), "curvature_radius_mm": 4.0}}
+    assert problems(raw | other) == [Facts(path, "edge_length_mm", 1.0, 0.7), Facts("curvature_radius_mm", 4.0)]
+    path.write_text("{}")
+    assert problems(raw) == [Facts(path, "results/study/norms.json")]
 
 
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
