@@ -16,28 +16,19 @@ PATCH_EDGE_MM = 20.0
 SYMMETRY_TOL_MM = 0.4
 """Mean distance to the mirror image below which both sides count as one observation: half a voxel of atlases."""
 
-MIN_SKILL_HORIZON_GW = 1.5
-"""Longest horizon without skill: the observed brain of the week before is then the start brain itself."""
-
 N_DRAWS = 2000
 """Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of the bootstrap samples at the ends of a 95 % interval."""
+RESAMPLED = "patches of one brain, not subjects"
+"""What the samples are drawn from, as tables say: the intervals do not cover differences between subjects."""
+NO_ROOM = "no room"
+"""Flag in place of a skill where the baseline of skill is not certainly better than the start."""
 
 
 def correlation(x: Floats, y: Floats, weights: Floats) -> float:
     """Return the weighted Pearson correlation of (n,) values; NaN where one of them is constant."""
     return float(_correlations(_products(x, y, weights).sum(axis=0)[None])[0])
-
-
-def skill(r: float, r_start: float, r_adjacent: float, horizon: float) -> float:
-    """Return (r − r_start)/(r_adjacent − r_start): 0 is as good as the scaled start, 1 as the observed week before.
-
-    NaN for horizons (GW) up to `MIN_SKILL_HORIZON_GW`, and where the adjacent week is not better than the start.
-    """
-    baseline_gain = r_adjacent - r_start
-    has_baseline = horizon > MIN_SKILL_HORIZON_GW and baseline_gain > 0
-    return float((r - r_start) / baseline_gain) if has_baseline else float("nan")
 
 
 def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) -> tuple[dict[str, Floats], float]:
@@ -56,15 +47,11 @@ def score_placement(
     observed: PreparedSurface,
     start: PreparedSurface,
     adjacent: PreparedSurface,
-    *,
-    horizon: float,
-) -> dict[str, float | bool]:
+) -> dict[str, float | bool | str]:
     """Score how well the positions of a simulated brain's folds agree with those of the observed brain.
 
-    Correlations r are weighted by area over the whole observed surface. For each of `COMPARED_MAPS`: r_…, r_start_…,
-    r_adjacent_…, gain_… (r − r_start) with its 95 % interval gain_low_…, gain_high_… by a bootstrap over patches
-    (Efron and Tibshirani 1993), and skill_…. In addition matched_share, the share of the observed area with a matching
-    point on the simulated brain, and asymmetry_mm and mirrored_patches of `make_patches`.
+    For each of `COMPARED_MAPS` the `correlation_scores`. In addition matched_share, the share of the observed area with
+    a matching point on the simulated brain, asymmetry_mm and mirrored_patches of `make_patches`, and resampled.
 
     Parameters
     ----------
@@ -74,30 +61,47 @@ def score_placement(
         The start brain scaled to the observed volume, which has no new folds.
     adjacent
         The observed brain of the week before.
-    horizon
-        Weeks since the start.
     """
     simulated_values, matched_share = interpolate_measures(simulated, observed)
-    start_values, adjacent_values = (interpolate_measures(surface, observed)[0] for surface in (start, adjacent))
+    baselines = [interpolate_measures(surface, observed)[0] for surface in (start, adjacent)]
     patch, symmetry = make_patches(observed)
-    row = {"matched_share": matched_share} | symmetry
-    areas = observed.areas
+    row = {"matched_share": matched_share} | symmetry | {"resampled": RESAMPLED}
     for measure in COMPARED_MAPS:
-        truth = getattr(observed, measure)
-        r = correlation(truth, simulated_values[measure], areas)
-        r_start = correlation(truth, start_values[measure], areas)
-        r_adjacent = correlation(truth, adjacent_values[measure], areas)
-        low, high = gain_interval(truth, simulated_values[measure], start_values[measure], areas, patch)
-        row |= {
-            f"r_{measure}": r,
-            f"r_start_{measure}": r_start,
-            f"r_adjacent_{measure}": r_adjacent,
-            f"gain_{measure}": r - r_start,
-            f"gain_low_{measure}": low,
-            f"gain_high_{measure}": high,
-            f"skill_{measure}": skill(r, r_start, r_adjacent, horizon),
-        }
+        values = [maps[measure] for maps in (simulated_values, *baselines)]
+        scores = correlation_scores(getattr(observed, measure), *values, observed.areas, patch)
+        row |= {f"{name}_{measure}": score for name, score in scores.items()}
     return row
+
+
+def correlation_scores(
+    truth: Floats, simulated: Floats, start: Floats, adjacent: Floats, areas: Floats, patch: Ints
+) -> dict[str, float | str]:
+    """Correlate (n,) values with the observed ones and compare with baselines, by a bootstrap over patches.
+
+    Returns
+    -------
+    dict
+        r, r_start and r_adjacent, weighted by area; gain = r − r_start; room = r_adjacent − r_start, the gain of the
+        baseline; skill = gain/room, and skill_flag: "ok", or `NO_ROOM` and NaN unless the interval of room lies above
+        0. r, gain, room and skill have 95 % intervals …_low, …_high (percentiles, Efron and Tibshirani 1993).
+    """
+    drawn = draw_patches(patch)
+    r, r_start, r_adjacent = (
+        bootstrap_correlations(truth, values, areas, patch, drawn) for values in (simulated, start, adjacent)
+    )
+    gain, room = r - r_start, r_adjacent - r_start
+    has_room = interval_of(room)[1] > 0
+    skill = gain / room if has_room else np.full_like(gain, np.nan)
+    row: dict[str, float | str] = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
+    for name, draws in (("r", r), ("gain", gain), ("room", room), ("skill", skill)):
+        row |= dict(zip((name, f"{name}_low", f"{name}_high"), interval_of(draws), strict=True))
+    return row | {"skill_flag": "ok" if has_room else NO_ROOM}
+
+
+def interval_of(draws: Floats) -> tuple[float, float, float]:
+    """Return the value of a statistic, the first of (1 + k,) draws, and its 95 % interval by the k others."""
+    low, high = (float("nan"),) * 2 if np.isnan(draws).all() else np.nanquantile(draws[1:], INTERVAL)
+    return float(draws[0]), float(low), float(high)
 
 
 def make_patches(surface: PreparedSurface, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
@@ -140,26 +144,17 @@ def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floa
     return np.asarray(cKDTree(points[seeds]).query(points)[1], dtype=np.int64)
 
 
-def gain_interval(
-    truth: Floats, simulated: Floats, start: Floats, areas: Floats, patch: NDArray[np.integer]
-) -> tuple[float, float]:
-    """Return the 95 % interval of r(simulated) − r(start) by a bootstrap over patches."""
-    drawn = draw_patches(patch)
-    r_simulated, r_start = (bootstrap_correlations(truth, values, areas, patch, drawn) for values in (simulated, start))
-    low, high = np.nanquantile(r_simulated - r_start, INTERVAL)
-    return float(low), float(high)
-
-
 def draw_patches(patch: NDArray[np.integer]) -> Ints:
-    """Draw bootstrap samples of patches: return how often each of p patches is in each sample, (N_DRAWS, p)."""
+    """Return how often each of p patches is in the surface itself, once, and in bootstrap samples, (1 + N_DRAWS, p)."""
     count = int(patch.max()) + 1
-    return np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
+    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
+    return np.concatenate([np.ones((1, count), np.int64), drawn])
 
 
 def bootstrap_correlations(
     truth: Floats, values: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
 ) -> Floats:
-    """Return the (N_DRAWS,) area-weighted correlations of (n,) values in each bootstrap sample."""
+    """Return the (k,) area-weighted correlations of (n,) values in each of k samples of `draw_patches`."""
     columns = _products(truth, values, areas).T
     sums: Floats = np.stack([np.bincount(patch, column) for column in columns], axis=1)
     return _correlations(np.asarray(drawn @ sums, dtype=float))

@@ -12,17 +12,15 @@ from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, signed
 from ..quantities import COMPARED_MAPS
 from .distances import bootstrap_distances, pairwise_distances, surface_distances
 from .placement import (
-    INTERVAL,
+    RESAMPLED,
     bootstrap_correlations,
     correlation,
     draw_patches,
     interpolate_measures,
+    interval_of,
     make_patches,
 )
 from .shapes import PreparedSurface, cortex_dice, prepare_for_comparison, scale_to_volume
-
-NOT_BASELINES = ("run", "target")
-"""Models that skill is not measured against: the run itself, and the surface that it grows towards."""
 
 
 def simple_predictions(
@@ -72,8 +70,8 @@ def prediction_table(
     Returns
     -------
     DataFrame
-        The labels, week, horizon (weeks since the start), model, the columns of `prediction_row`, and skill with
-        skill_low and skill_high of `add_skill`.
+        The labels, week, horizon (weeks since the start), model, the columns of `prediction_row`, skill with skill_low
+        and skill_high of `add_skill`, and resampled.
     """
     rows = []
     for week, surfaces in models.items():
@@ -83,7 +81,7 @@ def prediction_table(
             predicted = prepare_for_comparison(surface, observed[week], radius_mm)
             row = prediction_row(surface, predicted, observed[week], prepared[week], patch)
             rows.append({**labels, "week": week, "horizon": horizon, "model": model, **row})
-    return add_skill(pd.DataFrame(rows))
+    return add_skill(pd.DataFrame(rows)).assign(resampled=RESAMPLED)
 
 
 def prediction_row(
@@ -101,7 +99,7 @@ def prediction_row(
         `distances.surface_distances` and cortex_dice, aligned rigidly and not scaled; area_error and volume_error as
         fractions of the observed; r_… of each of `COMPARED_MAPS`; crossing_faces; roughness_ratio and
         curvature_rms_ratio to the observed surface; …_low and …_high, the 95 % intervals of distance_mm and
-        r_shape_index by a bootstrap over patches; drawn_mm, the mean distance in each sample, for
+        r_shape_index by a bootstrap over patches; drawn_mm, the mean distance in each of `draw_patches`, for
         `add_skill`.
     """
     aligned = align(predicted, observed)
@@ -120,7 +118,7 @@ def prediction_row(
         "curvature_rms_ratio": predicted_prepared.curvature_rms / prepared.curvature_rms,
     }
     for name, draws in (("distance_mm", drawn_mm), ("r_shape_index", drawn_r)):
-        row[f"{name}_low"], row[f"{name}_high"] = map(float, np.nanquantile(draws, INTERVAL))
+        _, row[f"{name}_low"], row[f"{name}_high"] = interval_of(draws)
     return row | {"drawn_mm": drawn_mm}
 
 
@@ -141,15 +139,19 @@ def roughness_mm(mesh: TriangleMesh) -> float:
 def add_skill(rows: pd.DataFrame) -> pd.DataFrame:
     """Add skill = 1 − distance / distance of the best baseline of the week, with its 95 % interval.
 
+    The best baseline is chosen in each bootstrap sample anew, so the interval includes that choice.
+
     Parameters
     ----------
     rows
-        Columns week, model, distance_mm, and drawn_mm, which the result does not have. All rows of a week have the same
-        bootstrap samples. Baselines are all models except `NOT_BASELINES`; without baselines, skill, skill_low and
-        skill_high are NaN.
+        Columns week, model and drawn_mm, which the result does not have. All rows of a week have the same samples.
+        Baselines are all models but `run`; without baselines, skill, skill_low and skill_high are NaN.
     """
-    simple = rows[~rows["model"].isin(NOT_BASELINES)]
-    best = simple.loc[simple.groupby("week")["distance_mm"].idxmin()].set_index("week")
-    skill, drawn = (1 - rows[name] / rows["week"].map(best[name]) for name in ("distance_mm", "drawn_mm"))
-    low, high = np.array([np.quantile(values, INTERVAL) for values in drawn]).T
-    return rows.drop(columns="drawn_mm").assign(skill=skill, skill_low=low, skill_high=high)
+    baselines = rows[rows["model"] != "run"]
+    best = {week: np.min(list(drawn), axis=0) for week, drawn in baselines.groupby("week")["drawn_mm"]}
+    skills = [
+        interval_of(1 - drawn / best.get(week, np.nan))
+        for week, drawn in zip(rows["week"], rows["drawn_mm"], strict=True)
+    ]
+    columns = dict(zip(("skill", "skill_low", "skill_high"), np.transpose(skills), strict=True))
+    return rows.drop(columns="drawn_mm").assign(**columns)

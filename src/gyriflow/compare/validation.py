@@ -64,7 +64,7 @@ def validation_table(
         brain = observed[week]
         prepared = prepare_for_comparison(simulated[week], brain.surface, radius_mm)
         row = {**labels, "week": week, "real": brain.brain, "horizon": week - labels["start_week"]}
-        rows.append(row | validation_row(simulated[week], prepared, brain, sizes.get(week, {}), horizon=row["horizon"]))
+        rows.append(row | validation_row(simulated[week], prepared, brain, sizes.get(week, {})))
     table = pd.DataFrame(rows)
     first = ["run", "kind", "start", "start_week", "week", "real", "horizon"]
     first += ["distance_mm", "distance95_mm", "cortex_dice"]
@@ -72,12 +72,7 @@ def validation_table(
 
 
 def validation_row(
-    simulated: TriangleMesh,
-    prepared: PreparedSurface,
-    observed: ObservedWeek,
-    sizes: Mapping[str, float],
-    *,
-    horizon: float,
+    simulated: TriangleMesh, prepared: PreparedSurface, observed: ObservedWeek, sizes: Mapping[str, float]
 ) -> dict[str, Any]:
     """Compare a simulated brain, as it is and `prepared`, with the observed one.
 
@@ -100,7 +95,7 @@ def validation_row(
         quantity, _ = name.split("_")
         row[f"{quantity}_error"] = row[name] / row[f"curve_{name}"] - 1
         row[f"{quantity}_difference"] = row[name] / row[f"real_{name}"] - 1
-    row |= score_placement(prepared, observed.prepared, observed.start, observed.adjacent, horizon=horizon)
+    row |= score_placement(prepared, observed.prepared, observed.start, observed.adjacent)
     return row | curvature_differences(prepared, observed.prepared)
 
 

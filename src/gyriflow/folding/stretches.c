@@ -12,8 +12,8 @@ static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] 
 
 // Of `count` elements between vertices at X before and x after: adds V/4 ln U (xx yy zz xy xz yz) and V/4 to the `sums`
 // (., 7) of their corners, and sets their F in `gradients` (., 3, 3) and V grad Ni . grad Nj in `pairs` (., 6). Six terms
-// of the series of ln(1 + x) give the logarithm to 3e-8 where the largest eigenvalue of FtF - 1 is 0.12. Where an entry
-// of FtF - 1 is not `small`, the element is left out of the sums and `large` (.,) is set to 1.
+// of the series of ln(1 + x) give the logarithm to 3e-8 where the largest eigenvalue of FtF - 1 is 0.12. Where its bound,
+// the sum of a row's absolute entries, is not `small`, the element is left out of the sums and `large` (.,) is set to 1.
 void stretch(long count, double small, const int64_t (*tets)[4], const double (*X)[3], const double (*x)[3],
              double (*sums)[7], double (*pairs)[6], double (*gradients)[3][3], uint8_t *large) {
     for (long e = 0; e < count; e++) {
@@ -31,8 +31,8 @@ void stretch(long count, double small, const int64_t (*tets)[4], const double (*
             gradients[e][i][j] = F[i][j];
             E[i][j] = F[0][i] * F[0][j] + F[1][i] * F[1][j] + F[2][i] * F[2][j] - (i == j);
             log[i][j] = (i == j) / 6.0;
-            largest = fmax(largest, fabs(E[i][j]));
         }
+        EACH(i, 3) largest = fmax(largest, fabs(E[i][0]) + fabs(E[i][1]) + fabs(E[i][2]));
         for (int order = 5; order >= 0; order--) {
             EACH(i, 3) EACH(j, 3) next[i][j] = E[i][0] * log[0][j] + E[i][1] * log[1][j] + E[i][2] * log[2][j];
             EACH(i, 3) EACH(j, 3) log[i][j] = order ? (i == j) / (double)order - next[i][j] : next[i][j] / 2;

@@ -14,8 +14,8 @@ from .stress import packed
 
 MAX_STRAIN = 0.3
 """Largest principal Hencky strain of growth in a step: elements with more are inverted in the target."""
-MAX_SERIES_ENTRY = 0.12
-"""Largest entry of FᵀF − I for which the logarithm is computed by its series."""
+MAX_SERIES_NORM = 0.12
+"""Largest row sum of |FᵀF − I|, a bound of its eigenvalues, for which the logarithm is computed by its series."""
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 """Corners of an element's edges, in the order of the pairs in the C code."""
 DECLARATION = """void stretch(long count, double small, void *tets, void *X, void *x,
@@ -51,7 +51,7 @@ class Stretches:
         gradients, large = np.empty((elements, 3, 3)), np.empty(elements, dtype=np.uint8)
         both = (np.ascontiguousarray(x, dtype=float) for x in (positions, positions + displacement))
         arrays = self.tets, *both, sums, pairs, gradients, large
-        self._code.stretch(elements, MAX_SERIES_ENTRY, *map(self._interface.from_buffer, arrays))
+        self._code.stretch(elements, MAX_SERIES_NORM, *map(self._interface.from_buffer, arrays))
         corners = self.tets[large > 0]
         edges = positions[corners[:, 1:]] - positions[corners[:, :1]]
         logs = packed(log_stretch(gradients[large > 0])) * np.linalg.det(edges)[:, None] / 24

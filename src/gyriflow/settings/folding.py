@@ -254,5 +254,7 @@ def require_maps(p: FoldingParameters, maps: Maps, vertices: int) -> None:
             raise InputError(f"the map {name} is missing", expected="a file with it, given with --maps")
         if (shape := maps[name].shape) != (vertices,):
             raise InputError(f"the map {name} does not fit the mesh", found=shape, expected=f"{vertices} values")
+        if bad := np.count_nonzero(~np.isfinite(maps[name])):
+            raise InputError(f"the map {name} has NaN or infinity", found=f"{bad} of {vertices} values")
     if problems := [line(problem.key, problem.text) for problem in value_problems(p, p.start_week, maps)]:
         raise InputError("folding parameters: " + "; ".join(problems))
