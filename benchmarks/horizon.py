@@ -23,7 +23,7 @@ from workflow import call
 
 WEEKS = range(22, 35)
 GROWN_BY = {"crl": "chinese", "chinese": "crl"}
-MODELS = ("run", "atlas", "atlas_deformed", "scaled")
+MODELS = ("run", "target", "atlas", "atlas_deformed", "scaled")
 NUMBERS = {"distance_mm": 3, "r_shape_index": 3, "area_error": 4, "volume_error": 4}
 RUN = "predicted"
 HEAD = """\

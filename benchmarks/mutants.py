@@ -46,8 +46,8 @@ BY_TESTS = {
     "study/test_participants.py": [("src/gyriflow/study/ages.py", "whole[4]) / 7", "whole[4]) / 10")],
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
-    "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "HORIZON_GW = 1.5", "HORIZON_GW = 0.5")],
-    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '("run", "target")', '("run",)')],
+    "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "interval_of(room)[1] > 0", "room[0] > 0")],
+    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '!= "run"]', '!= "target"]')],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),
         ("src/gyriflow/compare/deviation.py", " * expected_mm / start_mm", ""),

@@ -27,7 +27,7 @@ from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
-from ..settings.terms import ELEMENTS_NEEDED
+from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
@@ -145,7 +145,7 @@ def _contents(study: Study) -> str:
 
 
 def coarse_cortices(study: Study) -> Iterator[str]:
-    """Yield a warning for each simulation whose mesh is too coarse for the cortex at its start."""
+    """Yield a warning for each simulation whose elements have a large error or are too few for the cortex's start."""
     mesh = study.config.mesh
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
@@ -154,12 +154,14 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, simulation.start.week)
-        if (elements := through / mesh.surface_edge_mm) < 0.99 * needed:
-            fine_mm = math.floor(100 * through / needed) / 100
-            yield (
-                f"run {simulation.run} from {simulation.start.id}: about {elements:.1f} elements through the cortex, "
-                f"{needed:g} are needed; use mesh.surface_edge_mm: {fine_mm:g}"
-            )
+        elements = through / mesh.surface_edge_mm
+        error, text = element_error(mesh.order, elements)
+        few, remedy = "", "mesh.order: 2"
+        if is_coarse := elements < 0.99 * needed:
+            few = f", fewer than the {needed:g} needed"
+            remedy = f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
+        if is_coarse or error > LARGE_ELEMENT_ERROR:
+            yield f"run {simulation.run} from {simulation.start.id}: about {text}{few}; use {remedy}"
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:

@@ -24,6 +24,7 @@ PARAMETER_TITLES = {
     "tets": "elements",
     "order": "order of the elements",
     "elements_through_cortex": "elements through the cortex at the start",
+    "element_error_percent": "error of the elements: fastest wave too slow by up to (%)",
     "newton": "Newton iterations",
     "seconds": "time of the solve (s)",
     "peak_memory_MiB": "memory (MiB)",

@@ -17,7 +17,14 @@ from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
 from ..settings.growth import GROWTH_MODELS
-from ..settings.terms import ELEMENTS_NEEDED, MEASURED, SPREAD_UNKNOWN, run_names
+from ..settings.terms import (
+    ELEMENTS_NEEDED,
+    LARGE_ELEMENT_ERROR,
+    MEASURED,
+    SPREAD_UNKNOWN,
+    element_error,
+    run_names,
+)
 from .labels import metric_title, plain, week_label
 from .tables import VERDICTS, accuracy_table, brain_table, centile_text, html_table, predicted_table, range_text
 
@@ -407,6 +414,9 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
         words.append(too_coarse)
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
         words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
+    if (elements := run["elements_through_cortex"]) > 0:  # not NaN
+        error, text = element_error(int(run["order"]), elements)
+        words += [text] if error > LARGE_ELEMENT_ERROR else []
     return "; ".join(words)
 
 
@@ -432,14 +442,19 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
         value = validation.get(name, np.nan)
         return "–" if pd.isna(value) else format(factor * value, pattern).replace("-", "−")
 
-    interval = f"{text('gain_low_shape_index', '+.2f')} to {text('gain_high_shape_index', '+.2f')}"
+    def spread(name: str, pattern: str) -> str:
+        ends = " to ".join(text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high"))
+        return f"{text(f'{name}_shape_index', pattern)} ({ends})" if len(validation) else "–"
+
+    has_skill = validation.get("skill_flag_shape_index", "ok") == "ok"
     return {
         "observed brain": f"{week_label(validation['week'])}, {validation['kind']}" if len(validation) else "none",
         "distance (mm)": text("distance_mm", ".2f"),
-        "r": text("r_shape_index", ".2f"),
+        "r": spread("r", ".2f"),
         "r of the scaled start": text("r_start_shape_index", ".2f"),
-        "gain": text("gain_shape_index", "+.2f"),
-        "95 % interval": "–" if interval == "– to –" else interval,
+        "gain": spread("gain", "+.2f"),
+        "room": spread("room", "+.2f"),
+        "skill": spread("skill", ".2f") if has_skill else validation["skill_flag_shape_index"],
         "area (%)": text("area_difference", "+.1f", 100),
         "volume (%)": text("volume_difference", "+.1f", 100),
     }

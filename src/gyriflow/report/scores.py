@@ -47,13 +47,13 @@ def validation_chart(
 ) -> Figure:
     """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
 
-    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Also drawn are the
-    observed brain of the adjacent week, the reference of skill, and the start carried by registration alone.
+    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Stars are the room,
+    the gain of the observed brain of the adjacent week; dotted is the start carried by registration alone.
 
     Parameters
     ----------
     validation
-        Columns run, start_week, week, kind, gain_…, gain_low_…, gain_high_…, r_start_…, r_adjacent_… of each of
+        Columns run, start_week, week, kind, and gain and room (gain_…, gain_low_…, gain_high_…) of each of
         `COMPARED_MAPS`.
     ceiling : the same of the start carried by registration
     """
@@ -65,8 +65,10 @@ def validation_chart(
             shift = 0.03 * (number - (len(colours) - 1) / 2)
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
         for _, rows in validation.groupby("start_week"):
-            adjacent = (rows[f"r_adjacent_{measure}"] - rows[f"r_start_{measure}"]).groupby(rows["week"]).first()
-            axes.plot(adjacent.index, adjacent, "*", color=OBSERVED_COLOUR, markersize=6)
+            weeks = rows.drop_duplicates("week")
+            bars = _bars(weeks, "room", measure)
+            style = {"color": OBSERVED_COLOUR, "markersize": 6, "elinewidth": 0.7}
+            axes.errorbar(weeks["week"], weeks[f"room_{measure}"], yerr=bars, fmt="*", **style)
         for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
             gain = rows[f"gain_{measure}"]
             axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)
@@ -87,11 +89,16 @@ def validation_chart(
 def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
     """Draw a gain with its interval; filled marks are explained weeks, open ones predicted."""
     gain = rows[f"gain_{measure}"]
-    bars = np.stack([gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain])
-    axes.errorbar(x, gain, yerr=bars.clip(min=0), color=colour, linewidth=1.0, elinewidth=0.7)
+    axes.errorbar(x, gain, yerr=_bars(rows, "gain", measure), color=colour, linewidth=1.0, elinewidth=0.7)
     for kind, face in (("explained", colour), ("predicted", "white")):
         if (selected := rows["kind"] == kind).any():
             axes.plot(x[selected], gain[selected], "o", color=colour, markerfacecolor=face)
+
+
+def _bars(rows: pd.DataFrame, name: str, measure: str) -> Any:
+    """Return the lengths (2, n) of the bars below and above values, to the ends of their intervals."""
+    value, low, high = (rows[f"{part}_{measure}"] for part in (name, f"{name}_low", f"{name}_high"))
+    return np.stack([value - low, high - value]).clip(min=0)
 
 
 @styled

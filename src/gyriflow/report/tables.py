@@ -10,7 +10,15 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from ..quantities import METRICS
-from ..settings.terms import CARBON_INTENSITY_G_PER_KWH, CORE_POWER_W, ELEMENTS_NEEDED, MEASURED, OBSERVED_BRAIN, SIDES
+from ..settings.terms import (
+    CARBON_INTENSITY_G_PER_KWH,
+    CORE_POWER_W,
+    ELEMENTS_NEEDED,
+    MEASURED,
+    OBSERVED_BRAIN,
+    SIDES,
+    element_error,
+)
 from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
 from .style import run_colours, runs_by_name
 
@@ -35,7 +43,8 @@ COMMON_PARAMETERS = (
         "contact.kind",
         "no_growth.kind",
     ),
-    *("step_s", "tets", "order", "elements_through_cortex", "steps", "newton", "seconds", "peak_memory_MiB"),
+    *("step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
+    *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
 PREDICTION_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness")
@@ -165,12 +174,13 @@ def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
     Returns
     -------
     dict
-        `order`, `least_elements_through_cortex`, and `unresolved_from_week`, the first week with fewer elements than
-        `ELEMENTS_NEEDED` (NaN if there is none).
+        `order`, `element_error_percent` (`element_error` at the start), `least_elements_through_cortex`, and
+        `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none).
     """
     through = steps["elements_through_cortex"].fillna(0.0)
     return {
         "order": order,
+        "element_error_percent": round(element_error(order, through.iloc[0])[0], 1),
         "least_elements_through_cortex": float(through.min()),
         "unresolved_from_week": float(steps.loc[through < ELEMENTS_NEEDED[order], "week"].min()),
     }
@@ -213,8 +223,8 @@ def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     table = prediction.assign(model=models.where(prediction["model"] != "run", prediction["run"]))
     # simpler predictions are the same for all runs
     table = table.drop_duplicates(["start", "week", "model"]).set_index(["start", "week", "model"])
-    columns = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error"]
-    return table[[*columns, "crossing_faces", "roughness_ratio", "skill"]].rename(columns=plain)
+    columns = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error", "crossing_faces"]
+    return table[[*columns, "roughness_ratio", "skill", "skill_low", "skill_high"]].rename(columns=plain)
 
 
 def predicted_table(metrics: pd.DataFrame, prediction: Mapping[str, Any]) -> pd.DataFrame:

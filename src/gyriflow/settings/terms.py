@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
+import numpy as np
+
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = get_args(Side)
 STRUCTURES: dict[Side, Literal["CortexLeft", "CortexRight"]] = {"left": "CortexLeft", "right": "CortexRight"}
@@ -53,6 +55,11 @@ ELEMENTS_NEEDED = {1: 2.0, 2: 0.8}
 fewer, folds may depend on the mesh. The value for quadratic elements comes from docs/verification.md (Convergence on a
 brain): two node distances through the thickness at the surface are enough, and that mesh has a count of 0.81 at its
 start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious."""
+ELEMENT_ERRORS = {1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5}, 2: {1.0: 4.3, 2.0: 0.9}}
+"""How much too slowly the fastest wave grows, in %, by element order and cells per thickness of a uniform slab
+(docs/verification.md, Elements). The mean edge there is 1.26 cells, so for as many elements these are upper bounds."""
+LARGE_ELEMENT_ERROR = 10.0
+"""Error in % from which `element_error` is a warning."""
 
 MAX_NAME_LENGTH = 100
 """Longest name of a brain, run or study; file names are limited to 255 bytes."""
@@ -107,6 +114,17 @@ CORE_POWER_W = 12.0
 """Power of a busy core: a processor's over its cores."""
 CARBON_INTENSITY_G_PER_KWH = 475.0
 """CO₂ emitted for electricity, the world's average of 2019 (IEA)."""
+
+
+def element_error(order: int, elements: float) -> tuple[float, str]:
+    """Return the error of the fastest wave in % with so many elements through the cortex, and a clause with it."""
+    errors = ELEMENT_ERRORS[order]
+    error = float(np.exp(np.interp(np.log(max(0.1, elements)), np.log(list(errors)), np.log(list(errors.values())))))
+    bound = "up to" if elements >= 0.99 * ELEMENTS_NEEDED[order] else "more than"
+    text = f"the fastest wave of folding grows {bound} {error:.0f} % too slowly"
+    if order == 1 and error > LARGE_ELEMENT_ERROR:
+        text += f" (quadratic elements on as many nodes: up to {element_error(2, max(elements / 2, 1.0))[0]:.0f} %)"
+    return error, f"{elements:.1f} {'linear' if order == 1 else 'quadratic'} elements through the cortex: {text}"
 
 
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:

@@ -66,9 +66,10 @@ VALIDATION = Kind(
     caption=(
         "Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the observed "
         "brain, less the r of the scaled start brain. Above 0, the simulation places folds better than the scaled "
-        "start. Bars: 95 % intervals of a bootstrap over patches of the surface. Filled marks: explained weeks, whose "
-        "observed brains gave the growth; open marks: predicted weeks. Dotted: the start carried to the observed brain "
-        "by registration."
+        "start. Stars: room, the gain of the observed brain of the week before; there is no room for skill where its "
+        "interval reaches 0. Bars: 95 % intervals of a bootstrap over patches of this one brain, not over subjects. "
+        "Filled marks: explained weeks, whose observed brains gave the growth; open marks: predicted weeks. Dotted: "
+        "the start carried to the observed brain by registration."
     ),
     target="validate",
     job="validation_charts",
@@ -95,8 +96,8 @@ PREDICTION_TABLE = Kind(
     title="Predicted brains, table",
     caption=(
         "The same in numbers, unscaled except for r. Skill is 1 − distance / distance of the best simpler prediction "
-        "of the week; roughness is relative to the observed surface. All columns are in "
-        "``results/study/prediction.csv``."
+        "of the week, with its 95 % interval (low, high): patches of one brain are resampled, not subjects. Roughness "
+        "is relative to the observed surface. All columns are in ``results/study/prediction.csv``."
     ),
     target="validate",
 )

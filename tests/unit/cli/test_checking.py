@@ -97,9 +97,19 @@ def coarse(mesh, **folding):
 
 def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
     fine = {"surface_edge_mm": 0.7}
-    assert coarse(fine | {"order": 1}, thickness_mm=1.0) == [Facts(1.4, 2, "mesh.surface_edge_mm: 0.47")]
-    assert coarse(fine, thickness_mm=1.5) == coarse({"surface_edge_mm": 0.47, "order": 1}, thickness_mm=1.0) == []
+    assert coarse(fine | {"order": 1}, thickness_mm=1.0) == [Facts(1.4, 2, "32 %", "mesh.surface_edge_mm: 0.47")]
+    assert coarse(fine, thickness_mm=1.5) == []
     assert "mesh.surface_edge_mm: 0.48" in coarse(fine, thickness_mm={"weeks": {22: 0.5, 24: 1.5}})[0]
+
+
+@pytest.mark.fault(84)
+@pytest.mark.parametrize(
+    ("edge_mm", "facts"),
+    [(0.47, ["2.0 linear", "32 %", "4 %", "mesh.order: 2"]), (0.235, ["4.0 linear", "13 %"]), (0.12, None)],
+)
+def test_linear_elements_that_are_enough_are_told_with_their_error(edge_mm, facts):
+    found = coarse({"surface_edge_mm": edge_mm, "order": 1}, thickness_mm=1.0)
+    assert found == ([Facts(*facts)] if facts else [])
 
 
 def test_a_look_leaves_nothing_behind(tmp_path):

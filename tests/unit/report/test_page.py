@@ -54,8 +54,10 @@ VALIDATION = pd.DataFrame(
     {
         "run": "thin", "kind": "predicted", "start_week": 21.0, "week": [22.0, 23.0], "area_difference": [0.1, -0.0794],
         "volume_difference": [0.0, 0.02], "r_shape_index": [0.1, 0.566], "r_start_shape_index": [0.1, 0.568],
+        "r_low_shape_index": [0.0, 0.51], "r_high_shape_index": [0.2, 0.61], "distance_mm": [0.1, 0.42],
         "gain_shape_index": [0.0, -0.002], "gain_low_shape_index": [0.0, -0.044], "gain_high_shape_index": [0.0, 0.045],
-        "skill_shape_index": [np.nan, np.nan], "distance_mm": [0.1, 0.42],
+        "room_shape_index": [0.0, 0.03], "room_low_shape_index": [0.0, -0.05], "room_high_shape_index": [0.0, 0.08],
+        "skill_shape_index": [np.nan, np.nan], "skill_flag_shape_index": "no room",
     }
 )  # fmt: skip
 
@@ -168,7 +170,7 @@ def test_the_verdict_tells_what_was_compared_and_the_worst_warning():
     assert told == Facts("23 GW", "thin", "predicted", 0.57, "0.42 mm", 1.2, 2)
     failed = pd.DataFrame({"level": ["warning", "error"], "message": ["holes closed", "a step died."]})
     assert verdict(RUNS, VALIDATION, failed) == Facts("23 GW", "a step died.") != Facts("holes closed")
-    alone = verdict(RUNS.assign(elements_through_cortex=3.0, unresolved_from_week=np.nan), None, none)
+    alone = verdict(RUNS.assign(elements_through_cortex=8.5, unresolved_from_week=np.nan), None, none)
     assert alone == Facts(NOT_COMPARED)
     assert not re.search(r"\d", alone)
     assert told in page(shown("growth_figure")).replace("&#39;", "'")
@@ -272,32 +274,39 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["verdict"] == Facts("22 GW", 23, 1.2, 2)
     assert row["observed brain"] == Facts("23 GW", "predicted")
     assert row["area (%)"] == "−7.9"
-    assert (row["gain"], row["95 % interval"]) == ("−0.00", "−0.04 to +0.04")
+    assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
+    assert (row["room"], row["skill"]) == ("+0.03 (−0.05 to +0.08)", "no room")
     assert row["distance (mm)"] == "0.42"
     (alone,) = scores_table(RUNS).to_dict("records")
-    assert [alone[name] for name in ("gain", "95 % interval")] == ["–", "–"]
+    assert [alone[name] for name in ("gain", "room", "skill")] == ["–", "–", "–"]
+    roomy = {"skill_shape_index": 0.4, "skill_low_shape_index": -0.1, "skill_high_shape_index": 0.8}
+    (row,) = scores_table(RUNS, VALIDATION.assign(skill_flag_shape_index="ok", **roomy)).to_dict("records")
+    assert row["skill"] == "0.40 (−0.10 to 0.80)"
     assert "GW" not in alone["observed brain"]
 
 
 @pytest.mark.parametrize(
     ("order", "through", "facts"),
     [
-        (1, (2.4, 2.2), []),
+        (1, (8.4, 8.2), []),
+        (1, (2.0, 2.0), [["2.0 linear", "32 %", "4 %"]]),
         (2, (1.0, 1.0), []),
-        (1, (1.0, 1.0), [1, 2]),
-        (2, (0.6, 0.5), [0.6]),
-        (1, (2.3, 2.1, 1.9, 1.7), ["22.5 GW", 1.7, 2]),
-        (2, (1.0, 0.9, 0.7, 0.6), ["22.5 GW", 0.6]),
-        (2, (1.0, 0.9, np.nan), [0]),
+        (1, (1.0, 1.0), [[1, 2], ["32 %"]]),
+        (2, (0.6, 0.5), [[0.6]]),
+        (1, (2.3, 2.1, 1.9, 1.7), [["22.5 GW", 1.7, 2], ["27 %"]]),
+        (2, (1.0, 0.9, 0.7, 0.6), [["22.5 GW", 0.6]]),
+        (2, (1.0, 0.9, np.nan), [[0]]),
+        (1, (np.nan, np.nan), [["nan", 2]]),
     ],
 )
+@pytest.mark.fault(84)
 def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, facts):
     # to its end, with so many elements before its steps of half a week and in them
     steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
     run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
     run |= resolution_over_steps(order, steps)
     reached, *doubts = run_verdict(run).split("; ")
-    assert (reached, doubts) == (Facts("23 GW"), [Facts(*facts)] * bool(facts))
+    assert (reached, doubts) == (Facts("23 GW"), [Facts(*doubt) for doubt in facts])
     assert len(run_verdict(run | {"min_J": -0.1}).split("; ")) == 2 + len(doubts)
     assert run_verdict(run | {"initial_penetration_mm": 0.45}) == run_verdict(run)
     assert run_verdict(run | {"initial_penetration_mm": 0.55}) == Facts("0.55 mm")
