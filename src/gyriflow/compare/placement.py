@@ -21,7 +21,7 @@ N_DRAWS = 2000
 INTERVAL = (0.025, 0.975)
 """Quantiles of the bootstrap samples at the ends of a 95 % interval."""
 RESAMPLED = "patches of one brain, not subjects"
-"""What the samples are drawn from, as tables say: the intervals do not cover differences between subjects."""
+"""What the bootstrap draws, as written in tables: the intervals do not cover differences between subjects."""
 NO_ROOM = "no room"
 """Flag in place of a skill where the baseline of skill is not certainly better than the start."""
 
@@ -62,14 +62,15 @@ def score_placement(
     adjacent
         The observed brain of the week before.
     """
-    simulated_values, matched_share = interpolate_measures(simulated, observed)
-    baselines = [interpolate_measures(surface, observed)[0] for surface in (start, adjacent)]
+    (run_maps, matched_share), (start_maps, _), (adjacent_maps, _) = (
+        interpolate_measures(surface, observed) for surface in (simulated, start, adjacent)
+    )
     patch, symmetry = make_patches(observed)
     row = {"matched_share": matched_share} | symmetry | {"resampled": RESAMPLED}
-    for measure in COMPARED_MAPS:
-        values = [maps[measure] for maps in (simulated_values, *baselines)]
-        scores = correlation_scores(getattr(observed, measure), *values, observed.areas, patch)
-        row |= {f"{name}_{measure}": score for name, score in scores.items()}
+    for name in COMPARED_MAPS:
+        compared = run_maps[name], start_maps[name], adjacent_maps[name]
+        scores = correlation_scores(getattr(observed, name), *compared, observed.areas, patch)
+        row |= {f"{score}_{name}": value for score, value in scores.items()}
     return row
 
 

@@ -66,9 +66,8 @@ def validation_chart(
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
         for _, rows in validation.groupby("start_week"):
             weeks = rows.drop_duplicates("week")
-            bars = _bars(weeks, "room", measure)
-            style = {"color": OBSERVED_COLOUR, "markersize": 6, "elinewidth": 0.7}
-            axes.errorbar(weeks["week"], weeks[f"room_{measure}"], yerr=bars, fmt="*", **style)
+            room, bars = weeks[f"room_{measure}"], _bars(weeks, "room", measure)
+            axes.errorbar(weeks["week"], room, yerr=bars, fmt="*", color=OBSERVED_COLOUR, markersize=6, elinewidth=0.7)
         for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
             gain = rows[f"gain_{measure}"]
             axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)

@@ -57,9 +57,9 @@ brain): two node distances through the thickness at the surface are enough, and 
 start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious."""
 ELEMENT_ERRORS = {1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5}, 2: {1.0: 4.3, 2.0: 0.9}}
 """How much too slowly the fastest wave grows, in %, by element order and cells per thickness of a uniform slab
-(docs/verification.md, Elements). The mean edge there is 1.26 cells, so for as many elements these are upper bounds."""
+(docs/verification.md, Elements). Its mean edge is 1.26 cells, so for as many elements these are upper bounds."""
 LARGE_ELEMENT_ERROR = 10.0
-"""Error in % from which `element_error` is a warning."""
+"""Smallest error in % that is a warning."""
 
 MAX_NAME_LENGTH = 100
 """Longest name of a brain, run or study; file names are limited to 255 bytes."""

@@ -220,7 +220,7 @@ def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_besid
     assert (rows.groupby("horizon")["start"].nunique() == 2).all()
     assert not rows.duplicated(["start", "horizon", "model"]).any()
     by_way = rows.pivot_table("distance_mm", ["start", "horizon"], "model")
-    assert set(by_way) == {"run", "atlas", "atlas_deformed", "scaled"}
+    assert set(by_way) == {"run", "target", "atlas", "atlas_deformed", "scaled"}
     assert by_way.notna().all(axis=None)
     # a prediction that is worth less than no folding would not be shipped
     assert (by_way["run"] < by_way["scaled"]).all()
