@@ -145,8 +145,9 @@ def _contents(study: Study) -> str:
 
 
 def coarse_cortices(study: Study) -> Iterator[str]:
-    """Yield a warning for each simulation whose elements have a large error or are too few for the cortex's start."""
+    """Yield a warning for each number of elements too small for the cortex at its start, or with a large error."""
     mesh = study.config.mesh
+    coarse: dict[str, list[str]] = defaultdict(list)
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
         thickness = simulation.settings.thickness_mm
@@ -161,7 +162,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
             few = f", fewer than the {needed:g} needed"
             remedy = f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
         if is_coarse or error > LARGE_ELEMENT_ERROR:
-            yield f"run {simulation.run} from {simulation.start.id}: about {text}{few}; use {remedy}"
+            coarse[f"about {text}{few}; use {remedy}"].append(f"run {simulation.run} from {simulation.start.id}")
+    yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:

@@ -78,7 +78,7 @@ def validation_chart(
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
-    extra: list[Artist] = [star("observed brain of the week before", markersize=6)]
+    extra: list[Artist] = [star("room: observed brain of the week before", markersize=6)]
     if ceiling is not None and len(ceiling):
         extra.append(Line2D([], [], color=MUTED_COLOUR, linestyle=":", label="registration alone"))
     run_legend(figure, colours, extra=extra)
