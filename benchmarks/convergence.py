@@ -1,17 +1,15 @@
-"""Measure how folding depends on the mesh: one smooth start surface, several resolutions, both element orders.
+"""Measure how the folds of a brain depend on the mesh, the elements and the time step.
 
     ./run python benchmarks/convergence.py --folder FOLDER
 
-A smooth hemisphere of 21 GW is folded on meshes of several resolutions. Its cortex and core grow; it is free and in
-contact with itself. Resolution is the number of node distances per cortical thickness, so linear and quadratic meshes
-have about the same number of unknowns. The shape is the left half of the shipped atlas brain of 21 GW, from labels
-smoothed more than in a study. It gets shallow bumps of 8 to 24 mm, far higher than facets and mesh noise, so every mesh
-starts from the same imperfection. Every run carries the same surface, which is measured, and is compared with the
-finest run at the same material points. A second mesh of the same resolution, of the rotated surface, shows how much is
-chance.
+The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness, stiffness and growth, the same
+at all places, free and in contact with itself, until its gyrification index is 1.3. Resolution is the number of node
+distances per cortical thickness. Three quadratic meshes have the same step of a day, one of them also half a day and
+two days, and one mesh is of linear elements. Every run carries the same surface, which is measured, and is compared
+with the finest run at the same material points.
 
 Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
-last line is one JSON object with `runs` and the differences from the finest run (`against_finest`).
+last line is one JSON object with `runs`, the values of the finest one and the differences from it (`against_finest`).
 
     ./run python benchmarks/convergence.py --folder FOLDER --run MESH PARAMS [MAPS]
 
@@ -36,62 +34,52 @@ from gyriflow.anatomy.labels import read_cerebrum
 from gyriflow.anatomy.pose import pose_of_hemisphere
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.compare.placement import correlation
-from gyriflow.geometry.alignment import motion, rigid_fit, without_rigid_motion
+from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
 from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
 from gyriflow.io.files import read_json
-from gyriflow.io.frames import read_positions, read_tets
+from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
-from gyriflow.metrics.measure import folding_metrics, measure_hemisphere, size_metrics, spectrum_metrics
+from gyriflow.metrics.measure import folding_metrics, measure_hemisphere, size_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM
 
 ROOT = Path(__file__).resolve().parents[1]
 Floats = NDArray[np.float64]
 
 LABELS = "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
-START_WEEK, END_WEEK = 21.0, 28.0
-SMOOTHING_VOXELS = 2.0
-BUMPS, BUMP_MM = 24, 0.15
-"""Number of waves, and the standard deviation of their sum."""
-WAVELENGTHS_MM = (8.0, 24.0)
-FINE_EDGE_MM = 0.6
+START_WEEK, END_WEEK, OUTPUTS_A_WEEK = 21.0, 30.0, 4
+END_GI = 1.3
+"""Gyrification index of the finest run at which all runs are compared."""
+SURFACE_EDGE_MM = 0.6
 """Edge length of the surface that all meshes are made from."""
 MEASURED_EDGE_MM = 1.0
 """Edge length of the surface that every run carries and that is measured, as in a study."""
 CORE_FACTOR = 1.6
 """Node distance inside over that at the surface: meshes differ only in scale."""
-ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
-"""Rotation of the surface during meshing, which gives another mesh of the same resolution."""
 ORDERS = {1: "linear", 2: "quadratic"}
-NODES_TO_CORTEX = (1.41, 2.0, 2.83, 4.0)
-"""Cortical thickness over the node distance at the surface; quadratic elements per thickness are half as many."""
-REPEATED = 2.0
-"""Resolution of the second mesh of quadratic elements."""
-THICKNESS_MM = 2.0
+THICKNESS_MM = 1.5
 DAY_S = 86400.0
 PARAMETERS = {
     "start_week": START_WEEK,
     "end_week": END_WEEK,
-    "output_weeks": [START_WEEK, END_WEEK],
-    "step_s": DAY_S,
+    "output_weeks": np.linspace(START_WEEK, END_WEEK, int((END_WEEK - START_WEEK) * OUTPUTS_A_WEEK) + 1).tolist(),
     "thickness_mm": THICKNESS_MM,
+    "shear_modulus_cortex_pa": 1500.0,
+    "shear_modulus_core_pa": 300.0,
     "contact": {"kind": "global"},
     "fissure_x_mm": 0.0,
-    # about the growth of the atlas' areas and volumes from 21 to 29 GW, if nothing were compressed
     "growth_rate_per_s": 2.0e-7,
-    "core_growth_rate_per_s": 0.8e-7,
     "support": "free",
     "no_growth": {"kind": "none"},
     "fields": ["displacement"],
 }
 COMPARED = (
-    *("area", "volume", "gyrification_index", "mean_sulcal_depth", "sulcal_depth_95", "mean_curvedness"),
-    *("folding_index", *(f"spangy_B{band}_relative_power" for band in range(1, 6))),
+    *("area", "gyrification_index", "mean_curvedness", "mean_sulcal_depth", "sulcal_depth_95", "folding_index"),
 )
 TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
 """Newton tolerances and time steps to try with a study's run, the most accurate first."""
@@ -99,7 +87,7 @@ TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
 
 @cache
 def start_surface() -> TriangleMesh:
-    """Return the smooth hemisphere, closed and outward, in RAS+ mm."""
+    """Return the surface of the hemisphere, closed and outward, in RAS+ mm."""
     volume, scheme = read_label_volume(ROOT / LABELS), SCHEMES["spina-bifida-atlas"]
     places = np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T + volume.affine[:3, 3]
     x = places[..., 0]
@@ -107,40 +95,36 @@ def start_surface() -> TriangleMesh:
     # shifted by half a voxel, since the middle lies on voxel centres
     left = np.where(x < (cerebrum_x.min() + cerebrum_x.max()) / 2 - volume.affine[0, 0] / 2, volume.labels, 0)
     cerebrum = read_cerebrum(left, volume.affine, scheme, 0.0)
-    field = smooth_mask(cerebrum.mask, SMOOTHING_VOXELS)
-    mesh = surface_of_mask(field, cerebrum.affine, cerebrum.volume_mm3, FINE_EDGE_MM).mesh
-    smooth = transformed(mesh, pose_of_hemisphere(mesh, "left", "auto", of_volume=True).of_file())
-    height = bumps(smooth.vertices)
-    return TriangleMesh(smooth.vertices + height[:, None] * vertex_normals(smooth), smooth.faces)
-
-
-def bumps(points: Floats) -> Floats:
-    """Return the (n,) height in mm of the bumps: waves in directions spread evenly (a Fibonacci sphere)."""
-    number = np.arange(BUMPS) + 0.5
-    polar, azimuth = np.arccos(1 - 2 * number / BUMPS), np.pi * (1 + np.sqrt(5)) * number
-    directions = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)], axis=1)
-    phases = 2 * np.pi * (points @ directions.T) / np.linspace(*WAVELENGTHS_MM, BUMPS) + number**2
-    return BUMP_MM * np.cos(phases).sum(axis=1) / np.sqrt(BUMPS / 2)
+    mesh = surface_of_mask(smooth_mask(cerebrum.mask), cerebrum.affine, cerebrum.volume_mm3, SURFACE_EDGE_MM).mesh
+    return transformed(mesh, pose_of_hemisphere(mesh, "left", "auto", of_volume=True).of_file())
 
 
 @dataclass(frozen=True)
 class Case:
-    """A mesh to fold: element order, node distances per cortical thickness, and whether the surface was rotated."""
+    """A run: element order, node distances per cortical thickness, and the time step in days."""
 
     order: int
     nodes: float
-    turned: bool = False
+    step_days: float = 1.0
+
+    @property
+    def mesh_name(self) -> str:
+        return f"{ORDERS[self.order]}-{self.nodes:g}"
 
     @property
     def name(self) -> str:
-        return f"{ORDERS[self.order]}-{self.nodes:g}{'-turned' if self.turned else ''}"
+        return f"{self.mesh_name}-{self.step_days:g}-days"
+
+
+FINEST = Case(2, 2.83)
+CASES = (Case(1, 2.0), Case(2, 1.41), Case(2, 2.0), Case(2, 2.0, 2.0), Case(2, 2.0, 0.5), FINEST)
 
 
 def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
     """Return the mesh of a case."""
-    rotation, spacing_mm = ROTATION if case.turned else np.eye(3), THICKNESS_MM / case.nodes
-    mesh = tetrahedralise(
-        transformed(surface, motion(rotation)),
+    spacing_mm = THICKNESS_MM / case.nodes
+    return tetrahedralise(
+        surface,
         surface_edge_mm=spacing_mm,
         core_edge_mm=CORE_FACTOR * spacing_mm,
         envelope_mm=0.1,
@@ -148,15 +132,14 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
         mesher="tetgen",
         order=case.order,
     )
-    return TetrahedralMesh(mesh.vertices @ rotation, mesh.tets)
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """The measured surface moved by a run, the mean curvature (1/mm) at its vertices, and its metrics."""
+    """The measured surface moved by a run, its shape index at the vertices, and its metrics."""
 
     surface: TriangleMesh
-    mean_curvature: Floats
+    shape_index: Floats
     values: dict[str, float]
 
 
@@ -177,24 +160,21 @@ def carried(frames: Path, week: float) -> Carried:
     mesh = measured_surface()
     match = match_points(mesh.vertices, vertex_normals(mesh), TriangleMesh(before, faces))
     surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
-    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, "B5")
-    metrics = size_metrics(surface, side.crossing) | folding_metrics([side]) | spectrum_metrics(side)
-    return Carried(surface, side.curvature_maps.mean, metrics)
+    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, 2)
+    metrics = size_metrics(surface, side.crossing) | folding_metrics([side])
+    return Carried(surface, side.curvature_maps.shape_index, metrics)
 
 
 def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
     parser.add_argument("--run", type=Path, nargs="+", help="mesh, params.yaml and, if there is one, maps.h5 of a run")
-    parser.add_argument(
-        "--nodes", type=float, nargs="+", default=list(NODES_TO_CORTEX), help="node distances per cortical thickness"
-    )
     return parser.parse_args()
 
 
 def mesh_file(folder: Path, case: Case) -> Path:
     """Return the file of a case's mesh; make the mesh if the file does not exist."""
-    file = folder / f"{case.name}.xdmf"
+    file = folder / f"{case.mesh_name}.xdmf"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
         write_tetrahedral_mesh(file, mesh_of(start_surface(), case))
@@ -215,23 +195,20 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict
     return read_json(out / "summary.json")
 
 
-def resolution_runs(arguments: argparse.Namespace) -> dict[Case, dict[str, Any]]:
-    """Fold all cases, coarse ones first, and return the size and cost of each run."""
-    cases = [Case(order, nodes) for nodes in sorted(arguments.nodes) for order in ORDERS]
-    if REPEATED in arguments.nodes:
-        cases.append(Case(2, REPEATED, turned=True))
-    rows = {}
-    for case in cases:
-        mesh = mesh_file(arguments.folder / "meshes", case)
-        summary = fold(mesh, arguments.folder / "runs" / case.name, PARAMETERS)
-        size = {"nodes": len(read_tetrahedral_mesh(mesh).vertices), "elements_to_cortex": case.nodes / case.order}
-        rows[case] = {"run": case.name, **size, **{key: summary[key] for key in summary if key != "weeks"}}
-        print(json.dumps(rows[case]), flush=True)
+def runs_of_cases(folder: Path) -> list[dict[str, Any]]:
+    """Fold all cases, and return the size and cost of each run."""
+    rows = []
+    for case in CASES:
+        mesh = mesh_file(folder / "meshes", case)
+        summary = fold(mesh, folder / "runs" / case.name, PARAMETERS | {"step_s": case.step_days * DAY_S})
+        nodes = len(read_tetrahedral_mesh(mesh).vertices)
+        rows.append({"run": case.name, "nodes": nodes, **{key: summary[key] for key in summary if key != "weeks"}})
+        print(json.dumps(rows[-1]), flush=True)
     return rows
 
 
 def difference(run: Carried, reference: Carried, start: Carried) -> dict[str, float]:
-    """Return how a run differs from a reference at a week: material points and surfaces (mm), curvature, metrics."""
+    """Return how a run differs from a reference: material points and surfaces (mm), shape index, metrics (relative)."""
     areas = vertex_areas(reference.surface)
     gaps = without_rigid_motion(reference.surface.vertices, run.surface.vertices, areas)
     displacements = without_rigid_motion(start.surface.vertices, reference.surface.vertices, areas)
@@ -248,8 +225,9 @@ def difference(run: Carried, reference: Carried, start: Carried) -> dict[str, fl
         "displacement_share": rms(gaps) / rms(displacements),
         "surface_distance_mm": distance,
         "surface_distance_95_mm": distance95,
-        "r_mean_curvature": correlation(run.mean_curvature, reference.mean_curvature, areas),
-        **{name: run.values[name] - reference.values[name] for name in COMPARED},
+        "r_shape_index": correlation(run.shape_index, reference.shape_index, areas),
+        "crossing_faces": run.values["crossing_faces"],
+        **{name: run.values[name] / reference.values[name] - 1 for name in COMPARED},
     }
 
 
@@ -286,24 +264,26 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any
     }
 
 
-def against_finest(arguments: argparse.Namespace, cases: list[Case]) -> list[dict[str, Any]]:
-    """Return how all runs differ from the finest run at the end."""
-    finest = max((case for case in cases if not case.turned), key=lambda case: (case.nodes, case.order))
-    frames = {case: arguments.folder / "runs" / case.name / "frames.h5" for case in cases}
-    start, exact = carried(frames[finest], START_WEEK), carried(frames[finest], END_WEEK)
-    return [
-        {"run": case.name, "finest": finest.name} | difference(carried(frames[case], END_WEEK), exact, start)
-        for case in cases
-        if case is not finest
-    ]
+def against_finest(folder: Path) -> dict[str, Any]:
+    """Return how all runs differ from the finest one, when it has the gyrification index, or at the end."""
+    frames = {case: folder / "runs" / case.name / "frames.h5" for case in CASES}
+    start = carried(frames[FINEST], START_WEEK)
+    for week in read_weeks(frames[FINEST]):
+        exact = carried(frames[FINEST], week)
+        if exact.values["gyrification_index"] >= END_GI:
+            break
+    values = {"week": week} | {name: exact.values[name] for name in (*COMPARED, "crossing_faces")}
+    others = [case for case in CASES if case is not FINEST and week in read_weeks(frames[case])]
+    rows = [{"run": case.name} | difference(carried(frames[case], week), exact, start) for case in others]
+    return {"finest": {"run": FINEST.name} | values, "against_finest": rows}
 
 
 def main(arguments: argparse.Namespace) -> None:
     if arguments.run:
         result: dict[str, Any] = solver_errors(arguments)
     else:
-        runs = resolution_runs(arguments)
-        result = {"runs": list(runs.values()), "against_finest": against_finest(arguments, list(runs))}
+        runs = runs_of_cases(arguments.folder)
+        result = {"runs": runs, **against_finest(arguments.folder)}
     print(json.dumps(result), flush=True)
 
 
