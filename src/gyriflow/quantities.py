@@ -137,7 +137,15 @@ _BRAIN_MAPS = (
         unit="1",
         label="dominant SpAnGy band",
         bids_suffix="spangyDominantBand",
-        description="Spangy dominant band",
+        description="Spangy dominant band by mean curvature",
+        is_averaged=False,
+    ),
+    VertexMap(
+        name="spangy_shape_index_dominant_band",
+        unit="1",
+        label="dominant SpAnGy band, shape index",
+        bids_suffix="spangyShapeIndexDominantBand",
+        description="Spangy dominant band by shape index",
         is_averaged=False,
     ),
     VertexMap(
@@ -241,10 +249,19 @@ _THICKNESS = (
     Metric("thickness_measured_share", "1", "thickness measured share", has_norm=False, is_reported=False),
 )
 _SPECTRUM = (
-    *(Metric(f"spangy_B{band}_power", "mm2", f"SpAnGy B{band} power") for band in range(7)),
-    *(Metric(f"spangy_B{band}_relative_power", "1", f"SpAnGy B{band} relative power") for band in range(1, 7)),
+    *(
+        metric
+        for name, words, unit in (("", "", "1"), ("shape_index_", " of shape index", "mm2"))
+        for metric in (
+            *(Metric(f"spangy_{name}B{band}_power", unit, f"SpAnGy B{band} power{words}") for band in range(7)),
+            *(
+                Metric(f"spangy_{name}B{band}_relative_power", "1", f"SpAnGy B{band} relative power{words}")
+                for band in range(1, 7)
+            ),
+            Metric(f"spangy_{name}captured_share", "1", f"SpAnGy captured share{words}", has_norm=False),
+        )
+    ),
     Metric("spangy_modes", "1", "SpAnGy modes", has_norm=False),
-    Metric("spangy_captured_share", "1", "SpAnGy captured share", has_norm=False),
     Metric("weyl_number", "1", "Weyl number", has_norm=False),
 )
 _DEVIATIONS = tuple(Metric(m.mean_name.removeprefix("mean_"), m.unit, m.label) for m in _DEVIATION_MAPS)

@@ -25,6 +25,15 @@ def from_members(pattern):
     ]
 
 
+def coefficients_of(wildcards):
+    """Return the coefficients of all surfaces that a sweep compares, without runs that have not reached its week."""
+    compared = study.sweeps[wildcards.study]
+    reached = [run for run, _ in compared.members if reaches(run.run, run.start.id, compared.week)]
+    rows = {run.at(compared.week).folder for run in reached}
+    rows |= {real.measurement.folder for run in reached for real in compared.observed[run.start.id]}
+    return [f"{folder}/coefficients.csv" for folder in sorted(rows)]
+
+
 rule compare_member:
     input:
         unpack(files_of_member),
@@ -49,6 +58,7 @@ rule compare_member:
 rule study_tables:
     input:
         comparisons=from_members(COMPARED_MEMBER),
+        coefficients=coefficients_of,
         params=from_members(PARAMETERS),
         summaries=from_members(FOLDING["summary"]),
         zones=from_members(FOLDING["zones"]),

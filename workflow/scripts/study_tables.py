@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from gyriflow.compare.sweeps import joined_comparisons, member_row, nearest_runs
-from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.compare.sweeps import joined_comparisons, member_row, nearest_runs, with_common_cut
+from gyriflow.io.files import read_json, read_table, read_tables, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
@@ -18,6 +18,8 @@ with step(snakemake.log[0]):
         rows.append(member_row(labels, member["values"], read_yaml(settings), read_json(zones), read_json(summary)))
     members, varied = pd.DataFrame(rows), list(params.members[0]["values"])
     found = joined_comparisons(map(read_table, files.comparisons))
+    if files.coefficients:
+        found = with_common_cut(found, read_tables(files.coefficients))
     comparison = members[["subject", "run", *varied, "resolution"]].merge(found, on=["subject", "run"])
     write_table(output.members, members)
     write_table(output.comparison, comparison)

@@ -54,7 +54,7 @@ def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str
 def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTables]) -> pd.DataFrame:
     """Return the nearest runs by each measure for which the paper reports a nearest value too.
 
-    The paper compares with other brains (a normal atlas). Its spectra are cut at Weyl's number.
+    The paper compares with other brains (a normal atlas). Its spectra are of the shape index, cut at Weyl's number.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def replication_table(
     summary
         `summary.json` of the same run as the displacement.
 
-    Bands are cut at Weyl's number: here that of each surface, in the paper the largest one of all surfaces. Values of
-    whole bands are added.
+    Bands are of the shape index, cut at the largest Weyl number of all surfaces compared, per side, as in the paper.
+    Values of whole bands are added.
     """
     modes = published["weyl_number"]
     rows = [*_displacements(published["displacement"], displacement), *_modes(modes, _sweep_of(modes, sweeps))]
@@ -148,7 +148,7 @@ def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[
             numbers = sweep.comparison.loc[is_number, ["value", "real_value"]].to_numpy(dtype=float)
             if numbers.size:
                 error = numbers.max() / published[side] - 1
-                here = f"{numbers.min():.0f} to {numbers.max():.0f}, by surface"
+                here = f"{numbers.max():.0f}, the largest of {numbers.min():.0f} to {numbers.max():.0f}"
                 verdict = AGREES if abs(error) <= AGREEMENT_TOL else f"{error:+.0%}"
         paper = f"{published[side]}, the largest of all surfaces"
         yield f"modes of the spectra, {side}", published["place"], paper, here, verdict
@@ -192,7 +192,7 @@ def _finding(check: str, sweep: SweepTables) -> tuple[str, str]:
 
 def _shares(comparison: pd.DataFrame, suffix: str) -> pd.DataFrame:
     """Return the share of each band in the power, with a row per brain (simulated or observed) and hemisphere."""
-    bands = {f"relative_power_B{band}{suffix}": f"B{band}" for band in FOLD_BANDS}
+    bands = {f"shape_index_relative_power_B{band}{suffix}": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands)]
     simulated, observed = (
         rows.assign(brain=rows["run"]),

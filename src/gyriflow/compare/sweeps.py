@@ -8,13 +8,15 @@ import pandas as pd
 
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
-from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED
+from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
 from .distances import aligned_distances
 
 SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
-"""The metric that gives the number of modes at which the spectrum of a hemisphere is cut."""
+"""The metric whose largest value among the brains compared is the number of modes at which spectra are cut."""
+NOT_RESOLVED = "not resolved"
+"""Flag of a band that edges or curvature radius do not resolve: it has no distance."""
 DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
 LABELS = ("subject", "run", "real", "real_population", "same_population")
@@ -92,8 +94,8 @@ def distances_to(
     -------
     DataFrame
         The columns `DISTANCE_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
-        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum, and the same with `_weyl`, of
-        spectra cut at Weyl's number as in the paper (distance: absolute difference); `spectral_distance_…`;
+        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
+        `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `spectral_distance_…`;
         `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of the surfaces); `area`, `volume`,
         `gyrification_index` (distance: absolute relative difference); `weyl_number` (no distance).
     """
@@ -107,17 +109,53 @@ def distances_to(
 
 
 def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
-    pairs = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], observed, ["hemisphere", "band"])
+    pairs = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], observed, ["hemisphere", "proxy", "band"])
     for pair in pairs.sort_values("band", kind="stable").to_dict("records"):
-        name = f"relative_power_B{pair['band']}"
-        resolved = "ok" if pair["resolved"] and pair["resolved_real"] else "not resolved"
-        whole = pair["relative_power"], pair["relative_power_real"]
+        values = pair["relative_power"], pair["relative_power_real"]
         if not (pair["complete"] and pair["complete_real"]):
-            whole = np.nan, np.nan
-        cut = pair["relative_power_weyl"], pair["relative_power_weyl_real"]
-        for measure, (value, real_value) in ((name, whole), (f"{name}_weyl", cut)):
-            flag = "cut off" if np.isnan(value + real_value) else resolved
-            yield pair["hemisphere"], measure, value, real_value, abs(value - real_value), "1", flag
+            values = np.nan, np.nan
+        measure = f"{SPECTRUM_PREFIXES[pair['proxy']]}relative_power_B{pair['band']}"
+        yield _band_row(pair["hemisphere"], measure, *values, resolved=pair["resolved"] and pair["resolved_real"])
+
+
+def _band_row(hemisphere: str, measure: str, value: float, real_value: float, *, resolved: bool) -> tuple:
+    flag = "cut off" if np.isnan(value + real_value) else "ok" if resolved else NOT_RESOLVED
+    return hemisphere, measure, value, real_value, abs(value - real_value) if flag == "ok" else np.nan, "1", flag
+
+
+def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.DataFrame:
+    """Add the shares of spectra that are all cut at one number of modes per side, as in the FetalFoldSim paper.
+
+    The number is the largest Weyl number of the surfaces compared, simulated and observed. The measures are
+    `shape_index_relative_power_B4_weyl` to `B6_weyl`, "cut off" where fewer modes were computed, or the band begins
+    beyond the cut.
+
+    Parameters
+    ----------
+    comparison
+        The columns `COMPARISON_COLUMNS` of all runs of a sweep.
+    coefficients
+        Columns subject, run ("real" for observed brains), hemisphere, mode, band, coefficient_shape_index of all
+        simulated and observed brains in the comparison.
+    """
+    numbers = comparison[comparison["measure"] == WEYL_NUMBER]
+    cuts = numbers.groupby("hemisphere")[["value", "real_value"]].max().max(axis=1).to_dict()
+    shares = {}
+    for (run, subject, side), modes in coefficients.groupby(["run", "subject", "hemisphere"]):
+        cut = modes[modes["mode"] < cuts.get(side, np.inf)]
+        power = (cut["coefficient_shape_index"] ** 2).groupby(cut["band"]).sum().reindex(range(1, max(FOLD_BANDS) + 1))
+        covered = len(modes) >= cuts.get(side, np.inf)
+        shares[run, subject, side] = power / power.sum() if covered else power * np.nan
+    rows = []
+    flags = comparison.set_index(["run", "subject", "real", "hemisphere", "measure"])["flag"]
+    for row in numbers.to_dict("records"):
+        labels, side = [row[name] for name in LABELS], row["hemisphere"]
+        own, real = shares[row["run"], row["subject"], side], shares[MEASURED, row["real"], side]
+        for band in FOLD_BANDS:
+            name = f"shape_index_relative_power_B{band}"
+            resolved = flags[row["run"], row["subject"], row["real"], side, name] != NOT_RESOLVED
+            rows.append([*labels, *_band_row(side, f"{name}_weyl", own[band], real[band], resolved=resolved)])
+    return joined_comparisons([comparison, pd.DataFrame(rows, columns=COMPARISON_COLUMNS)])
 
 
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
@@ -159,6 +197,9 @@ def member_row(
     }
 
 
+REFUSED = "no nearest run: the band is not resolved; use shorter edges and a smaller metrics.curvature_radius_mm"
+
+
 def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per hemisphere.
 
@@ -176,16 +217,20 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     DataFrame
         subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
         distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
-        of the range, or not resolved).
+        of the range, or not resolved). Without a run if no run resolves the band.
     """
     keys, varied = ["subject", "real", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]
-    table = comparison.dropna(subset=["distance"]).merge(
+    table = comparison[comparison["distance"].notna() | (comparison["flag"] == NOT_RESOLVED)].merge(
         members[["subject", "run", *varied, "resolution"]], on=["subject", "run"]
     )
     rows = []
-    for _, group in table.groupby(keys, sort=False):
-        best, *further = group.sort_values("distance", kind="stable").to_dict("records")
+    for names, group in table.groupby(keys, sort=False):
+        ordered = group.dropna(subset=["distance"]).sort_values("distance", kind="stable").to_dict("records")
+        if not ordered:
+            rows.append(dict(zip(keys, names, strict=True)) | {"flag": REFUSED})
+            continue
+        best, *further = ordered
         row = {name: best[name] for name in (*keys, *varied, "run", "distance")}
         if further:
             row |= {f"next_{name}": further[0][name] for name in (*varied, "distance")}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.special import jv
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, edges, mean_edge_length, unit, vertex_areas, vertex_normals
@@ -101,6 +102,16 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
     gaussian = (4.0 * a * c - b**2) / stretch**2
     half_difference = np.sqrt(np.maximum(mean**2 - gaussian, 0.0))
     return Curvature(mean + half_difference, mean - half_difference, fitted & ~one_sided, radii)
+
+
+def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
+    """Return the share of its mean curvature that a shallow wave keeps, by the quadric fit: 384 J₄(k)/k⁴, k = 2πr/λ.
+
+    It is exact for many vertices in the ball of radius r; with the fewest, two edges to a radius, it holds within 0.04.
+    Folds a quarter as deep as long keep more.
+    """
+    k = np.maximum(2.0 * np.pi * radius_mm / np.asarray(wavelength_mm), 0.01)
+    return np.asarray(384.0 * jv(4, k) / k**4)
 
 
 def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:

@@ -21,13 +21,12 @@ from ..geometry.triangles import (
     area,
     area_cm2,
     convex_hull,
-    mean_edge_length,
     signed_volume,
     vertex_areas,
     volume_ml,
 )
 from ..quantities import METRICS, WHITE_METRICS
-from ..settings.terms import CURVATURE_RADIUS_MM, SPANGY_MODES
+from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
 from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth
@@ -73,20 +72,24 @@ class Folds:
 class Hemisphere(Folds):
     """A hemisphere of n vertices, "left" or "right", with its measures other than folds.
 
-    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others, `weyl`
-    Weyl's number of modes.
+    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others,
+    `spectra` has those of the `PROXIES`, `weyl` is Weyl's number of modes.
     """
 
     name: str
     thickness: Floats
     crossing: int
-    spectrum: Spectrum
+    spectra: Mapping[str, Spectrum]
     weyl: int
 
     def maps(self) -> dict[str, NDArray]:
         """Return the arrays per vertex by name, as in `BrainMetrics.maps`."""
         thickness = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
-        return {**super().maps(), **thickness, "spangy_dominant_band": self.spectrum.dominant_band}
+        return {**super().maps(), **thickness, **self.dominant_bands()}
+
+    def dominant_bands(self) -> dict[str, NDArray]:
+        """Return the maps of the dominant band by each proxy."""
+        return {f"spangy_{SPECTRUM_PREFIXES[proxy]}dominant_band": part.dominant_band for proxy, part in self.spectra.items()}
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
@@ -107,22 +110,41 @@ def measure_hemisphere(
 ) -> Hemisphere:
     """Measure a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
     folds = measure_folds(mesh, curvature_radius_mm)
-    curvature_maps = folds.curvature_maps
-    stiffness, mass = laplacian(mesh)
-    first = first_eigenvalue(stiffness, mass)
-    modes, reach = modes_of(spangy_modes, stiffness, mass, first)
-    weyl = weyl_number(area(mesh), first)
-    # near a cut the proxy is continued from beyond
-    reliable, shape_index = np.flatnonzero(curvature_maps.reliable), curvature_maps.shape_index[:, None]
-    proxy = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(shape_index[reliable])[:, 0]
+    spectra = hemisphere_spectra(mesh, folds.curvature_maps, spangy_modes)
     return Hemisphere(
         **vars(folds),
         name=name,
         thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
         crossing=crossing_faces(mesh),
-        spectrum=spectrum(proxy, modes, mass, edge_length_mm=mean_edge_length(mesh), reach=reach, weyl=weyl),
-        weyl=weyl,
+        spectra=spectra,
+        weyl=weyl_number(area(mesh), float(spectra[PROXIES[0]].eigenvalues[1])),
     )
+
+
+def hemisphere_spectra(mesh: TriangleMesh, curvature_maps: Curvature, spangy_modes: SpangyModes) -> dict[str, Spectrum]:
+    """Return the spectra of a hemisphere by each of the `PROXIES`, on the same modes."""
+    stiffness, mass = laplacian(mesh)
+    modes, reach = modes_of(spangy_modes, stiffness, mass, first_eigenvalue(stiffness, mass))
+    # near a cut the proxies are continued from beyond
+    reliable = np.flatnonzero(curvature_maps.reliable)
+    known = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[reliable]
+    maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(known).T
+    radius = float(curvature_maps.radius_mm.mean())
+    return {
+        proxy: spectrum(values, modes, mass, radius_mm=radius, reach=reach)
+        for proxy, values in zip(PROXIES, maps, strict=True)
+    }
+
+
+def band_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
+    """Return the columns proxy and those of `Spectrum.bands`, a row per proxy and band."""
+    return _stacked({proxy: part.bands for proxy, part in spectra.items()}, "proxy")
+
+
+def _mode_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
+    part = spectra[PROXIES[0]]
+    modes = {"mode": np.arange(len(part.band)), "eigenvalue_per_mm2": part.eigenvalues, "band": part.band}
+    return pd.DataFrame(modes | {f"coefficient_{proxy}": part.coefficients for proxy, part in spectra.items()})
 
 
 def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
@@ -200,25 +222,20 @@ def area_ratio(whole: Metrics) -> Metrics:
 
 
 def spectrum_metrics(side: Hemisphere) -> Metrics:
-    """Return the metrics of a hemisphere's spectrum.
+    """Return the metrics of a hemisphere's spectra.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
     `spectra` has all values with their flags.
     """
-    bands = side.spectrum.bands
-    power = bands["power"].where(bands["complete"])
-    share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
-    metrics: Metrics = {}
-    for band in bands["band"]:
-        metrics[f"spangy_B{band}_power"] = float(power[band])
-        if band > 0:
-            metrics[f"spangy_B{band}_relative_power"] = float(share[band])
-    return {
-        **metrics,
-        "spangy_modes": float(len(side.spectrum.eigenvalues)),
-        "spangy_captured_share": side.spectrum.captured,
-        "weyl_number": float(side.weyl),
-    }
+    metrics: Metrics = {"spangy_modes": float(len(side.spectra[PROXIES[0]].band)), "weyl_number": float(side.weyl)}
+    for proxy, found in side.spectra.items():
+        bands, name = found.bands, f"spangy_{SPECTRUM_PREFIXES[proxy]}"
+        power = bands["power"].where(bands["complete"])
+        share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
+        metrics |= {f"{name}B{band}_power": float(power[band]) for band in bands["band"]}
+        metrics |= {f"{name}B{band}_relative_power": float(share[band]) for band in bands["band"][1:]}
+        metrics[f"{name}captured_share"] = found.captured
+    return metrics
 
 
 def _folding_and_thickness(sides: Sequence[Hemisphere]) -> Metrics:
@@ -243,9 +260,10 @@ class BrainMetrics:
     `table` has a row per number: hemisphere (whole, left or right), metric, value, unit. `maps` has per hemisphere
     ("left", "right", or the only one) arrays per vertex by name: shape_index, curvedness (1/mm), mean_curvature (1/mm),
     gaussian_curvature (1/mm²), sulcal_depth_mm, local_gyrification_index, thickness_mm (where it is known; NaN where
-    not measured), spangy_dominant_band (−6 to 6), reliable (0 near a cut, else 1). `spectra` has a row per hemisphere
-    and band with the columns of `Spectrum.bands`. `coefficients` has a row per hemisphere and mode: hemisphere, mode,
-    eigenvalue_per_mm2, band (−1 beyond B6), coefficient (cᵢ, in mm).
+    not measured), spangy_dominant_band and spangy_shape_index_dominant_band (−6 to 6; by mean curvature and by shape
+    index), reliable (0 near a cut, else 1). `spectra` has a row per hemisphere, proxy and band with the columns of
+    `Spectrum.bands`. `coefficients` has a row per hemisphere and mode: hemisphere, mode, eigenvalue_per_mm2, band (−1
+    beyond B6), coefficient_mean_curvature (cᵢ, no unit), coefficient_shape_index (in mm).
     """
 
     table: pd.DataFrame
@@ -307,8 +325,8 @@ def measure_brain(
     return BrainMetrics(
         table=_table(metrics),
         maps={side.name: side.maps() for side in sides},
-        spectra=_stacked({side.name: side.spectrum.bands for side in sides}),
-        coefficients=_stacked({side.name: side.spectrum.modes() for side in sides}),
+        spectra=_stacked({side.name: band_table(side.spectra) for side in sides}),
+        coefficients=_stacked({side.name: _mode_table(side.spectra) for side in sides}),
     )
 
 
@@ -319,9 +337,8 @@ def _require_outward(*meshes: TriangleMesh) -> None:
             raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
 
 
-def _stacked(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    stacked = pd.concat(tables, names=["hemisphere", None])
-    return stacked.reset_index("hemisphere").reset_index(drop=True)
+def _stacked(tables: Mapping[str, pd.DataFrame], name: str = "hemisphere") -> pd.DataFrame:
+    return pd.concat(tables, names=[name, None]).reset_index(name).reset_index(drop=True)
 
 
 def measure_white(

@@ -13,7 +13,8 @@ from scipy import sparse
 
 from ..errors import MeshError
 from ..geometry.triangles import Floats, Ints
-from ..settings.terms import FOLD_BANDS, MEASURED, LastBand
+from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand
+from .curvature import kept_curvature
 from .laplace_beltrami import Modes, count_below, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand
@@ -27,9 +28,6 @@ HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
 
-EDGES_PER_WAVELENGTH = 6
-"""A band whose shortest wavelength spans fewer edges is not resolved by the mesh."""
-
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -40,10 +38,9 @@ class Spectrum:
     complete bands, 0 where none is; `captured` the share of fᵀMf that the modes hold, 1 if all (Parseval).
 
     `bands` has a row per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared
-    times mm²; NaN without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0),
-    relative_power_weyl (the same of as many modes as Weyl's number alone; NaN where there are fewer), complete (the
-    modes reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are),
-    resolved (the shortest wavelength spans at least 6 edges).
+    times mm²; NaN without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), complete
+    (the modes reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are),
+    resolved (a wave of the band's middle length keeps 80 % of its curvature, see `curvature.kept_curvature`).
     """
 
     eigenvalues: Floats
@@ -52,11 +49,6 @@ class Spectrum:
     bands: pd.DataFrame
     dominant_band: Ints
     captured: float
-
-    def modes(self) -> pd.DataFrame:
-        """Return mode, eigenvalue_per_mm2, band and coefficient, a row per mode."""
-        columns = {"eigenvalue_per_mm2": self.eigenvalues, "band": self.band, "coefficient": self.coefficients}
-        return pd.DataFrame({"mode": np.arange(len(self.eigenvalues)), **columns})
 
 
 def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
@@ -116,24 +108,20 @@ def spectrum(
     modes: Modes,
     mass: sparse.csc_matrix,
     *,
-    edge_length_mm: float,
+    radius_mm: float,
     reach: float | None = None,
-    weyl: int | None = None,
 ) -> Spectrum:
     """Return the band spectrum of a folding proxy, (n,) values per vertex.
 
-    `reach` is the λ in mm⁻² below which no mode is missing; that of the highest mode where it is not given. `weyl` is
-    Weyl's number, where known. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by itself:
-    a vertex where the proxy is positive belongs to the band that adds most, another to the band that takes most away,
-    with a minus sign.
+    `radius_mm` is that of the fitted curvature. `reach` is the λ in mm⁻² below which no mode is missing; that of the
+    highest mode where it is not given. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by
+    itself: a vertex where the proxy is positive belongs to the band that adds most, another to the band that takes most
+    away, with a minus sign.
     """
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)
     reach = float(modes.eigenvalues[-1]) if reach is None else reach
-    bands = _band_table(modes.eigenvalues, band, coefficients, edge_length_mm, reach)
-    is_covered = weyl is not None and weyl <= len(coefficients)
-    cut = _relative(_powers(band[:weyl], coefficients[:weyl])) if is_covered else np.full(BANDS + 1, np.nan)
-    bands.insert(list(bands.columns).index("complete"), "relative_power_weyl", cut.tolist())
+    bands = _band_table(modes.eigenvalues, band, coefficients, radius_mm, reach)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
         parts = np.stack([modes.functions[:, band == k] @ coefficients[band == k] for k in whole])
@@ -153,7 +141,7 @@ def _relative(power: Floats) -> Floats:
 
 
 def _band_table(
-    eigenvalues: Floats, band: Ints, coefficients: Floats, edge_length_mm: float, reach: float
+    eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm: float, reach: float
 ) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
     power = _powers(band, coefficients)
@@ -161,6 +149,7 @@ def _band_table(
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
     complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
     whole = np.arange(BANDS + 1) == 0
+    kept = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
     return pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
@@ -171,7 +160,7 @@ def _band_table(
             "relative_power": _relative(power),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
-            "resolved": whole | (wavelengths[1:] >= EDGES_PER_WAVELENGTH * edge_length_mm),
+            "resolved": whole | (kept >= MIN_KEPT_CURVATURE),
         }
     )
 
@@ -181,16 +170,16 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
 
     The distance up to band Bk is √Σ(s − s′)² over the fold bands B4 to Bk, where s is the share that a band has of the
     power of B1 to Bk: 0 for equal shares, at most √2. Neither the size of the brain nor the number of modes enters it.
-    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are complete in both.
+    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are complete and resolved in both.
 
-    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, band, power, complete,
-    resolved. A measured brain is not compared with itself.
+    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, proxy, band, power, complete,
+    resolved; those of mean curvature are compared. A measured brain is not compared with itself.
 
-    Columns subject, run, week, hemisphere, real (the measured brain), real_week, metric (spectral_distance_B4,
-    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok"; "B5 B6 not resolved": in one of
-    the two these bands are finer than its edges resolve; "B6 cut off": not complete in one of the two, then without a
-    value).
+    Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy, metric (spectral_distance_B4,
+    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", or why there is no value: "B5 B6
+    not resolved" or "B6 cut off", not complete, in one of the two).
     """
+    spectra = spectra[spectra["proxy"] == PROXIES[0]]
     complete, resolved, powers = (
         spectra.pivot_table(name, HEMISPHERE, "band", aggfunc="first").reindex(columns=range(1, BANDS + 1))
         for name in ("complete", "resolved", "power")
@@ -206,6 +195,7 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
         for row in _distances(whole[i], whole[j], fine[i] & fine[j])
     ]
     table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])
+    table.insert(len(HEMISPHERE) + 2, "proxy", PROXIES[0])
     return table.assign(unit="1")[[*table.columns[:-1], "unit", "flag"]]
 
 
@@ -219,5 +209,5 @@ def _distances(a: Floats, b: Floats, resolved: NDArray[np.bool_]) -> list[tuple[
         )
         flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else "ok"
         name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
-        rows.append((name, float(np.linalg.norm(shares[0][fold] - shares[1][fold])), flag))
+        rows.append((name, float(np.linalg.norm(shares[0][fold] - shares[1][fold])) if flag == "ok" else np.nan, flag))
     return rows

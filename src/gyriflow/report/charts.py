@@ -19,8 +19,8 @@ from matplotlib.patches import Patch
 from matplotlib.transforms import Transform
 
 from ..errors import InputError
-from ..settings.terms import FOLD_BANDS, MEASURED, OBSERVED_BRAIN, SIDES
-from .labels import metric_title, value_labels
+from ..settings.terms import FOLD_BANDS, MEASURED, OBSERVED_BRAIN, PROXIES, SIDES
+from .labels import metric_title, plain, value_labels
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
@@ -248,10 +248,10 @@ def _region_lines(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], 
     week_axis(axes, values["week"])
 
 
-def _band_rows(spectra: pd.DataFrame, bands: Sequence[int]) -> pd.DataFrame:
-    """Return the rows of the bands with a column `trusted`."""
+def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
+    """Return the rows of the bands by a proxy with a column `trusted`."""
     trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
-    return spectra.assign(trusted=trusted)[spectra["band"].isin(bands)]
+    return spectra.assign(trusted=trusted)[spectra["band"].isin(bands) & (spectra["proxy"] == proxy)]
 
 
 def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
@@ -293,14 +293,14 @@ def influence_spectra(
 ) -> Figure:
     """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week.
 
-    A panel per hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. Bars are hatched
+    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. Bars are hatched
     and stars open if the band, or one in the denominator of the relative power, is cut off, or if the surface does not
     resolve it. A band without any power is labelled as beyond the modes.
 
     Parameters
     ----------
-    members : {run: columns subject, week, hemisphere, band, relative_power, complete, denominator_complete, resolved}
-        None for a run that ended before the week.
+    members : {run: columns subject, week, hemisphere, proxy, band, relative_power, complete, denominator_complete,
+        resolved}. None for a run that ended before the week.
     observed : the same of observed brains, with run "real"
     values : {run: {parameter: value}}
         The varied parameters, in the order of the sweep.
@@ -310,13 +310,14 @@ def influence_spectra(
     simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
     shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
     colours = dict(zip(labels.values(), shades, strict=False))
-    rows = _band_rows(pd.concat([*simulated, *observed]), FOLD_BANDS)
-    rows = rows[rows["week"] == week]
+    spectra = pd.concat([*simulated, *observed])
+    by_proxy = {proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy) for proxy in PROXIES}
+    rows = pd.concat(by_proxy.values())
     sides = _sides_in(rows)
-    figure, panels = panel_figure(len(sides), per_row=2, panel_in=2.3, sharey=True)
+    figure, panels = panel_figure(len(sides) * len(PROXIES), per_row=len(sides), panel_in=2.3, sharey="row")
     width = 0.8 / len(colours)
-    for axes, hemisphere in zip(panels, sides, strict=True):
-        side = rows[rows["hemisphere"] == hemisphere]
+    for axes, (proxy, hemisphere) in zip(panels, product(PROXIES, sides), strict=True):
+        side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
         for index, (run, colour) in enumerate(colours.items()):
             run_rows = side[side["run"] == run]
             position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in run_rows["band"]]
@@ -335,9 +336,10 @@ def influence_spectra(
         axes.set_xticks(range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS])
         axes.set_xlabel("SpAnGy band, and the folds that go with it")
         axes.set_xlim(-0.5, len(FOLD_BANDS) - 0.5)
-        axes.set_title(f"{hemisphere} hemisphere")
-    panels[0].set_ylabel("relative power")
-    from_zero(panels[0])
+        axes.set_title(f"{hemisphere} hemisphere, {plain(proxy)}")
+        if hemisphere == sides[0]:
+            axes.set_ylabel("relative power")
+            from_zero(axes)
     _spectra_legend(figure, rows, colours, observed_name, [], bars=True)
     return figure
 
@@ -351,7 +353,7 @@ def spectra_weeks_chart(
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw the relative power of the bands of the folds over weeks: a row per hemisphere, a column per band.
+    """Draw the relative power of the bands of the folds over weeks, by mean curvature: hemispheres by bands.
 
     Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
     the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
@@ -359,11 +361,11 @@ def spectra_weeks_chart(
     Parameters
     ----------
     spectra
-        Columns subject, run, week, hemisphere, band, relative_power, complete, denominator_complete, resolved.
+        Columns subject, run, week, hemisphere, proxy, band, relative_power, complete, denominator_complete, resolved.
     """
     with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
-    rows = _band_rows(runs_by_name(spectra), bands)
+    rows = _band_rows(runs_by_name(spectra), bands, PROXIES[0])
     sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
     shades, entries = _shades(groups, colours)
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}

@@ -89,6 +89,12 @@ CURVATURE_RADIUS_MM = 3.0
 """With edges of 0.8 mm it has the bias of three rings of neighbours and half their noise (docs/metrics.md)."""
 SPANGY_MODES: LastBand = "B5"
 
+PROXIES = ("mean_curvature", "shape_index")
+"""Maps whose spectra are computed; the first is that of the method (Germanaud et al. 2012), the second the paper's."""
+SPECTRUM_PREFIXES = {"mean_curvature": "", "shape_index": "shape_index_"}
+"""Prefixes of the names of metrics and measures of a proxy's spectrum."""
+MIN_KEPT_CURVATURE = 0.8
+"""A band is resolved if a wave of its middle length keeps this share of its curvature."""
 FOLD_BANDS = (4, 5, 6)
 """Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
 

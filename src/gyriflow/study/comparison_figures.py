@@ -239,9 +239,9 @@ INFLUENCE_SPECTRA = Kind(
     section="Studies",
     title="Influence on the spectrum of the folds",
     caption=(
-        "Relative power in the bands B4 to B6 (primary to tertiary folds) of the left (a) and the right hemisphere (b) "
-        "in the study *{study}* at {week} GW: runs from pale to dark in their order, the observed brain as stars. "
-        "Hatched bars and open stars: the band is cut off or finer than the surface."
+        "Relative power in the bands B4 to B6 (primary to tertiary folds) of each hemisphere in the study *{study}* at "
+        "{week} GW, by mean curvature and, below, by shape index (the FetalFoldSim paper's): runs from pale to dark in "
+        "their order, the observed brain as stars. Hatched bars and open stars: the band is cut off or not resolved."
     ),
     target="influence_figures",
     paper=True,

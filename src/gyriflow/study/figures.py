@@ -424,8 +424,8 @@ SPECTRA = Kind(
     title="SpAnGy bands of folds over the weeks",
     caption=(
         "Relative power in the bands B4, B5 and B6 (primary, secondary and tertiary folds), as far as the spectra "
-        "reach, per hemisphere (SpAnGy, Germanaud et al. 2012). Open marks: the band is cut off, or finer than the "
-        "surface resolves."
+        "reach, per hemisphere (SpAnGy of the mean curvature, Germanaud et al. 2012). Open marks: the band is cut off, "
+        "or finer than the edges and the curvature radius resolve."
     ),
     job="metrics_charts",
 )

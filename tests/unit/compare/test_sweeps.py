@@ -21,17 +21,20 @@ from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     comparison_table,
     distances_to,
+    REFUSED,
     joined_comparisons,
     member_row,
     nearest_runs,
+    with_common_cut,
 )
 from gyriflow.io.yaml_files import read_yaml
 
 
 def spectra(run, subject, powers):
     rows = [
-        {"subject": subject, "run": run, "hemisphere": "left", "band": band, "relative_power": power,
-         "relative_power_weyl": float("nan") if band == 6 else 2 * power, "complete": True, "resolved": band < 6}
+        {"subject": subject, "run": run, "hemisphere": "left", "proxy": proxy, "band": band,
+         "relative_power": power * factor, "complete": True, "resolved": band < 6}
+        for proxy, factor in (("mean_curvature", 1), ("shape_index", 2))
         for band, power in zip((4, 5, 6), powers, strict=True)
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -55,14 +58,11 @@ SURFACES = {"whole": {"distance_mm": 1.5, "distance95_mm": 2.5}}
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
     table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index(["hemisphere", "measure"])
-    cut_off = table.loc[("left", "relative_power_B6_weyl")]
-    assert (cut_off["flag"], cut_off["distance"] == cut_off["distance"]) == ("cut off", False)
     assert table["distance"].dropna().to_dict() == {
         ("left", "relative_power_B4"): pytest.approx(0.1),
         ("left", "relative_power_B5"): pytest.approx(0.1),
-        ("left", "relative_power_B4_weyl"): pytest.approx(0.2),
-        ("left", "relative_power_B5_weyl"): pytest.approx(0.2),
-        ("left", "relative_power_B6"): pytest.approx(0.0),
+        ("left", "shape_index_relative_power_B4"): pytest.approx(0.2),
+        ("left", "shape_index_relative_power_B5"): pytest.approx(0.2),
         ("whole", "area"): pytest.approx(0.1),
         ("left", "spectral_distance_B4"): 0.2,
         ("whole", "surface_distance"): 1.5,
@@ -132,7 +132,7 @@ MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 
 def compared(**distances):
     rows = [
         {"subject": "a", "run": run, "real": "b", "real_population": "other", "same_population": False,
-         "hemisphere": "left", "measure": "relative_power_B4", "value": 0.1, "real_value": 0.3, "distance": distance,
+         "hemisphere": "left", "measure": "shape_index_relative_power_B4", "value": 0.1, "real_value": 0.3, "distance": distance,
          "unit": "1", "flag": "ok"}
         for run, distance in distances.items()
     ]  # fmt: skip
@@ -145,6 +145,43 @@ def test_the_nearest_run_has_the_second_nearest_and_flags():
     assert row["flag"] == "ok"
     (row,) = nearest_runs(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
+
+
+@pytest.mark.fault(90)
+def test_a_band_that_no_run_resolves_has_no_nearest_run():
+    coarse = compared(t1=float("nan"), t2=float("nan")).assign(flag="not resolved")
+    (row,) = nearest_runs(coarse, MEMBERS, ["thickness_mm"]).to_dict("records")
+    assert (row["run"], row["flag"]) == (pytest.approx(float("nan"), nan_ok=True), REFUSED)
+    (row,) = nearest_runs(pd.concat([coarse, compared(t3=0.2)]), MEMBERS, ["thickness_mm"]).to_dict("records")
+    assert row["run"] == "t3"
+
+
+def coefficients(run, subject, *bands):
+    """Return modes of unit power in these bands, after the constant."""
+    modes = pd.DataFrame({"mode": range(len(bands) + 1), "band": [0, *bands], "coefficient_shape_index": 1.0})
+    return modes.assign(run=run, subject=subject, hemisphere="left")
+
+
+def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared():
+    number = {"measure": "weyl_number", "value": 5.0, "real_value": 6.0, "unit": "1", "flag": "ok"}
+    known = {"measure": "shape_index_relative_power_B5", "flag": "not resolved"}
+    bands = [{"measure": f"shape_index_relative_power_B{band}", "flag": "ok"} for band in (4, 6)]
+    labels = {"subject": "a", "real": "b", "real_population": "", "same_population": True, "hemisphere": "left"}
+    rows = [{**labels, "run": run, **row} for run in ("thin", "few") for row in (number, known, *bands)]
+    modes = [
+        coefficients("thin", "a", 4, 4, 5, 5, 6, 6),
+        coefficients("few", "a", 4, 5, 5),
+        coefficients("real", "b", 4, 5, 5, 5, 5, 6),
+    ]
+    table = with_common_cut(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.concat(modes))
+    table = table.set_index(["run", "measure"])[["value", "real_value", "distance", "flag"]]
+    cut = {band: tuple(table.loc["thin", f"shape_index_relative_power_B{band}_weyl"]) for band in (4, 5, 6)}
+    nan = pytest.approx(float("nan"), nan_ok=True)
+    # modes 1 to 5: two of B4, two of B5, one of B6 against one and four; its own number, 5, would leave B6 out
+    assert cut[4] == (0.4, 0.2, pytest.approx(0.2), "ok")
+    assert cut[5] == (0.4, 0.8, nan, "not resolved")
+    assert cut[6] == (0.2, nan, nan, "cut off")
+    assert table.loc[("few", "shape_index_relative_power_B4_weyl"), "flag"] == "cut off"
 
 
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
@@ -163,15 +200,15 @@ def sweep(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, .
     rows = []
     for (run, side), own in shares.items():
         cut = zip((4, 5, 6), (*own, float("nan")), (*real, float("nan")), strict=True)
-        rows += [(run, side, f"relative_power_B{band}_weyl", value, true) for band, value, true in cut]
-        rows.append((run, side, "relative_power_B6", whole_b6, whole_b6))
+        rows += [(run, side, f"shape_index_relative_power_B{band}_weyl", value, true) for band, value, true in cut]
+        rows.append((run, side, "shape_index_relative_power_B6", whole_b6, whole_b6))
         rows.append((run, side, "weyl_number", 1800.0 if side == "left" else 700.0, 600.0))
     comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "real_value"]).assign(real="r28")
     members = pd.DataFrame({"run": ["thin", "thick"], "outcome": ["finished", "diverged"]})
     nearest = pd.DataFrame(
         {
             "hemisphere": SIDES,
-            "measure": "relative_power_B4_weyl",
+            "measure": "shape_index_relative_power_B4_weyl",
             "thickness_mm": [2.25, 0.8],
             "flag": ["ok", "not resolved by the mesh"],
         }
@@ -209,7 +246,7 @@ def test_findings_of_a_sweep_are_checked_one_by_one():
     found = verdicts(moves(), sweep(SHARES, (0.4, 0.35), 0.2))
     checked = {entry["check"]: found[entry["finding"]] for entry in PUBLISHED["findings"][::-1]}
     assert checked["all_come"] == (Facts(1, 2), "in part")
-    (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", "relative_power_B4", "28 GW"))
+    (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", "shape_index_relative_power_B4", "28 GW"))
     assert nearest == (Facts("left", 2.25, "right", 0.8, "not resolved by the mesh"), "in part")
     # three simulated hemispheres and the two of the real brain, of which the thick one has more B5
     assert checked["most_B4"] == (Facts(4, 5), "in part")
@@ -231,7 +268,7 @@ def test_another_sweep_is_not_the_papers(week, varied):
 
 def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     nearest = nearest_runs(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
-    nearest = pd.concat([nearest, nearest.assign(measure="relative_power_B5_weyl"), nearest.assign(measure="area")])
+    nearest = pd.concat([nearest, nearest.assign(measure="shape_index_relative_power_B5_weyl"), nearest.assign(measure="area")])
     tables = {"members": MEMBERS, "comparison": compared(t1=0.3, t2=0.1), "nearest": nearest}
     sweeps = {
         "thickness": SweepTables(["thickness_mm"], 28, **tables),
@@ -242,8 +279,8 @@ def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     table = published_nearest(PUBLISHED, sweeps)
     names = ["study", "measure", "parameter", "nearest", "run", "paper", "place"]
     assert table[names].to_numpy().tolist() == [
-        ["thickness", "relative_power_B4", "thickness_mm", 2.0, "t2", 2.25, "section 4.1.3"],
-        ["thickness", "relative_power_B5_weyl", "thickness_mm", 2.0, "t2", 0.8, "section 4.1.3"],
+        ["thickness", "shape_index_relative_power_B4", "thickness_mm", 2.0, "t2", 2.25, "section 4.1.3"],
+        ["thickness", "shape_index_relative_power_B5_weyl", "thickness_mm", 2.0, "t2", 0.8, "section 4.1.3"],
     ]
     none = published_nearest(PUBLISHED, {"ratio": sweeps["ratio"]})
     assert len(none) == 0

@@ -24,6 +24,7 @@ from gyriflow.metrics.curvature import (
     Curvature,
     curvature,
     curvature_integrals,
+    kept_curvature,
     mean_curvature_quantiles,
 )
 
@@ -118,6 +119,17 @@ def test_folds_shorter_than_four_radii_are_flattened(wavelength, least, most):
     found, expected = (np.sum((values**2 * stretch)[inner]) for values in (bend.mean, exact))
     assert least < found / expected < most
     assert RESOLVED_RADII * 3.0 == 12.0
+
+
+@pytest.mark.parametrize("edge", [0.25, 0.4])
+@pytest.mark.parametrize("wavelength", [2.0, 3.05, 4.0, 6.0])
+def test_shallow_waves_keep_the_share_of_the_closed_form(wavelength, edge):
+    x, y = np.meshgrid(np.arange(0, 3 * wavelength + 2, edge), np.arange(0, 3, edge), indexing="ij")
+    wave = np.cos(2 * np.pi / wavelength * x)
+    bend = curvature(sheet(x, y, 0.01 * wave), radius_mm=1.0)
+    exact = 0.5 * 0.01 * (2 * np.pi / wavelength) ** 2 * wave.ravel()[bend.reliable]
+    share = bend.mean[bend.reliable] @ exact / (exact @ exact)
+    assert share == pytest.approx(kept_curvature(np.array(wavelength), bend.radius_mm.mean()), abs=0.04)
 
 
 LARGE, SMALL = 18.0, 7.0

@@ -12,10 +12,19 @@ from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, vertex_areas
 from gyriflow.growth.carrying import maps_on_template
-from gyriflow.metrics.measure import BrainMetrics, area_ratio, measure_brain, measure_white, thickness_metrics
+from gyriflow.metrics.curvature import curvature
+from gyriflow.metrics.measure import (
+    BrainMetrics,
+    area_ratio,
+    hemisphere_spectra,
+    measure_brain,
+    measure_white,
+    thickness_metrics,
+)
 from gyriflow.metrics.regions import region_metrics
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
 from gyriflow.quantities import METRICS, VERTEX_MAPS
+from gyriflow.settings.terms import PROXIES
 
 
 def value(metrics: BrainMetrics, hemisphere: str, metric: str) -> float:
@@ -100,11 +109,27 @@ def test_thickness_is_that_of_each_side() -> None:
 def test_maps_and_spectra(apart: BrainMetrics) -> None:
     assert set(apart.maps) == {"left", "right"}
     assert {len(values) for values in apart.maps["left"].values()} == {2562}
-    assert apart.spectra["hemisphere"].tolist() == ["left"] * 7 + ["right"] * 7
-    assert apart.spectra["band"].tolist() == [*range(7), *range(7)]
-    # the shape index of a sphere is the constant 1: all its power is in B0, 1² times the area
-    assert value(apart, "left", "spangy_B0_power") == pytest.approx(4 * np.pi * 20.0**2, rel=0.02)
-    assert value(apart, "left", "spangy_captured_share") == pytest.approx(1.0, abs=1e-3)
+    assert apart.spectra["hemisphere"].tolist() == ["left"] * 14 + ["right"] * 14
+    assert apart.spectra["proxy"].tolist() == 2 * (["mean_curvature"] * 7 + ["shape_index"] * 7)
+    assert apart.spectra["band"].tolist() == 4 * [*range(7)]
+    # a sphere has the mean curvature 1/R and the shape index 1: all power is in B0, the square times the area
+    for proxy, squared in (("", 20.0**-2), ("shape_index_", 1.0)):
+        power = value(apart, "left", f"spangy_{proxy}B0_power")
+        assert power == pytest.approx(squared * 4 * np.pi * 20.0**2, rel=0.02)
+        assert value(apart, "left", f"spangy_{proxy}captured_share") == pytest.approx(1.0, abs=1e-3)
+        coefficients = apart.coefficients[f"coefficient_{proxy.rstrip('_') or 'mean_curvature'}"]
+        assert coefficients[0] ** 2 == pytest.approx(power)
+
+
+def test_folds_of_one_wavelength_are_one_band_of_mean_curvature_but_not_of_shape_index() -> None:
+    ball = sphere(1.0, 4)
+    x, y, _ = ball.vertices.T
+    # a harmonic of degree 8, in the middle of B3; B4 has the degrees 11 to 22
+    folds = TriangleMesh(ball.vertices * (25.0 + 2.0 * np.real((x + 1j * y) ** 8))[:, None], ball.faces)
+    found = hemisphere_spectra(folds, curvature(folds, radius_mm=3.0), 23**2)
+    share = {proxy: found[proxy].bands["relative_power"][4] for proxy in PROXIES}
+    assert share["mean_curvature"] < 0.02
+    assert share["shape_index"] > 0.07
 
 
 def test_each_map_and_metric_has_a_record_and_each_record_is_written(apart: BrainMetrics) -> None:
@@ -137,8 +162,9 @@ def test_cut_is_left_out(cut: BrainMetrics) -> None:
         assert value(cut, name, "mean_shape_index") == pytest.approx(value(cut, "whole", "mean_shape_index"), abs=0.01)
         assert value(cut, name, "mean_curvedness") == pytest.approx(1 / 25.0, rel=0.02)
         # nothing of the cut's edge in the spectrum
-        total = cut.spectra.query("hemisphere == @name and band > 0")["power"].sum()
-        assert total < 1e-3 * value(cut, name, "spangy_B0_power")
+        total = cut.spectra.query("hemisphere == @name and band > 0").groupby("proxy")["power"].sum()
+        assert total["shape_index"] < 1e-3 * value(cut, name, "spangy_shape_index_B0_power")
+        assert total["mean_curvature"] < 1e-3 * value(cut, name, "spangy_B0_power")
 
 
 def test_surfaces_that_cut_each_other_are_counted() -> None:

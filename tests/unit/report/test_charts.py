@@ -50,8 +50,11 @@ def spectrum_rows(run: str, week: float, power: dict[int, float], *, complete: b
     of_all |= {"complete": complete, "denominator_complete": complete}
     bands, powers = list(power), np.array(list(power.values()))
     return [
-        pd.DataFrame({**of_all, "hemisphere": side, "band": bands, "relative_power": factor * powers})
+        pd.DataFrame(
+            {**of_all, "hemisphere": side, "proxy": proxy, "band": bands, "relative_power": factor * share * powers}
+        )
         for side, factor in (("left", 1.0), ("right", 0.5))
+        for proxy, share in (("mean_curvature", 1.0), ("shape_index", 0.8))
     ]
 
 
@@ -112,8 +115,11 @@ def test_spectra_bars_are_the_relative_powers_of_each_side():
     thin = [*spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3, 6: 0.1}), *spectrum_rows("thin", 27.0, {4: 0.9})]
     figure = study_of(thin, spectrum_rows("real", 28.0, {4: 0.25, 5: 0.15}))
     assert {"1.5 mm", "observed brain"} <= words(figure)
-    left, right = figure.axes
+    left, right, shape_index, _ = figure.axes
+    assert "mean curvature" in left.get_title()
+    assert "shape index" in shape_index.get_title()
     assert [bar.get_height() for bar in left.patches] == pytest.approx([0.2, 0.3, 0.1])
+    assert [bar.get_height() for bar in shape_index.patches] == pytest.approx([0.16, 0.24, 0.08])
     assert [bar.get_height() for bar in right.patches] == pytest.approx([0.1, 0.15, 0.05])
     assert [line.get_xydata()[0].tolist() for line in left.lines] == [[0, 0.25], [1, 0.15]]
     assert not any(bar.get_hatch() for bar in left.patches)
@@ -400,8 +406,8 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
 
 
 def test_what_a_publication_found_nearest_is_a_line_in_the_panel_of_its_measure_and_week():
-    rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in ("area", "relative_power_B4_weyl")]
-    found = {"parameter": "thickness_mm", "week": 28, "measure": "relative_power_B4", "value": 1.3}
+    rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in ("area", "shape_index_relative_power_B4_weyl")]
+    found = {"parameter": "thickness_mm", "week": 28, "measure": "shape_index_relative_power_B4", "value": 1.3}
     others = [found | {"week": 29, "value": 1.4}, found | {"parameter": "step_s", "value": 1.5}]
     figure = nearest_chart(pd.concat(rows), **OF_THE_STUDY, published={"nearest": [found, *others]})
     dashed = [[line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == "--"] for axes in figure.axes]

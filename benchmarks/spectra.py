@@ -1,0 +1,62 @@
+"""Print spectra of folds of one wavelength by both proxies, and the share of curvature that waves keep.
+
+The folds are radial waves of degree 8 on a sphere of 25 mm: 18.5 mm long, in the middle of B3; what is in B4 is
+harmonics. `isotropic` waves run in all directions, `parallel` folds from pole to pole. The shallow waves of the second
+table are on a plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
+"""
+
+import numpy as np
+from scipy.spatial import Delaunay
+from scipy.special import sph_harm_y
+from trimesh.creation import icosphere
+
+from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
+from gyriflow.metrics.curvature import curvature, kept_curvature
+from gyriflow.metrics.measure import hemisphere_spectra
+
+DEGREE, RADIUS_MM, FITTED_MM = 8, 25.0, 2.6
+MODES = 23**2
+"""All modes up to degree 22: B3 has the degrees 6 to 10, B4 11 to 22."""
+
+
+def folded_sphere(kind: str, rms_mm: float) -> TriangleMesh:
+    """Return a sphere with radial waves of one degree."""
+    ball = icosphere(subdivisions=5)
+    x, y, z = np.asarray(ball.vertices).T
+    orders = range(DEGREE + 1) if kind == "isotropic" else [DEGREE]
+    weights = np.random.default_rng(1).standard_normal((len(orders), 2)) @ [1, 1j]
+    waves = sum(w * sph_harm_y(DEGREE, m, np.arccos(z), np.arctan2(y, x)) for w, m in zip(weights, orders, strict=True))
+    height = np.real(waves)
+    height *= rms_mm / np.sqrt(np.average(height**2, weights=vertex_areas(TriangleMesh(ball.vertices, ball.faces))))
+    return TriangleMesh((RADIUS_MM + height)[:, None] * ball.vertices, ball.faces)
+
+
+def kept(wavelength_radii: float, edges_per_radius: float) -> tuple[float, float]:
+    """Return the share of its curvature that a shallow wave keeps on a plane, and the radius in its wavelengths."""
+    edge, wavelength = 1.0 / edges_per_radius, wavelength_radii
+    size = int(max(4 * wavelength, 8.0) / edge)
+    i, j = np.meshgrid(np.arange(size), np.arange(size), indexing="ij")
+    points = edge * np.stack([i + 0.5 * (j % 2), 0.866 * j], axis=-1).reshape(-1, 2)
+    points += np.random.default_rng(1).normal(0.0, 0.12 * edge, points.shape)
+    wave = np.cos(2 * np.pi / wavelength * points[:, 0])
+    faces = Delaunay(points).simplices
+    found = curvature(TriangleMesh(np.column_stack([points, 0.01 * wavelength * wave]), faces), radius_mm=1.0)
+    true = 0.5 * 0.01 * wavelength * (2 * np.pi / wavelength) ** 2 * wave
+    inside = found.reliable
+    return float(found.mean[inside] @ true[inside] / np.sum(true[inside] ** 2)), float(found.radius_mm.mean())
+
+
+if __name__ == "__main__":
+    print("| folds | rms, mm | proxy | B2 | B3 | B4 |\n| --- | --- | --- | --- | --- | --- |")
+    for kind in ("isotropic", "parallel"):
+        for rms_mm in (0.4, 1.0):
+            mesh = folded_sphere(kind, rms_mm)
+            for proxy, found in hemisphere_spectra(mesh, curvature(mesh, radius_mm=FITTED_MM), MODES).items():
+                shares = " | ".join(f"{100 * found.bands['relative_power'][band]:.1f} %" for band in (2, 3, 4))
+                print(f"| {kind} | {rms_mm:g} | {proxy} | {shares} |", flush=True)
+    print("\n| wavelength / radius | edges / radius | kept | closed form |\n| --- | --- | --- | --- |")
+    for wavelength in (2.0, 3.0, 4.0, 6.0):
+        for edges_per_radius in (2.0, 3.0, 4.0):
+            share, radius = kept(wavelength, edges_per_radius)
+            closed = float(kept_curvature(np.array(wavelength), radius))
+            print(f"| {wavelength / radius:.2f} | {radius * edges_per_radius:.1f} | {share:.2f} | {closed:.2f} |")
