@@ -5,8 +5,18 @@
 CALIBRATED = study.calibration
 
 
+# spectra of the observed brains, if they are scored
+OBSERVED_SPECTRA = [
+    f"{real.measurement.folder}/spectra.csv"
+    for brains in (CALIBRATED.observed.values() if CALIBRATED and CONFIG.calibrate.is_spectral else [])
+    for real in brains
+]
+
+
 rule calibration_design:
     input:
+        # bands that are not resolved are refused before the first run
+        spectra=OBSERVED_SPECTRA,
         scores=lambda w: CALIBRATED.scores_before(int(w.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
@@ -21,6 +31,7 @@ rule calibration_design:
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,
+        score=lambda w: list(CONFIG.calibrate.score),
         runs=lambda w: [run for run, number in CALIBRATED.rounds.items() if number == int(w.round)],
     script:
         "../scripts/calibration_design.py"
@@ -64,6 +75,7 @@ rule calibration_score:
         data=from_bases(REGIONS["data"]),
         summaries=from_bases(FOLDING["summary"]),
         real=lambda w: [real.pial for brains in CALIBRATED.observed.values() for real in brains],
+        spectra=OBSERVED_SPECTRA,
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
@@ -81,7 +93,7 @@ rule calibration_score:
         week=lambda w: CONFIG.calibrate.compare_week,
         weights=lambda w: CONFIG.calibrate.score,
         round=lambda w: CALIBRATED.rounds[w.run],
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+        settings=MEASURED_WITH,
     script:
         "../scripts/calibration_score.py"
 

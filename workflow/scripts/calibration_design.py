@@ -2,12 +2,14 @@
 
 import pandas as pd
 
-from gyriflow.compare.calibration import fit_surrogate, propose_runs, sobol_design
+from gyriflow.compare.calibration import fit_surrogate, propose_runs, require_bands, sobol_design
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 
-params, earlier = snakemake.params, snakemake.input.scores
-with step(snakemake.log[0]):
+params, earlier, spectra = snakemake.params, snakemake.input.scores, snakemake.input.spectra
+with step(snakemake.log[0], *spectra):
+    for path in spectra:
+        require_bands(read_table(path), params.score, path)
     count = len(params.runs)
     if earlier:
         scores = pd.concat(map(read_table, earlier), ignore_index=True)

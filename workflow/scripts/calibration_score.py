@@ -10,26 +10,32 @@ from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.frames import read_positions
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_regions
+from gyriflow.metrics.measure import surface_spectra
 from gyriflow.step import step
 
 files, params, run = snakemake.input, snakemake.params, snakemake.wildcards.run
 
 
-def surface_at_week(regions, frames):
-    """Return the pial surface of a simulation at the week of the comparison."""
-    return folded_surfaces(read_regions(regions), read_positions(frames, params.week))[0]
+def surfaces_at_week(regions, frames):
+    """Return the pial surfaces of a simulation at the week of the comparison: the whole, left and right."""
+    return folded_surfaces(read_regions(regions), read_positions(frames, params.week))
 
 
 with step(snakemake.log[0]):
     values = read_table(files.design).set_index("run").loc[run].to_dict()
     causes = [summary["diverged"] for summary in map(read_json, files.summaries) if summary["diverged"]]
-    observed = map(read_surface, files.real)
-    # read by `run_score`, since a diverged run has not reached the week
-    simulated = map(surface_at_week, files.regions, files.frames)
-    pairs = (
-        (surface, brain)
-        for surface, count in zip(simulated, params.compared, strict=True)
-        for brain in islice(observed, count)
-    )
-    score = run_score(pairs, params.weights, causes, radius_mm=params.curvature_radius_mm)
+    radius_mm, modes = params.settings["curvature_radius_mm"], params.settings["spangy_modes"]
+    # a diverged run has not reached the week
+    simulated = [] if causes else list(map(surfaces_at_week, files.regions, files.frames))
+
+    def paired(values, brains):
+        """Pair the value of each simulation with those of its observed brains."""
+        brains = iter(brains)
+        counts = zip(values, params.compared, strict=True)
+        return ((value, brain) for value, count in counts for brain in islice(brains, count))
+
+    pairs = paired((whole for whole, _, _ in simulated), map(read_surface, files.real))
+    own = (surface_spectra(left, right, radius_mm, modes) for _, left, right in simulated)
+    spectra = paired(own, map(read_table, files.spectra))
+    score = run_score(pairs, params.weights, causes, radius_mm=radius_mm, spectra=spectra)
     write_table(snakemake.output[0], pd.DataFrame([{"run": run, "round": params.round, **values, **score}]))

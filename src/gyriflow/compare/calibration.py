@@ -14,9 +14,11 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
+from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
+from ..metrics.spangy import spectral_distances
 from ..quantities import COMPARED_MAPS
-from ..settings.terms import AMPLITUDE, STIFFNESS_RATIO, Score
+from ..settings.terms import AMPLITUDE, FOLD_BANDS, MEASURED, PROXIES, SPECTRAL_SCORES, STIFFNESS_RATIO, Score
 from .distances import aligned_distances
 from .placement import correlation, interpolate_measures
 from .shapes import PreparedSurface, curvature_differences, prepare_for_comparison
@@ -116,6 +118,45 @@ def shape_scores(simulated: PreparedSurface, observed: PreparedSurface) -> dict[
     }
 
 
+def require_bands(spectra: pd.DataFrame, names: Collection[str], path: str | None = None) -> None:
+    """Raise InputError unless the bands of spectral scores are complete and resolved.
+
+    `spectra`, of the file `path`, has the columns proxy, band, wavelength_min_mm, wavelength_max_mm, complete,
+    resolved.
+    """
+    rows = spectra[(spectra["proxy"] == PROXIES[0]) & spectra["band"].isin(FOLD_BANDS)]
+    for name in [name for name in names if name in SPECTRAL_SCORES]:
+        # the distance is that of all complete bands
+        last = int(rows.loc[rows["complete"], "band"].max()) if rows["complete"].any() else FOLD_BANDS[0]
+        bands = range(FOLD_BANDS[0], last + 1) if name == "spectral_distance" else [int(name[-1])]
+        for band in bands:
+            row = rows[rows["band"] == band]
+            lengths = f"B{band}, {row['wavelength_min_mm'].min():.1f} to {row['wavelength_max_mm'].max():.1f} mm"
+            problem, remedy = "", ""
+            if not row["complete"].all():
+                problem, remedy = "cut off", f"Set metrics.spangy_modes: B{band}, or use another score."
+            elif not row["resolved"].all():
+                problem = "not resolved"
+                remedy = "Use shorter edges and a smaller metrics.curvature_radius_mm, or another score."
+            if problem:
+                problem = f"calibrate.score {name} needs a band that is {problem}"
+                raise InputError(problem, path=path, found=lengths, remedy=remedy)
+
+
+def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str, float]:
+    """Return the `SPECTRAL_SCORES` of two brains: means over hemispheres, NaN where bands are not complete or resolved.
+
+    Both have the columns hemisphere, proxy, band, power, relative_power, complete, resolved.
+    """
+    labels = {"subject": "", "week": 0.0}
+    both = pd.concat([simulated.assign(run="", **labels), observed.assign(run=MEASURED, **labels)], ignore_index=True)
+    distances = spectral_distances(both).query("run == ''").groupby("metric")["value"].mean().dropna()
+    shares = both[both["proxy"] == PROXIES[0]].pivot_table("relative_power", ["hemisphere", "band"], "run")
+    differences = (shares[""] - shares[MEASURED]).abs().groupby("band").mean()
+    scores = {f"relative_power_b{band}": float(differences.get(band, np.nan)) for band in FOLD_BANDS}
+    return scores | {"spectral_distance": float(distances.iloc[-1]) if len(distances) else np.nan}
+
+
 def brain_scores(
     simulated: TriangleMesh, observed: TriangleMesh, names: Collection[Score], *, radius_mm: float
 ) -> dict[Score, float]:
@@ -124,7 +165,7 @@ def brain_scores(
     Both are closed surfaces in mm; `radius_mm` is that of the fitted curvature.
     """
     scores = {name: score(simulated, observed) for name, score in SURFACE_SCORES.items() if name in names}
-    if set(names) - set(SURFACE_SCORES):
+    if set(names) - set(scores):
         prepared = (prepare_for_comparison(mesh, observed, radius_mm) for mesh in (simulated, observed))
         scores |= shape_scores(*prepared)
     return {name: scores[name] for name in names}
@@ -136,6 +177,7 @@ def run_score(
     causes: Sequence[str],
     *,
     radius_mm: float,
+    spectra: Iterable[tuple[pd.DataFrame, pd.DataFrame]] = (),
 ) -> dict[str, Any]:
     """Return the score of a run, the weighted sum of its scores' means over all pairs of brains.
 
@@ -147,6 +189,8 @@ def run_score(
         Weight of each score.
     causes
         Reasons why simulations of the run have diverged; empty if all have finished.
+    spectra
+        Spectra of the same pairs, as in `spectral_scores`; needed for these scores only.
 
     Returns
     -------
@@ -154,7 +198,15 @@ def run_score(
         score and the mean of each score in `weights`, NaN if the run has diverged; outcome ("finished" or "diverged")
         and cause.
     """
-    rows = [brain_scores(*pair, list(weights), radius_mm=radius_mm) for pair in pairs] if not causes else []
+    rows: list[dict[str, float]] = []
+    if not causes:
+        surface_names = [name for name in weights if name not in SPECTRAL_SCORES]
+        rows = [{**brain_scores(*pair, surface_names, radius_mm=radius_mm)} for pair in pairs]
+        if len(surface_names) < len(weights):
+            for row, (simulated, observed) in zip(rows, spectra, strict=True):
+                require_bands(simulated, weights)
+                require_bands(observed, weights)
+                row.update(spectral_scores(simulated, observed))
     table = pd.DataFrame(rows, columns=list(weights))
     means: dict[str, float] = {name: float(table[name].mean()) for name in weights}
     score = sum(weight * means[name] for name, weight in weights.items())

@@ -89,7 +89,10 @@ class Hemisphere(Folds):
 
     def dominant_bands(self) -> dict[str, NDArray]:
         """Return the maps of the dominant band by each proxy."""
-        return {f"spangy_{SPECTRUM_PREFIXES[proxy]}dominant_band": part.dominant_band for proxy, part in self.spectra.items()}
+        return {
+            f"spangy_{SPECTRUM_PREFIXES[proxy]}dominant_band": part.dominant_band
+            for proxy, part in self.spectra.items()
+        }
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
@@ -134,6 +137,19 @@ def hemisphere_spectra(mesh: TriangleMesh, curvature_maps: Curvature, spangy_mod
         proxy: spectrum(values, modes, mass, radius_mm=radius, reach=reach)
         for proxy, values in zip(PROXIES, maps, strict=True)
     }
+
+
+def surface_spectra(
+    left: TriangleMesh | None, right: TriangleMesh | None, radius_mm: float, spangy_modes: SpangyModes
+) -> pd.DataFrame:
+    """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
+    sides = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    return _stacked(
+        {
+            name: band_table(hemisphere_spectra(mesh, curvature(mesh, radius_mm=radius_mm), spangy_modes))
+            for name, mesh in sides.items()
+        }
+    )
 
 
 def band_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:

@@ -140,9 +140,7 @@ def _relative(power: Floats) -> Floats:
     return np.concatenate([[np.nan], power[1:] / total if total > 0 else 0 * power[1:]])
 
 
-def _band_table(
-    eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm: float, reach: float
-) -> pd.DataFrame:
+def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm: float, reach: float) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
     power = _powers(band, coefficients)
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])

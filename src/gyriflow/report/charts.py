@@ -293,9 +293,9 @@ def influence_spectra(
 ) -> Figure:
     """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week.
 
-    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. Bars are hatched
-    and stars open if the band, or one in the denominator of the relative power, is cut off, or if the surface does not
-    resolve it. A band without any power is labelled as beyond the modes.
+    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. They
+    are hatched or open if the band, or one in the denominator of the relative power, is cut off, or if the surface does
+    not resolve it. A band without any power is labelled as beyond the modes.
 
     Parameters
     ----------

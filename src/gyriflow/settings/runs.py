@@ -10,7 +10,7 @@ from .base import KeyProblem, Settings
 from .brains import BrainConfig
 from .folding import FoldingSettings
 from .growth import SIZES
-from .terms import MAX_NAME_LENGTH, SCORES, Score
+from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
 from .varying import EndWeek
 
 ALL = "all"
@@ -230,6 +230,11 @@ class CalibrationSettings(ComparisonSettings):
                 )
         if not self.score:
             yield KeyProblem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether spectra are compared."""
+        return not set(self.score).isdisjoint(SPECTRAL_SCORES)
 
     @property
     def runs(self) -> dict[str, int]:

@@ -100,15 +100,19 @@ FOLD_BANDS = (4, 5, 6)
 
 # scores of calibration
 
-Score = Literal["shape_index", "mean_curvature", "curvature_distribution", "size", "surface_distance"]
+SpectralScore = Literal["relative_power_b4", "relative_power_b5", "relative_power_b6", "spectral_distance"]
+Score = Literal["shape_index", "mean_curvature", "curvature_distribution", "size", "surface_distance", SpectralScore]
 """A measure of the difference between a simulated and an observed brain of the same week.
 
 - shape_index, mean_curvature: 1 − r, with r the correlation over the pial surface after scaling to the observed volume;
 - curvature_distribution: distance between the two distributions of mean curvature (1/mm);
 - size: √(a² + v²), with a, v the relative differences of pial area and volume;
-- surface_distance: mean distance of the two surfaces, each to the other, in mm.
+- surface_distance: mean distance of the two surfaces, each to the other, in mm;
+- relative_power_b4, _b5, _b6: difference of a band's share in the power of mean curvature, mean of the hemispheres;
+- spectral_distance: distance of these spectra up to the last fold band that is complete.
 """
 SCORES: tuple[Score, ...] = get_args(Score)
+SPECTRAL_SCORES: tuple[SpectralScore, ...] = get_args(SpectralScore)
 
 AMPLITUDE = ".amplitude"
 """Suffix of a parameter that scales a curve of the base run."""

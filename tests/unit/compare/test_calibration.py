@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from facts import Facts
 
 from gyriflow.compare.calibration import (
     brain_scores,
@@ -10,12 +11,15 @@ from gyriflow.compare.calibration import (
     find_optimum,
     fit_surrogate,
     propose_runs,
+    require_bands,
     run_score,
     shape_scores,
     size_score,
     sobol_design,
+    spectral_scores,
     to_unit_box,
 )
+from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 
 from .bumpy import PREPARED, RADIUS, REAL, bumpy, shaped
@@ -52,6 +56,53 @@ def test_the_optimum_is_found():
         assert best.loc[name, "value"] == pytest.approx(truth, abs=0.03 * width)
     assert not best["at_bound"].any()
     assert best["score"].iloc[0] == pytest.approx(0.1, abs=0.02)
+
+
+def folded(thickness: float, **flags: bool) -> pd.DataFrame:
+    """Return made spectra of folds whose wavelength is 6 thicknesses, in bands of a brain with λ1 = (2π/128 mm)²."""
+    bands = np.arange(1, 7)
+    power = np.exp(-((np.log2(128 / (6 * thickness)) - bands + 0.5) ** 2))
+    table = pd.DataFrame({"band": bands, "power": power, "relative_power": power / power.sum()})
+    table = table.assign(wavelength_min_mm=128 / 2.0**bands, wavelength_max_mm=256 / 2.0**bands)
+    return table.assign(hemisphere="left", proxy="mean_curvature", **({"complete": True, "resolved": True} | flags))
+
+
+@pytest.mark.parametrize("name", ["relative_power_b5", "spectral_distance"])
+def test_the_thickness_of_a_brain_is_recovered_from_its_spectrum(name):
+    bounds, truth = {"thickness_mm": (1.0, 3.0)}, folded(1.7)
+
+    def runs(design):
+        pairs = [[(folded(thickness), truth)] for thickness in design["thickness_mm"]]
+        scores = [run_score([(REAL, REAL)], {name: 1.0}, [], radius_mm=3.0, spectra=pair)["score"] for pair in pairs]
+        return design.assign(score=scores)
+
+    found = runs(sobol_design(bounds, 6, seed=0))
+    for _ in range(3):
+        found = pd.concat([found, runs(propose_runs(fit_surrogate(found, bounds, seed=0), 2))], ignore_index=True)
+    assert find_optimum(fit_surrogate(found, bounds, seed=0))["value"][0] == pytest.approx(1.7, abs=0.05)
+
+
+def test_spectral_scores_are_of_mean_curvature_and_0_for_the_same_spectrum():
+    other = folded(1.5).assign(proxy="shape_index")
+    both = [pd.concat([folded(thickness), other]) for thickness in (1.7, 2.4)]
+    assert spectral_scores(both[0], both[0]) == pytest.approx(dict.fromkeys(spectral_scores(*both), 0.0))
+    share = [folded(thickness)["relative_power"][4] for thickness in (1.7, 2.4)]
+    assert spectral_scores(*both)["relative_power_b5"] == pytest.approx(abs(share[0] - share[1]))
+
+
+@pytest.mark.fault(90)
+@pytest.mark.parametrize(
+    ("flags", "name", "remedy"),
+    [
+        ({"resolved": False}, "relative_power_b5", "metrics.curvature_radius_mm"),
+        ({"resolved": False}, "spectral_distance", "metrics.curvature_radius_mm"),
+        ({"complete": False}, "relative_power_b6", "metrics.spangy_modes: B6"),
+    ],
+)
+def test_scores_of_bands_that_are_cut_off_or_not_resolved_are_refused(flags, name, remedy):
+    require_bands(folded(1.7), [name, "size"])
+    with pytest.raises(InputError, check=Facts("spectra.csv", name, "mm", remedy)):
+        require_bands(folded(1.7, **flags), [name, "size"], "spectra.csv")
 
 
 def test_a_diverged_run_keeps_others_away():

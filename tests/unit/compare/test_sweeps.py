@@ -19,9 +19,9 @@ from gyriflow.compare.published import (
 )
 from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
+    REFUSED,
     comparison_table,
     distances_to,
-    REFUSED,
     joined_comparisons,
     member_row,
     nearest_runs,
@@ -132,8 +132,8 @@ MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 
 def compared(**distances):
     rows = [
         {"subject": "a", "run": run, "real": "b", "real_population": "other", "same_population": False,
-         "hemisphere": "left", "measure": "shape_index_relative_power_B4", "value": 0.1, "real_value": 0.3, "distance": distance,
-         "unit": "1", "flag": "ok"}
+         "hemisphere": "left", "measure": "shape_index_relative_power_B4",
+         "value": 0.1, "real_value": 0.3, "distance": distance, "unit": "1", "flag": "ok"}
         for run, distance in distances.items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -246,7 +246,8 @@ def test_findings_of_a_sweep_are_checked_one_by_one():
     found = verdicts(moves(), sweep(SHARES, (0.4, 0.35), 0.2))
     checked = {entry["check"]: found[entry["finding"]] for entry in PUBLISHED["findings"][::-1]}
     assert checked["all_come"] == (Facts(1, 2), "in part")
-    (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", "shape_index_relative_power_B4", "28 GW"))
+    name = "shape_index_relative_power_B4"
+    (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", name, "28 GW"))
     assert nearest == (Facts("left", 2.25, "right", 0.8, "not resolved by the mesh"), "in part")
     # three simulated hemispheres and the two of the real brain, of which the thick one has more B5
     assert checked["most_B4"] == (Facts(4, 5), "in part")
@@ -268,7 +269,8 @@ def test_another_sweep_is_not_the_papers(week, varied):
 
 def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     nearest = nearest_runs(compared(t1=0.3, t2=0.1), MEMBERS, ["thickness_mm"])
-    nearest = pd.concat([nearest, nearest.assign(measure="shape_index_relative_power_B5_weyl"), nearest.assign(measure="area")])
+    others = [nearest.assign(measure=name) for name in ("shape_index_relative_power_B5_weyl", "area")]
+    nearest = pd.concat([nearest, *others])
     tables = {"members": MEMBERS, "comparison": compared(t1=0.3, t2=0.1), "nearest": nearest}
     sweeps = {
         "thickness": SweepTables(["thickness_mm"], 28, **tables),

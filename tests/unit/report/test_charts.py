@@ -406,7 +406,8 @@ def test_the_nearest_member_is_named_and_one_that_is_not_trusted_is_not_it():
 
 
 def test_what_a_publication_found_nearest_is_a_line_in_the_panel_of_its_measure_and_week():
-    rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in ("area", "shape_index_relative_power_B4_weyl")]
+    names = ("area", "shape_index_relative_power_B4_weyl")
+    rows = [distances({0.8: 2.0, 2.25: 1.0}).assign(measure=name) for name in names]
     found = {"parameter": "thickness_mm", "week": 28, "measure": "shape_index_relative_power_B4", "value": 1.3}
     others = [found | {"week": 29, "value": 1.4}, found | {"parameter": "step_s", "value": 1.5}]
     figure = nearest_chart(pd.concat(rows), **OF_THE_STUDY, published={"nearest": [found, *others]})
