@@ -72,7 +72,9 @@ BY_TESTS = {
         ("src/gyriflow/report/page.py", '"area_difference", "+.1f", 100', '"area_difference", "+.1f", 1'),
         ("src/gyriflow/settings/terms.py", "{1: 2.0, 2: 0.8}", "{1: 1.0, 2: 0.8}"),
     ],
-    "report/test_tables.py": [("src/gyriflow/settings/terms.py", "CORE_POWER_W = 12.0", "CORE_POWER_W = 120.0")],
+    "report/test_tables.py": [
+        ("src/gyriflow/report/tables.py", "costs.carbon_g_per_kwh / 1000", "costs.carbon_g_per_kwh")
+    ],
     "report/test_report_scripts.py": [
         ("workflow/scripts/study_records.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),
         ("workflow/scripts/run_tables.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),

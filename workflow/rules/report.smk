@@ -52,6 +52,7 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
+        costs=CONFIG.costs.model_dump(),
         # pattern of the benchmark files of each rule; files of earlier configurations do not match
         benchmarks=lambda w: benchmark_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)

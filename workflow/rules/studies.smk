@@ -92,6 +92,14 @@ rule replication:
         published=PUBLISHED,
         displacement=rules.run_tables.output.displacement,
         summary=study.files(FOLDING["summary"])[:1],
+        frames=study.files(FOLDING["frames"])[:1],
+        params=study.files(PARAMETERS)[:1],
+        rates=GROWTH["rates"] if study.series_with_rates else [],
+        sides=[
+            PIAL[side].format(brain=simulation.start.id)
+            for simulation in study.run_simulations[:1]
+            for side in simulation.start.sides
+        ],
     output:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
@@ -109,6 +117,7 @@ rule replication:
             if name in study.sweeps
         },
         run=next(iter(study.pairs), (None, None)),
+        costs=CONFIG.costs.model_dump(),
     script:
         "../scripts/replication.py"
 

@@ -2,11 +2,22 @@
 
 from markupsafe import Markup
 
-from gyriflow.compare.published import SweepTables, comparison_caption, published_nearest, replication_table
+from gyriflow.compare.published import (
+    SweepTables,
+    comparison_caption,
+    mirror_distance,
+    place_of_largest,
+    published_nearest,
+    replication_table,
+)
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.figures import write_html
 from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.frames import read_positions, read_tets, read_weeks
+from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.tables import html_table
+from gyriflow.settings.stages import CostSettings
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -21,7 +32,23 @@ with step(snakemake.log[0]):
     displacement, summary = read_table(files.displacement), read_json(files.summary[0])
     run, brain = params.run
     displacement = displacement[(displacement["run"] == run) & (displacement["subject"] == brain)]
-    table = replication_table(published, displacement, list(sweeps.values()), summary)
+    from_back, week = None, published["largest"]["from_week"]
+    if {week, week + 1} <= set(read_weeks(files.frames[0])):
+        before, after = (read_positions(files.frames[0], at) for at in (week, week + 1))
+        _, pial = boundary_surface(TetrahedralMesh(before, read_tets(files.frames[0])))
+        from_back = place_of_largest(before, after, pial)
+    sides = [read_surface(path) for path in files.sides]
+    table = replication_table(
+        published,
+        displacement,
+        list(sweeps.values()),
+        summary,
+        costs=CostSettings(**params.costs),
+        rates=read_table(files.rates) if files.rates else None,
+        used_rate=read_yaml(files.params[0])["growth_rate_per_s"],
+        from_back=from_back,
+        mirror_mm=mirror_distance(*sides) if len(sides) == 2 else None,
+    )
     write_table(output.csv, table)
     write_table(output.nearest, published_nearest(published, sweeps))
     lines = [

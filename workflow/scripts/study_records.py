@@ -10,6 +10,7 @@ from gyriflow.report.page import methods_text
 from gyriflow.report.tables import html_table, resources
 from gyriflow.running.jobs import gather_messages, read_benchmarks
 from gyriflow.running.provenance import software, texts_in
+from gyriflow.settings.stages import CostSettings
 from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
@@ -30,7 +31,7 @@ with step(snakemake.log[0]):
         names.get((run, brain)) if rule == "simulate" else None
         for rule, run, brain in zip(jobs["rule"], jobs["run"], jobs["brain"], strict=True)
     ]
-    table = resources(jobs)
+    table = resources(jobs, CostSettings(**params.costs))
     write_table(output.resources, table)
     write_html(output.resources_page, html_table(table))
     write_table(output.warnings, gather_messages(".", params.known_brains, params.folded))

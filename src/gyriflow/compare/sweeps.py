@@ -15,8 +15,12 @@ SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
 """The metric whose largest value among the brains compared is the number of modes at which spectra are cut."""
+CROSSING_FACES = "crossing_faces"
+"""The metric that counts collisions."""
 NOT_RESOLVED = "not resolved"
 """Flag of a band that edges or curvature radius do not resolve: it has no distance."""
+WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
+"""Metrics that are compared, but are not measures of similarity."""
 DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
 LABELS = ("subject", "run", "real", "real_population", "same_population")
@@ -97,7 +101,7 @@ def distances_to(
         `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
         `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `spectral_distance_…`;
         `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of the surfaces); `area`, `volume`,
-        `gyrification_index` (distance: absolute relative difference); `weyl_number` (no distance).
+        `gyrification_index` (distance: absolute relative difference); `weyl_number` and `crossing_faces` (no distance).
     """
     rows = [*_band_rows(observed, spectra), *_size_rows(observed, metrics)]
     for row in spectral[spectral["real"] == observed].itertuples():
@@ -159,10 +163,12 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
 
 
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
-    pairs = _pairs(metrics[metrics["metric"].isin([*SIZE_METRICS, WEYL_NUMBER])], observed, ["hemisphere", "metric"])
+    pairs = _pairs(
+        metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])], observed, ["hemisphere", "metric"]
+    )
     for pair in pairs.to_dict("records"):
-        # the number of modes is not a measure of similarity
-        distance = np.nan if pair["metric"] == WEYL_NUMBER else abs(pair["value"] / pair["value_real"] - 1)
+        has_distance = pair["metric"] not in WITHOUT_DISTANCE
+        distance = abs(pair["value"] / pair["value_real"] - 1) if has_distance else np.nan
         yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
 
 

@@ -31,8 +31,6 @@ from .stress import left_stretch, packed, relaxed, unpacked
 from .tissue import Elements, Tissue
 from .zones import Zones
 
-PENALTY_PA_PER_M = 5.0e5
-"""Pressure per depth of penetration at the contact planes (FetalFoldSim)."""
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
 
@@ -62,7 +60,7 @@ class Folding:
             self.domain,
             zones,
             MATERIALS[p.material](p.poisson_ratio),
-            penalty_pa_per_m=PENALTY_PA_PER_M if p.contact.kind == "planes" else 0.0,
+            penalty_pa_per_m=p.contact.penalty_pa_per_m if p.contact.kind == "planes" else 0.0,
             remembers_stress=p.stress_memory_gw > 0,
         )
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]

@@ -150,8 +150,9 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
     The planes are a quarter of `contact.gap_mm` left and right of the middle of the fissure. With any kind of contact,
-    facets near the fissure are not clamped. The ellipsoid without growth is given in fractions of the brain's extents
-    (Tallinen et al. 2016). A single hemisphere has a MEDIAL_WALL, and may not pass the plane of that wall.
+    facets near the fissure are not clamped; with `planes`, elements that begin between the planes do not grow. The
+    ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
+    has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
     p = parameters
     fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
@@ -192,6 +193,8 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         growth[static] = 0.0
         if side is None:
             growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
+            if p.contact.kind == "planes":
+                growth[medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)] = 0.0
     free = support == "free" and side is None
     return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors)
 
@@ -206,6 +209,18 @@ def bridge_vertices(
     deepest = depth >= depth.max(axis=1, keepdims=True) - 1e-9
     between = ((x > left_plane) & (x < right_plane))[mesh.tets]
     return np.unique(mesh.tets[(between | ~deepest).all(axis=1)])
+
+
+def medial_vertices(
+    mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
+) -> NDArray[np.int64]:
+    """Return the vertices of the elements whose medial-most vertex lies between the planes, each once.
+
+    Nothing grows there in the prototype of the FetalFoldSim paper: walls between the planes have no contact.
+    """
+    x = mesh.vertices[mesh.tets, 0]
+    medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
+    return np.unique(mesh.tets[(medial >= left_plane) & (medial <= right_plane)])
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:

@@ -10,15 +10,8 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from ..quantities import METRICS
-from ..settings.terms import (
-    CARBON_INTENSITY_G_PER_KWH,
-    CORE_POWER_W,
-    ELEMENTS_NEEDED,
-    MEASURED,
-    OBSERVED_BRAIN,
-    SIDES,
-    element_error,
-)
+from ..settings.stages import CostSettings
+from ..settings.terms import ELEMENTS_NEEDED, MEASURED, OBSERVED_BRAIN, SIDES, element_error
 from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
 from .style import run_colours, runs_by_name
 
@@ -186,7 +179,7 @@ def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
     }
 
 
-def resources(jobs: pd.DataFrame) -> pd.DataFrame:
+def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
     A job keeps at least one core busy, so its energy is the longer of wall and CPU time times the power of a core.
@@ -208,8 +201,8 @@ def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     stages = stages.rename(columns={"rule": "stage"}).sort_values("core_hours", ascending=False, kind="stable")
     whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
     table = pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
-    table["energy_Wh"] = CORE_POWER_W * table["core_hours"]
-    return table.assign(co2e_g=CARBON_INTENSITY_G_PER_KWH / 1000 * table["energy_Wh"])
+    table["energy_Wh"] = costs.core_power_w * table["core_hours"]
+    return table.assign(co2e_g=costs.carbon_g_per_kwh / 1000 * table["energy_Wh"])
 
 
 def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:

@@ -63,6 +63,8 @@ class Contact(Settings):
     gap_mm: float = Field(2.5, gt=0, le=20)
     """Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows between
     them. [mm]"""
+    penalty_pa_per_m: float = Field(5.0e5, gt=0, le=1e9)
+    """With `planes`, pressure per depth of penetration, ε_N of the FetalFoldSim paper. [Pa/m]"""
 
 
 class NoGrowth(Settings):

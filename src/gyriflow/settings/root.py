@@ -11,7 +11,7 @@ from .folding import FoldingSettings
 from .participants import ParticipantsSettings
 from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings
 from .schemes import SchemeSettings
-from .stages import MeshSettings, MetricsSettings, SurfaceSettings
+from .stages import CostSettings, MeshSettings, MetricsSettings, SurfaceSettings
 
 
 class Config(Settings):
@@ -43,6 +43,8 @@ class Config(Settings):
     """A search for the parameters that meet a real brain best."""
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
+    costs: CostSettings = CostSettings()
+    """Energy and emissions."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
     _age_sources: dict[str, str] = PrivateAttr(default_factory=dict)
 

@@ -120,12 +120,6 @@ STIFFNESS_RATIO = "stiffness_ratio"
 """The parameter that sets the shear modulus of the cortex to a multiple of that of the core."""
 
 
-CORE_POWER_W = 12.0
-"""Power of a busy core: a processor's over its cores."""
-CARBON_INTENSITY_G_PER_KWH = 475.0
-"""CO₂ emitted for electricity, the world's average of 2019 (IEA)."""
-
-
 def element_error(order: int, elements: float) -> tuple[float, str]:
     """Return the error of the fastest wave in % with so many elements through the cortex, and a clause with it."""
     errors = ELEMENT_ERRORS[order]

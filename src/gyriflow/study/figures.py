@@ -500,8 +500,8 @@ RESOURCES = Kind(
     section="Resources",
     title="Time, memory, energy and emissions",
     caption=(
-        "Resources of the jobs of this study. Energy is estimated as core hours × 12 W, emissions as energy × 475 "
-        "g/kWh. The numbers are in ``results/study/resources.csv``."
+        "Resources of the jobs of this study. Energy is estimated as core hours × ``costs.core_power_w``, emissions as "
+        "energy × ``costs.carbon_g_per_kwh``. The numbers are in ``results/study/resources.csv``."
     ),
     technical=True,
     target="report",

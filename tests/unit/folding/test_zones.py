@@ -63,6 +63,21 @@ def test_tissue_that_bridges_the_planes_does_not_grow():
     assert zones.growth[np.argmax(mesh.vertices[:, 0])] == 1
 
 
+@pytest.mark.parametrize(("contact", "growing"), [("planes", 0), ("global", 1)])
+def test_walls_of_separate_hemispheres_between_the_planes_do_not_grow_with_planes(contact, growing):
+    """As in the paper's prototype: two hemispheres 0.5 mm apart, with planes at 0.625 mm from the fissure."""
+    boxes = [box_mesh((4, 3, 3), (8.0, 6.0, 6.0)) for _ in range(2)]
+    x = [mesh.vertices + [shift, 0.0, 0.0] for mesh, shift in zip(boxes, (-4.25, 4.25), strict=True)]
+    tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
+    pair = TetrahedralMesh(np.concatenate(x), np.concatenate(tets))
+    zones = find_zones(pair, contact=contact, no_growth={"semi_axes": (0.01, 0.01, 0.01)})
+    distance = np.abs(pair.vertices[:, 0])
+    # the walls and, of the elements behind them, the first layer
+    assert (zones.growth[distance < 0.625] == growing).all()
+    assert (zones.growth[distance < 2.5] == growing).all()
+    assert (zones.growth[distance > 4.0] == 1).all()
+
+
 def test_the_report_adds_up(brain):
     zones = find_zones(brain)
     report = zone_report(brain, zones, 3.0)

@@ -17,6 +17,7 @@ from gyriflow.report.tables import (
     resources,
     runs_table,
 )
+from gyriflow.settings.stages import CostSettings
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 
@@ -139,7 +140,7 @@ JOBS = pd.DataFrame(
 
 
 def test_energy_is_that_of_the_busy_cores_and_the_last_row_has_the_sum():
-    table = resources(JOBS)
+    table = resources(JOBS, CostSettings(core_power_w=12, carbon_g_per_kwh=475))
     rows = table.set_index(["stage", "run"])
     assert table["stage"].tolist() == ["simulate", "simulate", "pial_from_labels", "lost", "all"]
     assert rows.loc[("simulate", "thin")].tolist() == pytest.approx([1, 1.0, 4.0, 2000.0, 48.0, 22.8])
