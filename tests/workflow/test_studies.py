@@ -56,7 +56,10 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_
         assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"]) == {"rate-1e-07"}
     table = pd.read_csv(folder / "replication.csv", keep_default_na=False).set_index("result")
     assert set(table["verdict"][["21-22 GW" in result for result in table.index]]) == {NOT_RUN}
-    assert tuple(table.loc["all thicknesses come to 28 GW without collisions", ["here", "verdict"]]) == (Facts("2 of 2"), AGREES)
+    assert tuple(table.loc["all thicknesses come to 28 GW without collisions", ["here", "verdict"]]) == (
+        Facts("2 of 2"),
+        AGREES,
+    )
     (ratios,) = (result for result in table.index if "ratios" in result)
     assert table.loc[ratios, "verdict"] == NOT_RUN
     # the coarse surfaces have no whole bands of folds to be nearest by

@@ -20,9 +20,13 @@ SULCI = ATLASES / "spina-bifida"
 DOWNLOADS = Path("resources", "atlases")
 """Folder in the working directory for the files of atlases whose section names no other."""
 
-FileKey = Literal["labels", "image", "left", "right", "pial"]
-SOURCES_OF_SERIES = ({"labels"}, {"left", "right"}, {"pial"})
-"""Sets of file keys that define a surface. A series has one of them; `image` is optional with labels."""
+FileKey = Literal["labels", "image", "left", "right", "pial", "white_left", "white_right", "white"]
+SOURCES_OF_SERIES: tuple[tuple[set[FileKey], set[FileKey]], ...] = (
+    ({"labels"}, {"image"}),
+    ({"left", "right"}, {"white_left", "white_right"}),
+    ({"pial"}, {"white"}),
+)
+"""Sets of file keys that define a surface, each with those that may come with it. A series has one of them."""
 WEEK_FORMAT = r"(0?[1-9]?(\.[0-9])?f?)"
 """How a week may be written in a file's name, as `05.2f`."""
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
@@ -92,7 +96,8 @@ class AtlasSeries(Settings):
     """Whether surfaces of all weeks have the same vertices; believed until the files are there."""
     files: dict[FileKey, str]
     """Path of each file below the folder and the URL, with `{week}` (`{week:05.2f}`: 21.00) for the week: `labels`
-    and perhaps `image` (T2-weighted), or pial surfaces `left` and `right`, or the whole `pial` one."""
+    and perhaps `image` (T2-weighted), or pial surfaces `left` and `right` (perhaps `white_left` and `white_right`), or
+    the whole `pial` one (perhaps `white`)."""
     weeks: dict[AnyWeek, dict[FileKey, AtlasFileRecord]]
     """The weeks, as a list, or each with `{labels: {bytes: …, sha256: …}}` for its files. [GW]"""
 
@@ -108,8 +113,9 @@ class AtlasSeries(Settings):
     @field_validator("files")
     @classmethod
     def _paths_with_week(cls, files: dict[FileKey, str]) -> dict[FileKey, str]:
-        if set(files) - {"image"} not in SOURCES_OF_SERIES or ("image" in files and "labels" not in files):
-            raise ValueError("should have labels (and perhaps image), or left and right, or pial")
+        if not any(set(files) in (needed, needed | optional) for needed, optional in SOURCES_OF_SERIES):
+            with_white = "left and right (and perhaps white_left and white_right), or pial (and perhaps white)"
+            raise ValueError(f"should have labels (and perhaps image), or {with_white}")
         for pattern in files.values():
             if Path(pattern).is_absolute() or ".." in Path(pattern).parts or "\\" in pattern:
                 raise ValueError("should be paths below the folder of the atlas")

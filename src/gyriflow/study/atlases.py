@@ -118,6 +118,8 @@ def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:
         entry = entries.setdefault(name, {"id": name, "week": file.week, "population": series.population})
         if file.key in ("left", "right"):
             entry.setdefault("hemispheres", {})[file.key] = str(file.path)
+        elif file.key in ("white_left", "white_right"):
+            entry.setdefault("white", ["", ""])[file.key == "white_right"] = str(file.path)
         else:
             entry[file.key] = str(file.path)
         if "labels" in series.files:

@@ -177,6 +177,21 @@ def test_an_atlas_of_ones_own_is_one_file(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("names", "white"),
+    [
+        (["left", "right", "white_left", "white_right"], {"left": "21.white_left.gii", "right": "21.white_right.gii"}),
+        (["pial", "white"], {"whole": "21.white.gii"}),
+    ],
+)
+def test_an_atlas_may_have_white_surfaces(tmp_path, names, white):
+    touched(tmp_path, *(f"{week}.{name}.gii" for week in (21, 22) for name in names))
+    files = {name: f"{{week}}.{name}.gii" for name in names}
+    write_atlas(tmp_path, **HERE, series={"scheme": None, "files": files})
+    brain, _ = load(study("atlas.yaml", "mine-21", folding={"end_week": 22}), tmp_path).brains
+    assert {side: Path(path).name for side, path in brain.white_files.items()} == white
+
+
+@pytest.mark.parametrize(
     ("changes", "key", "facts"),
     [
         ({"nam": "x"}, "nam", ["name"]),
@@ -186,6 +201,7 @@ def test_an_atlas_of_ones_own_is_one_file(tmp_path):
         ({"series": {"weeks": [21, 21]}}, "series.all.weeks", [[21, 21]]),
         ({"series": {"files": {"labels": "a.nii.gz"}}}, "series.all.files", ["{week}", "a.nii.gz"]),
         ({"series": {"files": {"left": "{week}.gii"}}}, "series.all.files", ["left", "right", "pial", "{week}.gii"]),
+        ({"series": {"files": {"pial": "{week}.gii", "white_left": "{week}.w"}}}, "series.all.files", ["white_left"]),
         ({"series": {"weeks": {21: {"labels": {"sha256": "abc"}}}}}, "series.all.weeks[21].labels.sha256", ["abc", 64]),
     ],
 )
