@@ -7,7 +7,7 @@ import pandas as pd
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_json, read_table
-from gyriflow.io.frames import read_pial_frames
+from gyriflow.io.frames import read_pial_frames, read_positions, read_tets, read_weeks
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
@@ -21,6 +21,12 @@ def read_boundary(path):
     return TriangleMesh(regions.mesh.vertices, regions.facets), regions.facet_tags
 
 
+def read_elements(path):
+    """Return the elements of a run, and the positions of their nodes by week."""
+    path = path.replace(".xdmf", ".h5")
+    return read_tets(path), {week: read_positions(path, week) for week in read_weeks(path)}
+
+
 READERS = {
     ".csv": read_table,
     ".json": read_json,
@@ -30,6 +36,7 @@ READERS = {
     ".shape.gii": read_vertex_maps,
     ".label.gii": read_vertex_labels,
     "frames.h5": read_pial_frames,
+    "frames.xdmf": read_elements,
     "regions.h5": read_boundary,
 }
 """Functions that read files, by the end of the file name."""

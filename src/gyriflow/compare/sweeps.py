@@ -23,6 +23,11 @@ WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
+PARAMETERS = (
+    *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
+    *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
+)
+"""Parameters of each run in `members.csv`: those of the tables of the FetalFoldSim paper."""
 LABELS = ("subject", "run", "real", "real_population", "same_population")
 COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
 
@@ -191,8 +196,8 @@ def member_row(
     return {
         **labels,
         **values,
-        "thickness_mm": params["thickness_mm"],
-        "shear_modulus_cortex_pa": params["shear_modulus_cortex_pa"],
+        **{key: params.get(key) for key in PARAMETERS},
+        "contact.penalty_pa_per_m": params.get("contact", {}).get("penalty_pa_per_m"),
         "elements_through_cortex": elements,
         "resolution": "ok" if is_resolved else "not resolved by the mesh",
         "outcome": "finished" if summary.get("diverged") is None else "diverged",

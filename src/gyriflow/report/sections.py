@@ -1,20 +1,28 @@
-"""Plane sections: superimposed outlines of surfaces."""
+"""Plane sections: superimposed outlines of surfaces, and the model's fields in its elements."""
 
 from collections.abc import Mapping
 
 import numpy as np
 import pyvista as pv
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..folding.layers import PialSearch, cortical_weight
+from ..folding.zones import zones_of_run
 from ..geometry.alignment import align
-from ..geometry.triangles import TriangleMesh
+from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh
+from ..settings.folding import FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN
+from ..settings.varying import value_at
 from .labels import week_label
 from .style import (
     FULL_WIDTH_IN,
+    MUTED_COLOUR,
     OBSERVED_COLOUR,
     SINGLE_COLUMN_IN,
     add_letters,
@@ -27,6 +35,8 @@ PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
 """The axis normal to each plane, and those to the right and up in its picture."""
 MAX_WEEKS = 5
 SCALE_BAR_MM = 20.0
+ARROW_MM = 3.0
+"""Spacing and length of the arrows of normals."""
 LEFT_IN, ABOVE_IN, MAX_PANEL_IN = 0.7, 0.9, 2.3
 """Space left of and above the panels of outlines, and the maximum width of a panel."""
 
@@ -38,6 +48,72 @@ def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colou
     cut = body.slice(normal=np.eye(3)[normal], origin=np.eye(3)[normal] * at)
     segments = np.asarray(cut.points)[cut.lines.reshape(-1, 3)[:, 1:]][..., [right, up]]
     axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=thickness, capstyle="round"))
+
+
+def _cut(positions: Floats, tets: Ints, at: float, fields: Mapping[str, Floats]) -> pv.PolyData:
+    """Return the coronal section of linear elements at y in mm: a polygon per element, with fields at its points."""
+    cells = np.insert(np.asarray(tets), 0, 4, axis=1)
+    body = pv.UnstructuredGrid(cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions))
+    for name, values in fields.items():
+        body.point_data[name] = values
+    # elements as they are, not as triangles
+    return body.slice(normal="y", origin=(0, at, 0), generate_triangles=False)
+
+
+@styled
+def model_sections(frames: tuple[Ints, Mapping[float, Floats]], params: FoldingParameters) -> Figure:
+    """Draw coronal sections through the elements of a run at its start and at its end.
+
+    Columns are the cortical weight with the elements, the growth zone (0 or 1), the tangential growth in a step, and
+    the normals of the pial surface at the nearest points, in the cortex.
+
+    Parameters
+    ----------
+    frames : elements (m, 4) or (m, 10), and the positions (n, 3) of their nodes in mm by week
+    params : without maps
+    """
+    tets, positions = frames
+    start, end = min(positions), max(positions)
+    zones = zones_of_run(TetrahedralMesh(positions[start], tets), params)
+    rate = params.growth_rate_per_s
+    largest = float(max(np.max(value_at(rate, week, {})) for week in (start, end)) * params.step_s)
+    figure = new_figure(FULL_WIDTH_IN, 4.2)
+    rows = figure.subplots(2, 4, sharex="row", sharey="row")
+    scales = {"weight": 1.0, "growing": 1.0, "increment": largest}
+    titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
+    for row, week in zip(rows, (start, end), strict=True):
+        nodes = positions[week]
+        pial = PialSearch(nodes, zones.cortex_facets)
+        weight = cortical_weight(pial.distance(nodes), value_at(params.thickness_mm, week, {}))
+        increment = value_at(rate, week, {}) * params.step_s * weight * zones.growth
+        fields = {"weight": weight, "growing": zones.growth, "increment": increment}
+        cut = _cut(nodes, tets[:, :4], float(np.median(nodes[:, 1])), fields)
+        places = np.asarray(cut.points)[:, [0, 2]]
+        faces = cut.irregular_faces
+        for axes, (name, top) in zip(row, scales.items(), strict=False):
+            values = np.array([cut.point_data[name][face].mean() for face in faces])
+            style = {"array": values, "cmap": "YlGnBu", "norm": Normalize(0, top), "linewidths": 0.05}
+            axes.add_collection(PolyCollection([places[face] for face in faces], edgecolors="black", **style))
+        outlines = {"facecolors": "none", "edgecolors": MUTED_COLOUR, "linewidths": 0.05}
+        row[3].add_collection(PolyCollection([places[face] for face in faces], **outlines))
+        # arrows at one point of the cortex in each square
+        _, first = np.unique(np.floor(places / ARROW_MM), axis=0, return_index=True)
+        shown = first[cut.point_data["weight"][first] > 0.5]
+        normals = pial.nearest_normals(np.asarray(cut.points, dtype=float)[shown])[:, [0, 2]] * ARROW_MM
+        row[3].quiver(*places[shown].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
+        low, high = places.min(axis=0) - ARROW_MM, places.max(axis=0) + ARROW_MM
+        for axes in row:
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+            axes.set_aspect("equal")
+            axes.set_axis_off()
+        row[0].text(-0.02, 0.5, week_label(week), transform=row[0].transAxes, rotation=90, ha="right", va="center")
+    for column, (title, top) in enumerate(zip(titles, (*scales.values(), None), strict=True)):
+        rows[0, column].set_title(title, fontsize=8)
+        if top:
+            scale = ScalarMappable(Normalize(0, top), "YlGnBu")
+            figure.colorbar(scale, ax=list(rows[:, column]), location="bottom", shrink=0.8)
+    add_letters(rows.flat)
+    return figure
 
 
 @styled

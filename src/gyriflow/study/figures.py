@@ -183,6 +183,10 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
             zones.add(zoned)
             inputs = {"regions": simulation.file(REGIONS["data"]), "params": simulation.file(PARAMETERS)}
             yield Figure(ZONES_OF_RUN, inputs, names=simulation.names)
+        settings = simulation.settings
+        if "growth_rate_per_s" in settings.growth.definition.rates and not simulation.maps:
+            inputs = {"frames": simulation.file(FOLDING["series"]), "params": simulation.file(PARAMETERS)}
+            yield Figure(MODEL_OF_RUN, inputs, names=simulation.names)
     if study.run_simulations:
         yield Figure(RUNS)
         table, runs = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}
@@ -323,6 +327,7 @@ def growth_found_figure(simulation: Simulation) -> Figure:
 
 
 ZONES_OF_RUN = Kind("zones_figure", f"{RUN_FIGURES}/zones.png", "pictures:zones_picture", target="", paper=True)
+MODEL_OF_RUN = Kind("model_figure", f"{RUN_FIGURES}/model.png", "sections:model_sections", target="", paper=True)
 RUNS = Kind(
     "run_tables",
     f"{STUDY}/runs.html",
@@ -334,6 +339,7 @@ RUNS = Kind(
     ),
     technical=True,
     target="metrics",
+    paper=True,
 )
 DISPLACEMENT = Kind(
     "displacement_figure",

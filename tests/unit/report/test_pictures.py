@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from facts import Facts
 from pictures import colour_bar, covered, picture, pictures, tone, words
-from shapes import box, ellipsoid, sphere
+from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.report.pictures import (
@@ -19,7 +19,7 @@ from gyriflow.report.pictures import (
     zones_picture,
 )
 from gyriflow.report.scene import VIEWS, render, uniform_colours
-from gyriflow.report.sections import outlines_chart
+from gyriflow.report.sections import model_sections, outlines_chart
 from gyriflow.settings.folding import parameters_from
 
 BRAIN = box((20, 30, 20))
@@ -177,6 +177,24 @@ def test_regions_are_seen_in_their_colours_where_they_are():
         pixel = image[int(row * image.shape[0]), int(column * image.shape[1])]
         away = {key: np.linalg.norm(hue / hue.sum() - pixel / pixel.sum()) for key, hue in hues.items()}
         assert min(away, key=away.__getitem__) == name
+
+
+def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end():
+    mesh = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
+    weeks = {21.0: mesh.vertices, 22.0: 1.2 * mesh.vertices}
+    run = {"start_week": 21, "end_week": 22, "output_weeks": [21, 22], "fissure_x_mm": 0.0, "step_s": 1e5}
+    figure = model_sections((mesh.tets, weeks), parameters_from(run | {"thickness_mm": 4.0}))
+    assert {"cortical weight", "growth zone", "normals", "21 GW", "22 GW"} <= words(figure)
+    weight, zone, increment, normals = (axes.collections[0] for axes in figure.axes[:4])
+    later = figure.axes[4].collections[0]
+    assert np.ptp(weight.get_array()) > 0.9
+    assert set(np.unique(zone.get_array())) >= {0.0, 1.0}
+    # 2e-7 per s for 1e5 s
+    assert 0.9 * 0.02 < increment.get_array().max() <= 0.02
+    # the whole section, as wide as the brain
+    width = [np.ptp(np.concatenate([path.vertices for path in part.get_paths()])[:, 0]) for part in (weight, later)]
+    assert width == pytest.approx([40.0, 48.0], rel=0.03)
+    assert len(normals.get_paths()) == len(weight.get_paths())
 
 
 def test_outlines_are_those_of_both_brains_at_one_scale_laid_onto_each_other():
