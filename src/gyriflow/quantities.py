@@ -248,19 +248,18 @@ _THICKNESS = (
     Metric("thickness_q95", "mm", "thickness q95", is_reported=False),
     Metric("thickness_measured_share", "1", "thickness measured share", has_norm=False, is_reported=False),
 )
+_SHAPE = "spangy_shape_index_"
 _SPECTRUM = (
+    *(Metric(f"spangy_B{band}_power", "1", f"SpAnGy B{band} power") for band in range(7)),
+    *(Metric(f"spangy_B{band}_relative_power", "1", f"SpAnGy B{band} relative power") for band in range(1, 7)),
+    Metric("spangy_captured_share", "1", "SpAnGy captured share", has_norm=False),
+    # of the shape index, to compare with the FetalFoldSim paper
+    *(Metric(f"{_SHAPE}B{band}_power", "mm2", f"shape index B{band} power", has_norm=False) for band in range(7)),
     *(
-        metric
-        for name, words, unit in (("", "", "1"), ("shape_index_", " of shape index", "mm2"))
-        for metric in (
-            *(Metric(f"spangy_{name}B{band}_power", unit, f"SpAnGy B{band} power{words}") for band in range(7)),
-            *(
-                Metric(f"spangy_{name}B{band}_relative_power", "1", f"SpAnGy B{band} relative power{words}")
-                for band in range(1, 7)
-            ),
-            Metric(f"spangy_{name}captured_share", "1", f"SpAnGy captured share{words}", has_norm=False),
-        )
+        Metric(f"{_SHAPE}B{band}_relative_power", "1", f"shape index B{band} relative power", has_norm=False)
+        for band in range(1, 7)
     ),
+    Metric(f"{_SHAPE}captured_share", "1", "shape index captured share", has_norm=False),
     Metric("spangy_modes", "1", "SpAnGy modes", has_norm=False),
     Metric("weyl_number", "1", "Weyl number", has_norm=False),
 )

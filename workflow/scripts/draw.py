@@ -1,9 +1,12 @@
 """Draw figures and tables of the registry: read their input files and call their functions."""
 
 from importlib import import_module
+from pathlib import Path
 
 import pandas as pd
 
+from gyriflow.folding.zones import model_fields, zones_of_run
+from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_json, read_table
@@ -22,9 +25,13 @@ def read_boundary(path):
 
 
 def read_elements(path):
-    """Return the elements of a run, and the positions of their nodes by week."""
-    path = path.replace(".xdmf", ".h5")
-    return read_tets(path), {week: read_positions(path, week) for week in read_weeks(path)}
+    """Return the elements of a run, and the model's fields at its first and last week."""
+    frames, run = path.replace(".xdmf", ".h5"), Path(path).parents[1]
+    params, weeks = parameters_from(read_yaml(run / "params.yaml")), read_weeks(frames)
+    mesh = TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames))
+    zones = zones_of_run(mesh, params)
+    ends = {week: read_positions(frames, week) for week in (weeks[0], weeks[-1])}
+    return mesh.tets, {week: model_fields(zones, nodes, params, week) for week, nodes in ends.items()}
 
 
 READERS = {

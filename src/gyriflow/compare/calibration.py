@@ -148,8 +148,8 @@ def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str
 
     Both have the columns hemisphere, proxy, band, power, relative_power, complete, resolved.
     """
-    labels = {"subject": "", "week": 0.0}
-    both = pd.concat([simulated.assign(run="", **labels), observed.assign(run=MEASURED, **labels)], ignore_index=True)
+    tables = [simulated.assign(run=""), observed.assign(run=MEASURED)]
+    both = pd.concat(tables, ignore_index=True).assign(subject="", week=0.0)
     distances = spectral_distances(both).query("run == ''").groupby("metric")["value"].mean().dropna()
     shares = both[both["proxy"] == PROXIES[0]].pivot_table("relative_power", ["hemisphere", "band"], "run")
     differences = (shares[""] - shares[MEASURED]).abs().groupby("band").mean()
@@ -201,7 +201,8 @@ def run_score(
     rows: list[dict[str, float]] = []
     if not causes:
         surface_names = [name for name in weights if name not in SPECTRAL_SCORES]
-        rows = [{**brain_scores(*pair, surface_names, radius_mm=radius_mm)} for pair in pairs]
+        scores = (brain_scores(*pair, surface_names, radius_mm=radius_mm) for pair in pairs)
+        rows = [dict(found.items()) for found in scores]
         if len(surface_names) < len(weights):
             for row, (simulated, observed) in zip(rows, spectra, strict=True):
                 require_bands(simulated, weights)

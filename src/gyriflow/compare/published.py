@@ -269,7 +269,7 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
     if holds.empty:
         return "the bands are cut off or not resolved", NOT_TESTABLE
     text = f"{holds.sum()} of {len(holds)} cases"
-    lost = [band for band in shares if shares[band].isna().all()]
+    lost = [str(band) for band in shares if shares[band].isna().all()]
     if check == "most_B4" and lost:
         return f"{text}, without {' and '.join(lost)}: cut off or not resolved", _verdict(holds)
     return text, _verdict(holds)

@@ -14,7 +14,8 @@ from ..geometry.triangles import Floats, TriangleMesh, face_normals
 from ..settings import terms
 from ..settings.folding import FoldingParameters, NoGrowth
 from ..settings.terms import Side
-from .layers import PialSearch
+from ..settings.varying import value_at
+from .layers import PialSearch, cortical_weight
 
 Tags = dict[str, NDArray[np.int32]]
 FLAT_TOL = 0.01
@@ -221,6 +222,19 @@ def medial_vertices(
     x = mesh.vertices[mesh.tets, 0]
     medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
     return np.unique(mesh.tets[(medial >= left_plane) & (medial <= right_plane)])
+
+
+def model_fields(zones: Zones, positions: Floats, p: FoldingParameters, week: float) -> dict[str, Floats]:
+    """Return fields of a run without maps at its nodes, at `positions` (n, 3) in mm of a week.
+
+    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential growth in a step) and normals
+    (n, 3) of the pial surface at the nearest points.
+    """
+    pial = PialSearch(positions, zones.cortex_facets)
+    weight = cortical_weight(pial.distance(positions), value_at(p.thickness_mm, week, {}))
+    increment = value_at(p.growth_rate_per_s, week, {}) * p.step_s * weight * zones.growth
+    fields = {"weight": weight, "growing": zones.growth, "increment": increment}
+    return {"positions": positions, **fields, "normals": pial.nearest_normals(positions)}
 
 
 def cell_tags(mesh: TetrahedralMesh, zones: Zones, weight: Floats) -> Tags:

@@ -130,12 +130,12 @@ def hemisphere_spectra(mesh: TriangleMesh, curvature_maps: Curvature, spangy_mod
     modes, reach = modes_of(spangy_modes, stiffness, mass, first_eigenvalue(stiffness, mass))
     # near a cut the proxies are continued from beyond
     reliable = np.flatnonzero(curvature_maps.reliable)
-    known = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[reliable]
-    maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(known).T
+    values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[reliable]
+    maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(values).T
     radius = float(curvature_maps.radius_mm.mean())
     return {
-        proxy: spectrum(values, modes, mass, radius_mm=radius, reach=reach)
-        for proxy, values in zip(PROXIES, maps, strict=True)
+        proxy: spectrum(proxy_map, modes, mass, radius_mm=radius, reach=reach)
+        for proxy, proxy_map in zip(PROXIES, maps, strict=True)
     }
 
 

@@ -147,7 +147,7 @@ def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
     complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
     whole = np.arange(BANDS + 1) == 0
-    kept = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
+    share = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
     return pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
@@ -158,7 +158,7 @@ def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm
             "relative_power": _relative(power),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
-            "resolved": whole | (kept >= MIN_KEPT_CURVATURE),
+            "resolved": whole | (share >= MIN_KEPT_CURVATURE),
         }
     )
 
@@ -174,8 +174,8 @@ def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     resolved; those of mean curvature are compared. A measured brain is not compared with itself.
 
     Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy, metric (spectral_distance_B4,
-    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", or why there is no value: "B5 B6
-    not resolved" or "B6 cut off", not complete, in one of the two).
+    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", or the reason for a missing value:
+    "B5 B6 not resolved" or "B6 cut off", not complete, in one of the two).
     """
     spectra = spectra[spectra["proxy"] == PROXIES[0]]
     complete, resolved, powers = (

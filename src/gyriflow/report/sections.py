@@ -1,6 +1,7 @@
 """Plane sections: superimposed outlines of surfaces, and the model's fields in its elements."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -11,14 +12,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..folding.layers import PialSearch, cortical_weight
-from ..folding.zones import zones_of_run
 from ..geometry.alignment import align
-from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh
-from ..settings.folding import FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN
-from ..settings.varying import value_at
 from .labels import week_label
 from .style import (
     FULL_WIDTH_IN,
@@ -61,57 +57,50 @@ def _cut(positions: Floats, tets: Ints, at: float, fields: Mapping[str, Floats])
 
 
 @styled
-def model_sections(frames: tuple[Ints, Mapping[float, Floats]], params: FoldingParameters) -> Figure:
+def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> Figure:
     """Draw coronal sections through the elements of a run at its start and at its end.
 
     Columns are the cortical weight with the elements, the growth zone (0 or 1), the tangential growth in a step, and
-    the normals of the pial surface at the nearest points, in the cortex.
+    the normals in the cortex.
 
     Parameters
     ----------
-    frames : elements (m, 4) or (m, 10), and the positions (n, 3) of their nodes in mm by week
-    params : without maps
+    model : elements (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at their nodes
     """
-    tets, positions = frames
-    start, end = min(positions), max(positions)
-    zones = zones_of_run(TetrahedralMesh(positions[start], tets), params)
-    rate = params.growth_rate_per_s
-    largest = float(max(np.max(value_at(rate, week, {})) for week in (start, end)) * params.step_s)
+    tets, weeks = model
+    largest = max(float(fields["increment"].max()) for fields in weeks.values())
     figure = new_figure(FULL_WIDTH_IN, 4.2)
     rows = figure.subplots(2, 4, sharex="row", sharey="row")
     scales = {"weight": 1.0, "growing": 1.0, "increment": largest}
     titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
-    for row, week in zip(rows, (start, end), strict=True):
-        nodes = positions[week]
-        pial = PialSearch(nodes, zones.cortex_facets)
-        weight = cortical_weight(pial.distance(nodes), value_at(params.thickness_mm, week, {}))
-        increment = value_at(rate, week, {}) * params.step_s * weight * zones.growth
-        fields = {"weight": weight, "growing": zones.growth, "increment": increment}
+    for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
+        fields = dict(weeks[week])
+        nodes = fields.pop("positions")
         cut = _cut(nodes, tets[:, :4], float(np.median(nodes[:, 1])), fields)
         places = np.asarray(cut.points)[:, [0, 2]]
         faces = cut.irregular_faces
         for axes, (name, top) in zip(row, scales.items(), strict=False):
             values = np.array([cut.point_data[name][face].mean() for face in faces])
-            style = {"array": values, "cmap": "YlGnBu", "norm": Normalize(0, top), "linewidths": 0.05}
+            style: dict[str, Any] = {"array": values, "cmap": "YlGnBu", "norm": Normalize(0, top), "linewidths": 0.05}
             axes.add_collection(PolyCollection([places[face] for face in faces], edgecolors="black", **style))
-        outlines = {"facecolors": "none", "edgecolors": MUTED_COLOUR, "linewidths": 0.05}
+        outlines: dict[str, Any] = {"facecolors": "none", "edgecolors": MUTED_COLOUR, "linewidths": 0.05}
         row[3].add_collection(PolyCollection([places[face] for face in faces], **outlines))
         # arrows at one point of the cortex in each square
         _, first = np.unique(np.floor(places / ARROW_MM), axis=0, return_index=True)
-        shown = first[cut.point_data["weight"][first] > 0.5]
-        normals = pial.nearest_normals(np.asarray(cut.points, dtype=float)[shown])[:, [0, 2]] * ARROW_MM
-        row[3].quiver(*places[shown].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
+        arrows = first[cut.point_data["weight"][first] > 0.5]
+        normals = cut.point_data["normals"][arrows][:, [0, 2]] * ARROW_MM
+        row[3].quiver(*places[arrows].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
         low, high = places.min(axis=0) - ARROW_MM, places.max(axis=0) + ARROW_MM
         for axes in row:
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
             axes.set_aspect("equal")
             axes.set_axis_off()
         row[0].text(-0.02, 0.5, week_label(week), transform=row[0].transAxes, rotation=90, ha="right", va="center")
-    for column, (title, top) in enumerate(zip(titles, (*scales.values(), None), strict=True)):
-        rows[0, column].set_title(title, fontsize=8)
-        if top:
-            scale = ScalarMappable(Normalize(0, top), "YlGnBu")
-            figure.colorbar(scale, ax=list(rows[:, column]), location="bottom", shrink=0.8)
+    for axes, title in zip(rows[0], titles, strict=True):
+        axes.set_title(title, fontsize=8)
+    for column, top in enumerate(scales.values()):
+        scale = ScalarMappable(Normalize(0, top), "YlGnBu")
+        figure.colorbar(scale, ax=list(rows[:, column]), location="bottom", shrink=0.8)
     add_letters(rows.flat)
     return figure
 

@@ -185,8 +185,7 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
             yield Figure(ZONES_OF_RUN, inputs, names=simulation.names)
         settings = simulation.settings
         if "growth_rate_per_s" in settings.growth.definition.rates and not simulation.maps:
-            inputs = {"frames": simulation.file(FOLDING["series"]), "params": simulation.file(PARAMETERS)}
-            yield Figure(MODEL_OF_RUN, inputs, names=simulation.names)
+            yield Figure(MODEL_OF_RUN, {"model": simulation.file(FOLDING["series"])}, names=simulation.names)
     if study.run_simulations:
         yield Figure(RUNS)
         table, runs = {"displacement": f"{STUDY}/displacement.csv"}, {"runs": run_names(study.pairs)}

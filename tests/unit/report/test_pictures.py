@@ -6,6 +6,7 @@ from facts import Facts
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
+from gyriflow.folding.zones import model_fields, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
 from gyriflow.report.pictures import (
     LINES_MM,
@@ -181,9 +182,11 @@ def test_regions_are_seen_in_their_colours_where_they_are():
 
 def test_the_models_fields_are_drawn_in_the_elements_at_the_start_and_at_the_end():
     mesh = ellipsoid_mesh(8, (20.0, 26.0, 18.0))
-    weeks = {21.0: mesh.vertices, 22.0: 1.2 * mesh.vertices}
     run = {"start_week": 21, "end_week": 22, "output_weeks": [21, 22], "fissure_x_mm": 0.0, "step_s": 1e5}
-    figure = model_sections((mesh.tets, weeks), parameters_from(run | {"thickness_mm": 4.0}))
+    p = parameters_from(run | {"thickness_mm": 4.0})
+    zones, sizes = zones_of_run(mesh, p), {21.0: 1.0, 22.0: 1.2}
+    weeks = {week: model_fields(zones, size * mesh.vertices, p, week) for week, size in sizes.items()}
+    figure = model_sections((mesh.tets, weeks))
     assert {"cortical weight", "growth zone", "normals", "21 GW", "22 GW"} <= words(figure)
     weight, zone, increment, normals = (axes.collections[0] for axes in figure.axes[:4])
     later = figure.axes[4].collections[0]
