@@ -27,6 +27,7 @@ DIGITS = 6
 """Significant digits of calibrated values."""
 N_CANDIDATES = 1024
 """Points of a Sobol sequence at which the surrogate is evaluated."""
+REFINE = "Use shorter edges and a smaller metrics.curvature_radius_mm, or another score."
 MIN_SPACING = 0.02
 """Smallest distance in the unit box between a new run and any other run."""
 
@@ -132,15 +133,14 @@ def require_bands(spectra: pd.DataFrame, names: Collection[str], path: str | Non
         for band in bands:
             row = rows[rows["band"] == band]
             lengths = f"B{band}, {row['wavelength_min_mm'].min():.1f} to {row['wavelength_max_mm'].max():.1f} mm"
-            problem, remedy = "", ""
-            if not row["complete"].all():
-                problem, remedy = "cut off", f"Set metrics.spangy_modes: B{band}, or use another score."
-            elif not row["resolved"].all():
-                problem = "not resolved"
-                remedy = "Use shorter edges and a smaller metrics.curvature_radius_mm, or another score."
-            if problem:
-                problem = f"calibrate.score {name} needs a band that is {problem}"
-                raise InputError(problem, path=path, found=lengths, remedy=remedy)
+            checks = {
+                "complete": ("cut off", f"Set metrics.spangy_modes: B{band}, or use another score."),
+                "resolved": ("not resolved", REFINE),
+            }
+            for column, (problem, remedy) in checks.items():
+                if not row[column].all():
+                    problem = f"calibrate.score {name} needs a band that is {problem}"
+                    raise InputError(problem, path=path, found=lengths, remedy=remedy)
 
 
 def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str, float]:
@@ -204,10 +204,9 @@ def run_score(
         scores = (brain_scores(*pair, surface_names, radius_mm=radius_mm) for pair in pairs)
         rows = [dict(found.items()) for found in scores]
         if len(surface_names) < len(weights):
-            for row, (simulated, observed) in zip(rows, spectra, strict=True):
-                require_bands(simulated, weights)
-                require_bands(observed, weights)
-                row.update(spectral_scores(simulated, observed))
+            for row, pair in zip(rows, spectra, strict=True):
+                require_bands(pd.concat(pair), weights)
+                row.update(spectral_scores(*pair))
     table = pd.DataFrame(rows, columns=list(weights))
     means: dict[str, float] = {name: float(table[name].mean()) for name in weights}
     score = sum(weight * means[name] for name, weight in weights.items())
