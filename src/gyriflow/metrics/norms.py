@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from ..errors import InputError
@@ -59,6 +60,16 @@ class PublishedNorm:
     scheme: str = ""
     tissue: str = ""
     side: Side | None = None
+
+    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+        """Return z of values at weeks, and its standard error, which is unknown."""
+        weeks, values = np.atleast_1d(weeks), np.atleast_1d(values)
+        z = (values - np.polyval(self.mean, weeks)) / np.polyval(self.sd, weeks)
+        return z, np.full(z.shape, np.nan)
+
+    def values(self, weeks: ArrayLike, z: float) -> Floats:
+        """Return the values with a z at weeks (n,)."""
+        return np.asarray(np.polyval(self.mean, weeks) + z * np.polyval(self.sd, weeks))
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -118,8 +129,9 @@ def published_scores(
         inside = norm.weeks[0] <= week <= norm.weeks[1]
         is_present = len(sides) == len(SIDES) or norm.side in sides
         scored = inside and is_present
-        mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
-        z = (value - mean) / sd
+        mean = float(norm.values(week, 0.0)) if scored else np.nan
+        sd = float(norm.values(week, 1.0)) - mean
+        z = float(norm.scores(week, value)[0][0]) if scored else np.nan
         brains = np.nan if norm.subjects is None else norm.subjects
         flag = "other labels" if name in substitutes else "ok"
         if not scored:

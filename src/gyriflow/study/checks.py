@@ -163,6 +163,7 @@ def norm_settings(config: Config) -> dict[str, Any]:
         "open_sulci": config.opens_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
         **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes"}),
+        "spectra": "mean_curvature",
         "schemes": sorted({brain.scheme for brain in config.brains if brain.scheme}),
     }
 

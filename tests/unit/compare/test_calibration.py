@@ -90,7 +90,7 @@ def test_spectral_scores_are_of_mean_curvature_and_0_for_the_same_spectrum():
     assert spectral_scores(*both)["relative_power_b5"] == pytest.approx(abs(share[0] - share[1]))
 
 
-@pytest.mark.fault(90)
+@pytest.mark.fault(86)
 @pytest.mark.parametrize(
     ("flags", "name", "remedy"),
     [
