@@ -63,13 +63,13 @@ class PublishedNorm:
 
     def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
         """Return z of values at weeks, and its standard error, which is unknown."""
-        weeks, values = np.atleast_1d(weeks), np.atleast_1d(values)
-        z = (values - np.polyval(self.mean, weeks)) / np.polyval(self.sd, weeks)
+        z = (np.atleast_1d(values) - self.values(weeks, 0.0)) / (self.values(weeks, 1.0) - self.values(weeks, 0.0))
         return z, np.full(z.shape, np.nan)
 
     def values(self, weeks: ArrayLike, z: float) -> Floats:
         """Return the values with a z at weeks (n,)."""
-        return np.asarray(np.polyval(self.mean, weeks) + z * np.polyval(self.sd, weeks))
+        at = np.asarray(weeks, dtype=float)
+        return np.asarray(np.polyval(self.mean, at) + z * np.polyval(self.sd, at))
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
