@@ -145,6 +145,10 @@ def metrics_chart(
     return figure
 
 
+MANY_BRAINS = 30
+"""With more reference brains, their marks are small."""
+
+
 @styled
 def norms_chart(
     metrics: pd.DataFrame,
@@ -185,11 +189,14 @@ def norms_chart(
         if len(band := curves[(curves["hemisphere"] == "whole") & (curves["metric"] == name)]):
             for low, high, alpha in (("q05", "q95", 0.6), ("q25", "q75", 1.0)):
                 axes.fill_between(band["week"], band[low], band[high], color=NEUTRAL_COLOUR, alpha=alpha, linewidth=0)
-            axes.plot(band["week"], band["expected"], color=MUTED_COLOUR)
+            axes.plot(band["week"], band["expected"], color=MUTED_COLOUR, zorder=4)
+            for quantile in ("q05", "q25", "q75", "q95"):
+                axes.plot(band["week"], band[quantile], color=MUTED_COLOUR, linewidth=0.6, zorder=4)
         _lines(axes, rows, colours)
         observed = rows[rows["run"] == MEASURED]
         within = observed["subject"].isin(reference)
-        _stars(axes, observed[within], subjects=subjects, markers=markers, shades=shades)
+        small: dict[str, Any] = {"markersize": 3.0} if within.sum() > MANY_BRAINS else {}
+        _stars(axes, observed[within], subjects=subjects, markers=markers, shades=shades, **small)
         _stars(axes, observed[~within], RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades)
         has_other_brains |= bool((~within & ~observed["subject"].isin(shades)).any())
         _title(axes, rows)
