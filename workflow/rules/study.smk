@@ -38,6 +38,7 @@ rule metrics_tables:
         individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
         made_with=study.norm_settings,
+        population=sorted({study.brains[brain].population for brain in study.norm_reference}),
     script:
         "../scripts/metrics_tables.py"
 

@@ -43,7 +43,7 @@ with step(snakemake.log[0]):
         brains = [LabelledBrain(*brain, by_label) for brain, by_label in zip(params.labelled, volumes, strict=True)]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
-    write_json(snakemake.output.norms, cohort.plain)
+    write_json(snakemake.output.norms, {"population": params.population, **cohort.plain})
     for name, path in snakemake.output.items():
         if name in tables:
             write_table(path, tables[name])
