@@ -4,7 +4,7 @@ The LMS method of Cole and Green (1992, doi 10.1002/sim.4780111005), as the grow
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ LOCATION_FREEDOM, SCALE_FREEDOM = (5.0, 7.5), 3.0
 subjects of 8 % scatter, the curve of a volume is off by up to 5 centiles in the middle."""
 SUBJECTS_PER_FREEDOM = 20
 """Subjects for each degree of freedom of the location, between these bounds."""
+MIN_WEEKS_OF_SPLINES = 8
 INTERVALS = 6
 """Intervals between the knots of the splines."""
 SKEWNESS_SD = 3.0
@@ -39,10 +40,10 @@ class WeeklyNorm:
     """The distribution of a metric by week, from `first` to `last`.
 
     A value y has z = ((y/M)^L − 1)/(L S) with location M, scale S and skewness L if the metric is positive, and
-    z = (y − M)/S if it may have either sign. ln M (or M) and ln S are linear in the `location` and `scale` (k,), which
-    are coefficients of cubic splines, or of powers of the week if there are few weeks or subjects. The covariance is
-    that of location, scale and skewness, the last only if it was estimated. `freedom` are the degrees of freedom of
-    the scale if it is that of few subjects, else None.
+    z = (y − M)/S if it may have either sign. ln M (or M) and ln S are linear in `location` and `scale`, which are
+    coefficients of cubic splines, or of powers of the week if there are few weeks or subjects. The covariance is that
+    of location, scale and skewness, the last only if it was estimated. `freedom` are the degrees of freedom of the
+    scale if it is that of few subjects, else None.
     """
 
     first: float
@@ -53,50 +54,57 @@ class WeeklyNorm:
     skewness: float
     covariance: Floats
     subjects: int
+    is_spline: bool
     freedom: float | None
 
-    @property
-    def is_spline(self) -> bool:
-        return len(self.scale) > 1
+    def _bases(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
+        at, sizes = np.atleast_1d(np.asarray(weeks, dtype=float)), (len(self.location), len(self.scale))
+        location, scale = (_basis(at, self.first, self.last, size, self.is_spline) for size in sizes)
+        return location, scale
+
+    def _student(self, locations: Floats, by_location: Floats) -> Floats:
+        """Return √(1 + leverage) at weeks, by which the scatter of a new subject exceeds the scale."""
+        size = len(self.location)
+        leverage = np.einsum("ij,jk,ik->i", locations, self.covariance[:size, :size], locations) * by_location**2
+        return np.asarray(np.sqrt(1 + leverage))
 
     def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
         """Return z and its standard error for values at weeks; of few subjects, z is that of Student's distribution."""
-        weeks, values = np.atleast_1d(weeks).astype(float), np.atleast_1d(values).astype(float)
-        rows = _basis(weeks, self.first, self.last, len(self.location), self.is_spline)
-        scales = rows if self.is_spline else np.ones((len(weeks), 1))
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            terms = _terms(rows @ self.location, scales @ self.scale, self.skewness, values, self.is_positive)
-        slopes = np.hstack([terms.by_location[:, None] * rows, terms.by_scale[:, None] * scales])
+        locations, scales = self._bases(weeks)
+        at = np.atleast_1d(np.asarray(values, dtype=float))
+        terms = _terms(locations @ self.location, scales @ self.scale, self.skewness, at, self.is_positive)
+        slopes = np.hstack([terms.by_location[:, None] * locations, terms.by_scale[:, None] * scales])
         if len(self.covariance) > slopes.shape[1]:
             slopes = np.hstack([slopes, terms.by_skewness[:, None]])
         error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, self.covariance, slopes), 0.0))
         if self.freedom is None:
             return terms.z, error
-        size = len(self.location)
-        leverage = np.einsum("ij,jk,ik->i", rows, self.covariance[:size, :size], rows) * terms.by_location**2
-        return stats.norm.ppf(stats.t.cdf(terms.z / np.sqrt(1 + leverage), self.freedom)), error
+        student = terms.z / self._student(locations, terms.by_location)
+        return stats.norm.ppf(stats.t.cdf(student, self.freedom)), error
 
     def values(self, weeks: ArrayLike, z: float) -> Floats:
-        """Return the values with a z at weeks (n,)."""
-        rows = _basis(np.asarray(weeks, dtype=float), self.first, self.last, len(self.location), self.is_spline)
-        scale = np.exp(rows @ self.scale if self.is_spline else self.scale[0])
+        """Return the values with a z at weeks (n,): the inverse of `scores`."""
+        locations, scales = self._bases(weeks)
+        scale = np.exp(scales @ self.scale)
+        own: Floats | float = z
+        if self.freedom is not None:
+            own = stats.t.ppf(stats.norm.cdf(z), self.freedom) * self._student(locations, 1 / scale)
         if not self.is_positive:
-            return rows @ self.location + scale * z
-        power = np.maximum(1.0 + self.skewness * scale * z, 1e-9)
-        logs = scale * z if abs(self.skewness) < 1e-6 else np.log(power) / self.skewness
-        return np.exp(rows @ self.location + logs)
+            return locations @ self.location + scale * own
+        power = np.maximum(1.0 + self.skewness * scale * own, 1e-9)
+        logs = scale * own if abs(self.skewness) < 1e-6 else np.log(power) / self.skewness
+        return np.exp(locations @ self.location + logs)
 
     def without(self, weeks: Floats, values: Floats, weights: Floats) -> "WeeklyNorm":
         """Return the norm without one of its subjects, by one Newton step from the whole."""
-        rows = _basis(weeks, self.first, self.last, len(self.location), self.is_spline)
-        terms = _terms(rows @ self.location, rows @ self.scale, self.skewness, values, self.is_positive)
-        slope = np.concatenate([rows.T @ (weights * terms.slope_location), rows.T @ (weights * terms.slope_scale)])
-        if len(self.covariance) > len(slope):
-            slope = np.append(slope, weights @ terms.slope_skewness)
-        step, size = self.covariance @ slope, len(self.location)
-        skewness = self.skewness - (step[2 * size] if len(step) > 2 * size else 0.0)
-        moved = {"location": self.location - step[:size], "scale": self.scale - step[size : 2 * size]}
-        return WeeklyNorm(**{**self.__dict__, **moved, "skewness": skewness, "subjects": self.subjects - 1})
+        locations, scales = self._bases(weeks)
+        terms = _terms(locations @ self.location, scales @ self.scale, self.skewness, values, self.is_positive)
+        slope = [locations.T @ (weights * terms.slope_location), scales.T @ (weights * terms.slope_scale)]
+        slope += [np.array([weights @ terms.slope_skewness])] * (len(self.covariance) > sum(map(len, slope)))
+        step, size = self.covariance @ np.concatenate(slope), len(self.location)
+        location, scale = self.location - step[:size], self.scale - step[size : size + len(self.scale)]
+        skewness = self.skewness - float(step[size + len(self.scale) :].sum())
+        return replace(self, location=location, scale=scale, skewness=skewness, subjects=self.subjects - 1)
 
     @property
     def plain(self) -> dict[str, Any]:
@@ -110,17 +118,20 @@ def norm_from(plain: Mapping[str, Any]) -> WeeklyNorm:
     return WeeklyNorm(**{"freedom": None, **plain, **arrays})
 
 
-def fit_norm(weeks: Floats, values: Floats, weights: Floats, subjects: int, *, is_positive: bool) -> WeeklyNorm:
+def fit_norm(
+    weeks: Floats, values: Floats, weights: Floats, subjects: int, *, is_positive: bool, with_curves: bool | None = None
+) -> WeeklyNorm:
     """Fit a norm to values (n,) at weeks (n,), by penalised maximum likelihood.
 
-    The weights of a subject's scans add up to 1. Of fewer subjects than `MIN_SUBJECTS_OF_CURVES`, or at fewer than
-    eight weeks, a quadratic (a line, a constant, for fewer than four and two weeks) is fitted to the values or their
-    logarithms, with one scatter.
+    The weights of a subject's scans add up to 1. Curves are splines, or of fewer than eight weeks a quadratic of the
+    location and a line of the scale. Of few subjects (by `with_curves`, or else by their number), a quadratic is fitted
+    to the values or their logarithms, with one scatter. Fewer than four weeks have a line, one week a constant.
     """
     first, last, count = float(weeks.min()), float(weeks.max()), len(np.unique(weeks))
     start = np.log(values) if is_positive else values
-    if subjects < MIN_SUBJECTS_OF_CURVES or count < 8:
-        size = 3 if count > 3 else 2 if count > 1 else 1
+    size = 3 if count > 3 else 2 if count > 1 else 1
+    with_curves = subjects >= MIN_SUBJECTS_OF_CURVES if with_curves is None else with_curves
+    if not with_curves:
         rows = _basis(weeks, first, last, size, False)
         normal = (rows.T * weights) @ rows
         location = solve(normal, rows.T @ (weights * start))
@@ -130,39 +141,50 @@ def fit_norm(weeks: Floats, values: Floats, weights: Floats, subjects: int, *, i
         covariance[:size, :size] = scatter**2 * np.linalg.inv(normal)
         covariance[size, size] = 0.5 / freedom
         scale = np.array([np.log(scatter)])
-        return WeeklyNorm(first, last, is_positive, location, scale, 0.0, covariance, subjects, float(freedom))
-    rows = _basis(weeks, first, last, INTERVALS + 3, True)
-    size = rows.shape[1]
-    differences = np.diff(np.eye(size), 2, axis=0)
-    penalty = differences.T @ differences
+        return WeeklyNorm(first, last, is_positive, location, scale, 0.0, covariance, subjects, False, float(freedom))
+    is_spline = count >= MIN_WEEKS_OF_SPLINES
+    sizes = (INTERVALS + 3,) * 2 if is_spline else (size, min(size, 2))
+    rows, scale_rows = (_basis(weeks, first, last, each, is_spline) for each in sizes)
     normal = (rows.T * weights) @ rows
-    location_freedom = float(np.clip(subjects / SUBJECTS_PER_FREEDOM, *LOCATION_FREEDOM))
-    strengths = [_strength(normal, penalty, each) for each in (location_freedom, SCALE_FREEDOM)]
-    location = solve(normal + strengths[0] * penalty, rows.T @ (weights * start))
+    size, total = sizes[0], sum(sizes)
+    penalties = np.zeros((total, total))
+    location_freedom = float(np.clip(subjects / SUBJECTS_PER_FREEDOM, *LOCATION_FREEDOM)) if is_spline else float(size)
+    strength = 0.0
+    if is_spline:
+        differences = np.diff(np.eye(size), 2, axis=0)
+        penalty = differences.T @ differences
+        strength = _strength(normal, penalty, location_freedom)
+        # the information of an observation on ln S is 2
+        penalties[size:, size:] = 2.0 * _strength(normal, penalty, SCALE_FREEDOM) * penalty
+        penalties[:size, :size] = strength * penalty
+    location = solve(normal + penalties[:size, :size], rows.T @ (weights * start))
     variance = float(weights @ (start - rows @ location) ** 2) / (subjects - location_freedom)
-    penalties = np.zeros((2 * size, 2 * size))
-    # the information of an observation is 1/S² on the location and 2 on ln S
-    penalties[:size, :size] = strengths[0] / variance * penalty
-    penalties[size:, size:] = 2.0 * strengths[1] * penalty
-    first_guess = np.concatenate([location, np.full(size, 0.5 * np.log(variance)), [1.0] * is_positive])
+    # the information of an observation on the location is 1/S²
+    penalties[:size, :size] /= variance
+    scale = np.zeros(sizes[1])
+    scale[: 1 if not is_spline else None] = 0.5 * np.log(variance)
+    first_guess = np.concatenate([location, scale, [1.0] * is_positive])
 
     def loss(parameters: Floats) -> tuple[float, Floats]:
-        curves, skewness = parameters[: 2 * size], parameters[-1] if is_positive else 0.0
-        terms = _terms(rows @ curves[:size], rows @ curves[size:], skewness, values, is_positive)
-        slope = -np.concatenate([rows.T @ (weights * terms.slope_location), rows.T @ (weights * terms.slope_scale)])
-        total = -float(weights @ terms.likelihood) + 0.5 * float(curves @ penalties @ curves)
+        curves, skewness = parameters[:total], parameters[-1] if is_positive else 0.0
+        terms = _terms(rows @ curves[:size], scale_rows @ curves[size:], skewness, values, is_positive)
+        slope = -np.concatenate(
+            [rows.T @ (weights * terms.slope_location), scale_rows.T @ (weights * terms.slope_scale)]
+        )
+        value = -float(weights @ terms.likelihood) + 0.5 * float(curves @ penalties @ curves)
         slope += penalties @ curves
         if is_positive:
-            total += 0.5 * ((skewness - 1.0) / SKEWNESS_SD) ** 2
+            value += 0.5 * ((skewness - 1.0) / SKEWNESS_SD) ** 2
             slope = np.append(slope, -weights @ terms.slope_skewness + (skewness - 1.0) / SKEWNESS_SD**2)
-        return total, slope
+        return value, slope
 
     fit = minimize(loss, first_guess, jac=True, method="BFGS", options={"gtol": 1e-4 * np.sqrt(subjects)}).x
     steps = 1e-4 * np.eye(len(fit))
     hessian = np.array([(loss(fit + step)[1] - loss(fit - step)[1]) / 2e-4 for step in steps])
     covariance = np.linalg.pinv(0.5 * (hessian + hessian.T), hermitian=True)
     skewness = float(fit[-1]) if is_positive else 0.0
-    return WeeklyNorm(first, last, is_positive, fit[:size], fit[size : 2 * size], skewness, covariance, subjects, None)
+    location, scale = fit[:size], fit[size:total]
+    return WeeklyNorm(first, last, is_positive, location, scale, skewness, covariance, subjects, is_spline, None)
 
 
 @dataclass(frozen=True, eq=False)
