@@ -118,7 +118,7 @@ class Case:
 
 
 FINEST = Case(2, 2.83)
-CASES = (Case(2, 2.0), Case(1, 2.0), Case(2, 1.41), Case(2, 2.0, 2.0), Case(2, 2.0, 0.5), FINEST)
+CASES = (Case(2, 2.0), Case(1, 2.0), Case(2, 2.0, 2.0), Case(2, 2.4), FINEST, Case(2, 2.0, 0.5))
 
 
 def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
