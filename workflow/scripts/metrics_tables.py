@@ -6,7 +6,7 @@ from gyriflow.io.files import read_json, read_tables, write_json, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.norms import (
     LabelledBrain,
-    cohort_from,
+    cohort_from_plain,
     cohort_norms,
     measured_scores,
     norm_curves,
@@ -24,7 +24,7 @@ with step(snakemake.log[0]):
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
     reference = [] if files.cohort else params.reference
     if files.cohort:
-        cohort = cohort_from(read_json(files.cohort[0]))
+        cohort = cohort_from_plain(read_json(files.cohort[0]))
     else:
         cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=params.made_with)
     parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]

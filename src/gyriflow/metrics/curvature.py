@@ -105,10 +105,10 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
 
 
 def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
-    """Return the share of its mean curvature that a shallow wave keeps, by the quadric fit: 384 J₄(k)/k⁴, k = 2πr/λ.
+    """Return the share of its mean curvature that a shallow wave keeps in the quadric fit: 384 J₄(k)/k⁴, k = 2πr/λ.
 
-    It is exact for many vertices in the ball of radius r; with the fewest, two edges to a radius, it holds within 0.04.
-    Folds a quarter as deep as long keep more.
+    Exact for many vertices in the ball of radius r, and within 0.04 for the coarsest mesh, with two edges to a radius.
+    Folds whose depth is a quarter of their length keep more.
     """
     k = np.maximum(2.0 * np.pi * radius_mm / np.asarray(wavelength_mm), 0.01)
     return np.asarray(384.0 * jv(4, k) / k**4)

@@ -1,6 +1,6 @@
 """Norms of a metric over gestational weeks: location, scale and skewness as smooth curves.
 
-The LMS method of Cole and Green (1992, doi 10.1002/sim.4780111005), as the growth standards of the WHO have it.
+The LMS method of Cole and Green (1992, doi 10.1002/sim.4780111005), as in the growth standards of the WHO.
 """
 
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ from ..geometry.triangles import Floats
 
 MIN_SUBJECTS = 10
 """With fewer subjects there are no centiles."""
-MIN_SUBJECTS_OF_CURVES = 30
-"""With fewer subjects the relative scatter is the same at all weeks, and centiles end at `FEW_CENTILES`."""
+MIN_SUBJECTS_FOR_SPLINES = 30
+"""With fewer subjects the relative scatter is the same at all weeks, and centiles are cut at `FEW_CENTILES`."""
 FEW_CENTILES = (5.0, 95.0)
 INTERVAL_Z = 1.645
 """Half the width of a 90 % interval in standard errors."""
 LOCATION_FREEDOM, SCALE_FREEDOM = (5.0, 7.5), 3.0
-"""Degrees of freedom of the curve of location, for few and for many subjects, and of that of scale. With 5 for 200
-subjects of 8 % scatter, the curve of a volume is off by up to 5 centiles in the middle."""
+"""Degrees of freedom of the curve of location, for few and for many subjects, and of the curve of scale. With 5 for 200
+subjects whose volumes scatter by 8 %, the median is wrong by up to 5 centiles."""
 SUBJECTS_PER_FREEDOM = 20
 """Subjects for each degree of freedom of the location, between these bounds."""
 MIN_WEEKS_OF_SPLINES = 8
@@ -108,12 +108,12 @@ class WeeklyNorm:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """Its fields as plain values for JSON."""
+        """The fields as plain values for JSON."""
         return {key: np.asarray(part).tolist() for key, part in asdict(self).items() if part is not None}
 
 
-def norm_from(plain: Mapping[str, Any]) -> WeeklyNorm:
-    """Return the norm of plain values as of `WeeklyNorm.plain`."""
+def norm_from_plain(plain: Mapping[str, Any]) -> WeeklyNorm:
+    """Return the norm that `WeeklyNorm.plain` gives as plain values."""
     arrays = {key: np.array(plain[key], dtype=float) for key in ("location", "scale", "covariance")}
     return WeeklyNorm(**{"freedom": None, **plain, **arrays})
 
@@ -209,10 +209,10 @@ def _terms(location: Floats, log_scale: Floats, skewness: float, values: Floats,
     logs = np.log(values) - location
     power = np.exp(skewness * logs)
     # the limits for small skewness
-    near = abs(skewness) < 1e-4
-    moved = logs + 0.5 * skewness * logs**2 if near else (power - 1) / skewness
-    by_skewness = 0.5 * logs**2 if near else (logs * power - moved) / skewness
-    z = moved / scale
+    is_small = abs(skewness) < 1e-4
+    scaled_z = logs + 0.5 * skewness * logs**2 if is_small else (power - 1) / skewness
+    by_skewness = 0.5 * logs**2 if is_small else (logs * power - scaled_z) / skewness
+    z = scaled_z / scale
     slope = z * power / scale - skewness
     return _Terms(
         z=z,
@@ -227,6 +227,7 @@ def _terms(location: Floats, log_scale: Floats, skewness: float, values: Floats,
 
 
 def _basis(weeks: Floats, first: float, last: float, size: int, is_spline: bool) -> Floats:
+    """Return the (n, size) values of the splines, or of the powers of the week, at weeks (n,)."""
     inside = np.clip(weeks, first, last)
     if not is_spline:
         return np.vander((weeks - 0.5 * (first + last)) / max(0.5 * (last - first), 1e-9), size, increasing=True)
@@ -235,6 +236,7 @@ def _basis(weeks: Floats, first: float, last: float, size: int, is_spline: bool)
 
 
 def _strength(normal: Floats, penalty: Floats, freedom: float) -> float:
+    """Return the factor of the penalty with which a penalised fit has the degrees of freedom."""
     ridge = 1e-10 * np.trace(normal) * np.eye(len(normal))
 
     def excess(exponent: float) -> float:

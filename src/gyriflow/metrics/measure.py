@@ -72,8 +72,8 @@ class Folds:
 class Hemisphere(Folds):
     """A hemisphere of n vertices, "left" or "right", with its measures other than folds.
 
-    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others,
-    `spectra` has those of the `PROXIES`, `weyl` is Weyl's number of modes.
+    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others, `spectra`
+    has a spectrum for each of the `PROXIES`, `weyl` is Weyl's number of modes.
     """
 
     name: str
@@ -85,14 +85,8 @@ class Hemisphere(Folds):
     def maps(self) -> dict[str, NDArray]:
         """Return the arrays per vertex by name, as in `BrainMetrics.maps`."""
         thickness = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
-        return {**super().maps(), **thickness, **self.dominant_bands()}
-
-    def dominant_bands(self) -> dict[str, NDArray]:
-        """Return the maps of the dominant band by each proxy."""
-        return {
-            f"spangy_{SPECTRUM_PREFIXES[proxy]}dominant_band": part.dominant_band
-            for proxy, part in self.spectra.items()
-        }
+        bands = {f"spangy_{SPECTRUM_PREFIXES[name]}dominant_band": x.dominant_band for name, x in self.spectra.items()}
+        return {**super().maps(), **thickness, **bands}
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
@@ -125,10 +119,10 @@ def measure_hemisphere(
 
 
 def hemisphere_spectra(mesh: TriangleMesh, curvature_maps: Curvature, spangy_modes: SpangyModes) -> dict[str, Spectrum]:
-    """Return the spectra of a hemisphere by each of the `PROXIES`, on the same modes."""
+    """Return the spectrum of each of the `PROXIES` of a hemisphere, all on the same modes."""
     stiffness, mass = laplacian(mesh)
     modes, reach = modes_of(spangy_modes, stiffness, mass, first_eigenvalue(stiffness, mass))
-    # near a cut the proxies are continued from beyond
+    # values near a cut are not reliable and are replaced by a harmonic continuation
     reliable = np.flatnonzero(curvature_maps.reliable)
     values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[reliable]
     maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(values).T
@@ -143,18 +137,18 @@ def surface_spectra(
     left: TriangleMesh | None, right: TriangleMesh | None, radius_mm: float, spangy_modes: SpangyModes
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
-    sides = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     return _stacked(
         {
             name: band_table(hemisphere_spectra(mesh, curvature(mesh, radius_mm=radius_mm), spangy_modes))
-            for name, mesh in sides.items()
+            for name, mesh in (("left", left), ("right", right))
+            if mesh is not None
         }
     )
 
 
 def band_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
     """Return the columns proxy and those of `Spectrum.bands`, a row per proxy and band."""
-    return _stacked({proxy: part.bands for proxy, part in spectra.items()}, "proxy")
+    return _stacked({proxy: spectrum.bands for proxy, spectrum in spectra.items()}, "proxy")
 
 
 def _mode_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:

@@ -1,13 +1,11 @@
 """Norms of published curves and of measured brains over gestational weeks, and the scores of brains against them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 from scipy import stats
 
 from ..errors import InputError
@@ -15,30 +13,28 @@ from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
-from .lms import FEW_CENTILES, INTERVAL_Z, MIN_SUBJECTS, WeeklyNorm, fit_norm, norm_from
+from .lms import FEW_CENTILES, INTERVAL_Z, MIN_SUBJECTS, WeeklyNorm, fit_norm, norm_from_plain
 from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
 
 MIN_AVERAGES = 5
-"""Smallest number of averages of an atlas that a curve is fitted to."""
+"""Minimum number of an atlas' average brains for a curve."""
 
 WINDOW_GW = 0.5
-"""Brains are scored at most this far before the norm's first week and after its last."""
+"""Brains are scored up to this long before the norm's first week and after its last."""
 
-USUAL_Z = 1.5
-"""Subjects beyond this z are left out of their own norm by another fit, others by one step of one."""
+MAX_ONE_STEP_Z = 1.5
+"""Subjects up to this z are removed from the norm by one Newton step; beyond it, the norm is fitted again."""
 
 CURVE_POINTS = 41
-"""Number of weeks at which a curve is given, from the reference's first to its last."""
+"""Number of points of a norm's curve."""
 
 OTHER_SIDES = "other hemispheres"
-"""The flag of a brain that has other hemispheres than those it would be compared with."""
-
-
-SCORES = (*("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag"),)
-EMPTY: Mapping[str, Any] = MappingProxyType({})
+"""Flag of a brain whose hemispheres are not those of the reference brains."""
+SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag")
+"""Columns of `measured_scores` that follow the value and its unit."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +56,6 @@ class PublishedNorm:
     scheme: str = ""
     tissue: str = ""
     side: Side | None = None
-
-    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-        """Return z of values at weeks, and its standard error, which is unknown."""
-        z = (np.atleast_1d(values) - self.values(weeks, 0.0)) / (self.values(weeks, 1.0) - self.values(weeks, 0.0))
-        return z, np.full(z.shape, np.nan)
-
-    def values(self, weeks: ArrayLike, z: float) -> Floats:
-        """Return the values with a z at weeks (n,)."""
-        at = np.asarray(weeks, dtype=float)
-        return np.asarray(np.polyval(self.mean, at) + z * np.polyval(self.sd, at))
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -129,9 +115,8 @@ def published_scores(
         inside = norm.weeks[0] <= week <= norm.weeks[1]
         is_present = len(sides) == len(SIDES) or norm.side in sides
         scored = inside and is_present
-        mean = float(norm.values(week, 0.0)) if scored else np.nan
-        sd = float(norm.values(week, 1.0)) - mean
-        z = float(norm.scores(week, value)[0][0]) if scored else np.nan
+        mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
+        z = (value - mean) / sd
         brains = np.nan if norm.subjects is None else norm.subjects
         flag = "other labels" if name in substitutes else "ok"
         if not scored:
@@ -174,18 +159,17 @@ def volume_tables(
 class CohortNorms:
     """The norms of a cohort by hemisphere and metric, with their units.
 
-    `made_with` are the settings that the numbers depend on.
-
-    Without `individuals`, as for averages of an atlas, the scatter is not that of individuals.
+    `made_with` are the settings that the numbers depend on. If the brains are not `individuals` but averages, as in an
+    atlas, their scatter is not that of individuals.
     """
 
     norms: Mapping[tuple[str, str], tuple[str, WeeklyNorm]]
-    individuals: bool = True
-    made_with: Mapping[str, Any] = field(default_factory=dict)
+    individuals: bool
+    made_with: Mapping[str, Any]
 
     @property
     def plain(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """The norms as plain values for JSON."""
         keys = ("hemisphere", "metric", "unit")
         rows = [dict(zip(keys, (*name, unit), strict=True)) | norm.plain for name, (unit, norm) in self.norms.items()]
         subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
@@ -193,27 +177,31 @@ class CohortNorms:
         return {"subjects": subjects, "method": method, "made_with": dict(self.made_with), "norms": rows}
 
 
-def cohort_from(content: Mapping[str, Any]) -> CohortNorms:
-    """Return the norms of plain values as of `CohortNorms.plain`."""
+def cohort_from_plain(content: Mapping[str, Any]) -> CohortNorms:
+    """Return the norms that `CohortNorms.plain` gives as plain values."""
     rows = [dict(row) for row in content["norms"]]
-    norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from(row)) for row in rows}
-    return CohortNorms(norms, made_with=content["made_with"])
+    norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from_plain(row)) for row in rows}
+    return CohortNorms(norms, True, content["made_with"])
 
 
 def cohort_norms(
-    metrics: pd.DataFrame, reference: Sequence[str], *, individuals: bool = True, made_with: Mapping[str, Any] = EMPTY
+    metrics: pd.DataFrame,
+    reference: Sequence[str],
+    *,
+    individuals: bool = True,
+    made_with: Mapping[str, Any] | None = None,
 ) -> CohortNorms:
     """Fit norms to the metrics of reference brains.
 
     `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person (the subject
     scanned; may be absent if no one was scanned twice). All scans of a subject together have the weight of one.
-    Individuals need at least `MIN_SUBJECTS` of them, averages five.
+    Metrics with fewer than `MIN_SUBJECTS` individuals, or `MIN_AVERAGES` averages, have no norm.
     """
     norms = {}
     for name, brains in _by_metric(metrics, reference):
         if brains["person"].nunique() >= (MIN_SUBJECTS if individuals else MIN_AVERAGES):
             norms[name] = (str(brains["unit"].iloc[0]), _fit(brains, name[1]))
-    return CohortNorms(norms, individuals, made_with)
+    return CohortNorms(norms, individuals, made_with or {})
 
 
 def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
@@ -231,7 +219,7 @@ def _weights(brains: pd.DataFrame) -> Floats:
 def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms) -> pd.DataFrame:
     """Return the scores of brains against the norms of reference brains, at each brain's own week.
 
-    A brain of the reference is compared with the other subjects. Norms from a file have no reference brains here.
+    A brain of the reference is compared with the other subjects. `reference` is empty for norms from a file.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd (half the distance between z = −1
     and 1), z, z_low, z_high, centile (0 to 100), centile_low, centile_high (90 % intervals from the norm's own
@@ -241,12 +229,11 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
-    alike = same_sides(metrics, reference) if len(reference) else True
-    table = _with_people(metrics).assign(alike=alike).dropna(subset=["value"])
-    table = table[table["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)]
+    is_comparable = same_sides(metrics, reference) if len(reference) else True
+    table = _with_norm(metrics.assign(is_comparable=is_comparable))
     rows = []
-    for row, is_comparable, person in zip(
-        table[names].to_dict("records"), table["alike"], table["person"], strict=True
+    for row, person, has_same_sides in zip(
+        table[names].to_dict("records"), table["person"], table["is_comparable"], strict=True
     ):
         key = row["hemisphere"], row["metric"]
         brains = by_metric.get(key)
@@ -254,7 +241,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
             continue
         is_own = row["run"] == MEASURED and brains is not None and (brains["person"] == person).any()
         score = _score(key, row["week"], row["value"], cohort, brains if is_own else None, person)
-        rows.append((*row.values(), *(score if is_comparable else _no_score(OTHER_SIDES))))
+        rows.append((*row.values(), *(score if has_same_sides else _no_score(OTHER_SIDES))))
     return pd.DataFrame(rows, columns=[*names, *SCORES])
 
 
@@ -263,26 +250,20 @@ def _no_score(flag: str, subjects: int = 0) -> tuple[Any, ...]:
 
 
 def _score(
-    key: tuple[str, str],
-    week: float,
-    value: float,
-    cohort: CohortNorms,
-    own_reference: pd.DataFrame | None,
-    person: str,
+    key: tuple[str, str], week: float, value: float, cohort: CohortNorms, brains: pd.DataFrame | None, person: str
 ) -> tuple[Any, ...]:
+    """Return the `SCORES` of a value; `brains` are those of the norm if the person is one of its subjects."""
     if key not in cohort.norms:
-        return _no_score("too few brains", 0 if own_reference is None else own_reference["person"].nunique())
+        return _no_score("too few brains", 0 if brains is None else brains["person"].nunique())
     norm = cohort.norms[key][1]
-    if own_reference is not None:
-        is_own = own_reference["person"] == person
-        others = own_reference[~is_own]
-        if others["person"].nunique() < (MIN_SUBJECTS if cohort.individuals else MIN_AVERAGES):
-            return _no_score("too few brains", others["person"].nunique())
-        own = own_reference[is_own]
+    if brains is not None:
+        is_own = brains["person"] == person
+        own, remaining = brains[is_own], brains[~is_own]
+        if (subjects := remaining["person"].nunique()) < (MIN_SUBJECTS if cohort.individuals else MIN_AVERAGES):
+            return _no_score("too few brains", subjects)
         scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
-        # one step is enough for subjects that the norm hardly depends on
-        if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > USUAL_Z:
-            norm = _fit(others, key[1])
+        if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > MAX_ONE_STEP_Z:
+            norm = _fit(remaining, key[1])
         else:
             norm = norm.without(*scans, _weights(own))
     if not norm.first - WINDOW_GW <= week <= norm.last + WINDOW_GW:
@@ -291,10 +272,9 @@ def _score(
     if not cohort.individuals:
         return (expected, *[np.nan] * (len(SCORES) - 3), norm.subjects, SPREAD_UNKNOWN)
     (z,), (error,) = norm.scores([week], [value])
-    bounds = FEW_CENTILES if norm.freedom is not None else (0.0, 100.0)
+    bounds, flag = ((0.0, 100.0), "ok") if norm.freedom is None else (FEW_CENTILES, "few brains")
     scores = np.array([z, z - INTERVAL_Z * error, z + INTERVAL_Z * error])
     scores = np.clip(scores, *stats.norm.ppf(np.array(bounds) / 100))
-    flag = "few brains" if norm.freedom is not None else "ok"
     return (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores), norm.subjects, flag)
 
 
@@ -308,15 +288,16 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
     return sides.isin(sides[is_reference])
 
 
-def _with_people(metrics: pd.DataFrame) -> pd.DataFrame:
-    return metrics if "person" in metrics else metrics.assign(person=metrics["subject"])
+def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows with a value of a metric that has norms, with the column person."""
+    has_norm = metrics["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
+    rows = metrics[has_norm & metrics["value"].notna()]
+    return rows if "person" in rows else rows.assign(person=rows["subject"])
 
 
 def _by_metric(metrics: pd.DataFrame, reference: Sequence[str]) -> list[tuple[Any, pd.DataFrame]]:
-    rows = metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)].dropna(subset=["value"])
-    rows = _with_people(rows)
-    with_norm = rows["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
-    return list(rows[with_norm].groupby(["hemisphere", "metric"], sort=False))
+    rows = _with_norm(metrics[(metrics["run"] == MEASURED) & metrics["subject"].isin(reference)])
+    return list(rows.groupby(["hemisphere", "metric"], sort=False))
 
 
 def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
@@ -330,12 +311,11 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
     for (hemisphere, metric), (unit, norm) in cohort.norms.items():
         weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
-        error = norm.scores(weeks, expected)[1]
-        half = 0.5 * (high - low)
-        margin = INTERVAL_Z * error * half
+        sd = 0.5 * (high - low)
+        margin = INTERVAL_Z * norm.scores(weeks, expected)[1] * sd
         band = {"week": weeks, "brains": norm.subjects, "expected": expected}
         band |= {"expected_low": expected - margin, "expected_high": expected + margin}
-        spread = {"sd": half} | {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        spread = {"sd": sd} | {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
         band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
         parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

@@ -113,8 +113,8 @@ def spectrum(
 ) -> Spectrum:
     """Return the band spectrum of a folding proxy, (n,) values per vertex.
 
-    `radius_mm` is that of the fitted curvature. `reach` is the λ in mm⁻² below which no mode is missing; that of the
-    highest mode where it is not given. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by
+    `radius_mm` is the radius of the curvature fit. `reach` is the λ in mm⁻² below which no mode is missing, by default
+    that of the highest mode. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by
     itself: a vertex where the proxy is positive belongs to the band that adds most, another to the band that takes most
     away, with a minus sign.
     """

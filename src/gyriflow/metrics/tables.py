@@ -51,7 +51,7 @@ def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]])
 
 
 def asymmetry(metrics: pd.DataFrame) -> pd.DataFrame:
-    """Return the asymmetry of each metric, of each region where there are.
+    """Return the asymmetry of each metric, by region if there are regions.
 
     Columns difference (left − right) with its unit, and asymmetry_index 2 (left − right)/(left + right), between −2 and
     2; NaN if both are 0, one is unknown or the metric may be negative. Metrics have the columns hemisphere, metric,

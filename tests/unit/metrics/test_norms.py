@@ -15,7 +15,7 @@ from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.lms import INTERVAL_Z, fit_norm
 from gyriflow.metrics.norms import (
     LabelledBrain,
-    cohort_from,
+    cohort_from_plain,
     cohort_norms,
     measured_scores,
     norm_curves,
@@ -150,7 +150,7 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
     cohort = cohort_norms(metrics, reference, made_with=norm_settings(own) | {"schemes": [LABELLED["scheme"], "more"]})
     path = tmp_path / "norms.json"
     write_json(path, cohort.plain)
-    again = cohort_from(read_json(path))
+    again = cohort_from_plain(read_json(path))
     pd.testing.assert_frame_equal(norm_curves(cohort), norm_curves(again))
     (score,) = measured_scores(metrics[metrics["run"] == "new"], [], again).to_dict("records")
     assert score["centile"] == pytest.approx(scores(metrics, reference).query("run == 'new'")["centile"].iloc[0])
