@@ -27,7 +27,6 @@ DIGITS = 6
 """Significant digits of calibrated values."""
 N_CANDIDATES = 1024
 """Points of a Sobol sequence at which the surrogate is evaluated."""
-REFINE = "Use shorter edges and a smaller metrics.curvature_radius_mm, or another score."
 MIN_SPACING = 0.02
 """Smallest distance in the unit box between a new run and any other run."""
 
@@ -92,14 +91,9 @@ def size_score(simulated: TriangleMesh, observed: TriangleMesh) -> float:
     return float(np.hypot(area(simulated) / area(observed) - 1, relative_volume - 1))
 
 
-def distance_score(simulated: TriangleMesh, observed: TriangleMesh) -> float:
-    """Return distance_mm of `distances.aligned_distances`."""
-    return aligned_distances(simulated, observed)["distance_mm"]
-
-
 SURFACE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {
     "size": size_score,
-    "surface_distance": distance_score,
+    "surface_distance": lambda simulated, observed: aligned_distances(simulated, observed)["distance_mm"],
 }
 """Scores that compare closed surfaces in mm, simulated and observed, without scaling."""
 
@@ -122,25 +116,26 @@ def shape_scores(simulated: PreparedSurface, observed: PreparedSurface) -> dict[
 def require_bands(spectra: pd.DataFrame, names: Collection[str], path: str | None = None) -> None:
     """Raise InputError unless the bands of spectral scores are complete and resolved.
 
-    `spectra`, of the file `path`, has the columns proxy, band, wavelength_min_mm, wavelength_max_mm, complete,
+    `spectra`, from the file `path`, have the columns proxy, band, wavelength_min_mm, wavelength_max_mm, complete,
     resolved.
     """
     rows = spectra[(spectra["proxy"] == PROXIES[0]) & spectra["band"].isin(FOLD_BANDS)]
+    # the spectral distance covers all complete bands
+    last = int(rows.loc[rows["complete"], "band"].max()) if rows["complete"].any() else FOLD_BANDS[0]
     for name in [name for name in names if name in SPECTRAL_SCORES]:
-        # the distance is that of all complete bands
-        last = int(rows.loc[rows["complete"], "band"].max()) if rows["complete"].any() else FOLD_BANDS[0]
-        bands = range(FOLD_BANDS[0], last + 1) if name == "spectral_distance" else [int(name[-1])]
-        for band in bands:
+        for band in range(FOLD_BANDS[0], last + 1) if name == "spectral_distance" else [int(name[-1])]:
             row = rows[rows["band"] == band]
-            lengths = f"B{band}, {row['wavelength_min_mm'].min():.1f} to {row['wavelength_max_mm'].max():.1f} mm"
-            checks = {
-                "complete": ("cut off", f"Set metrics.spangy_modes: B{band}, or use another score."),
-                "resolved": ("not resolved", REFINE),
-            }
-            for column, (problem, remedy) in checks.items():
-                if not row[column].all():
-                    problem = f"calibrate.score {name} needs a band that is {problem}"
-                    raise InputError(problem, path=path, found=lengths, remedy=remedy)
+            if row["complete"].all() and row["resolved"].all():
+                continue
+            problem, remedy = "not resolved", "Use shorter edges and a smaller metrics.curvature_radius_mm"
+            if not row["complete"].all():
+                problem, remedy = "cut off", f"Set metrics.spangy_modes: B{band}"
+            raise InputError(
+                f"calibrate.score {name} needs a band that is {problem}",
+                path=path,
+                found=f"B{band}, {row['wavelength_min_mm'].min():.1f} to {row['wavelength_max_mm'].max():.1f} mm",
+                remedy=f"{remedy}, or use another score.",
+            )
 
 
 def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str, float]:
@@ -190,7 +185,7 @@ def run_score(
     causes
         Reasons why simulations of the run have diverged; empty if all have finished.
     spectra
-        Spectra of the same pairs, as in `spectral_scores`; needed for these scores only.
+        Spectra of the same pairs, as in `spectral_scores`; only needed if `weights` has some of these scores.
 
     Returns
     -------
@@ -201,8 +196,7 @@ def run_score(
     rows: list[dict[str, float]] = []
     if not causes:
         surface_names = [name for name in weights if name not in SPECTRAL_SCORES]
-        scores = (brain_scores(*pair, surface_names, radius_mm=radius_mm) for pair in pairs)
-        rows = [dict(found.items()) for found in scores]
+        rows = [dict(brain_scores(*pair, surface_names, radius_mm=radius_mm).items()) for pair in pairs]
         if len(surface_names) < len(weights):
             for row, pair in zip(rows, spectra, strict=True):
                 require_bands(pd.concat(pair), weights)

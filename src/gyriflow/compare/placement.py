@@ -21,9 +21,9 @@ N_DRAWS = 2000
 INTERVAL = (0.025, 0.975)
 """Quantiles of the bootstrap samples at the ends of a 95 % interval."""
 RESAMPLED = "patches of one brain, not subjects"
-"""What the bootstrap draws, as written in tables: the intervals do not cover differences between subjects."""
+"""Note in tables with bootstrap intervals, which do not include differences between subjects."""
 NO_ROOM = "no room"
-"""Flag in place of a skill where the baseline of skill is not certainly better than the start."""
+"""Flag of a skill that is not computed, since its baseline may be no better than the start."""
 
 
 def correlation(x: Floats, y: Floats, weights: Floats) -> float:
@@ -50,8 +50,8 @@ def score_placement(
 ) -> dict[str, float | bool | str]:
     """Score how well the positions of a simulated brain's folds agree with those of the observed brain.
 
-    For each of `COMPARED_MAPS` the `correlation_scores`. In addition matched_share, the share of the observed area with
-    a matching point on the simulated brain, asymmetry_mm and mirrored_patches of `make_patches`, and resampled.
+    The result has the `correlation_scores` of each of `COMPARED_MAPS`; matched_share, the share of the observed area
+    with a matching point on the simulated brain; asymmetry_mm and mirrored_patches of `make_patches`; and resampled.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ def score_placement(
     patch, symmetry = make_patches(observed)
     row = {"matched_share": matched_share} | symmetry | {"resampled": RESAMPLED}
     for name in COMPARED_MAPS:
-        compared = run_maps[name], start_maps[name], adjacent_maps[name]
-        scores = correlation_scores(getattr(observed, name), *compared, observed.areas, patch)
+        maps = (getattr(observed, name), run_maps[name], start_maps[name], adjacent_maps[name])
+        scores = correlation_scores(*maps, observed.areas, patch)
         row |= {f"{score}_{name}": value for score, value in scores.items()}
     return row
 
@@ -77,14 +77,15 @@ def score_placement(
 def correlation_scores(
     truth: Floats, simulated: Floats, start: Floats, adjacent: Floats, areas: Floats, patch: Ints
 ) -> dict[str, float | str]:
-    """Correlate (n,) values with the observed ones and compare with baselines, by a bootstrap over patches.
+    """Correlate (n,) simulated values with the observed `truth`, and compare r with that of the baselines.
 
     Returns
     -------
     dict
         r, r_start and r_adjacent, weighted by area; gain = r − r_start; room = r_adjacent − r_start, the gain of the
-        baseline; skill = gain/room, and skill_flag: "ok", or `NO_ROOM` and NaN unless the interval of room lies above
-        0. r, gain, room and skill have 95 % intervals …_low, …_high (percentiles, Efron and Tibshirani 1993).
+        baseline; skill = gain/room and skill_flag: "ok", or NaN and `NO_ROOM` unless the interval of room lies above 0.
+        r, gain, room and skill have 95 % intervals …_low, …_high: percentiles of a bootstrap over patches (Efron and
+        Tibshirani 1993).
     """
     drawn = draw_patches(patch)
     r, r_start, r_adjacent = (
@@ -100,7 +101,7 @@ def correlation_scores(
 
 
 def interval_of(draws: Floats) -> tuple[float, float, float]:
-    """Return the value of a statistic, the first of (1 + k,) draws, and its 95 % interval by the k others."""
+    """Return a statistic, the first of (1 + k,) draws, and its 95 % interval, from the other k."""
     low, high = (float("nan"),) * 2 if np.isnan(draws).all() else np.nanquantile(draws[1:], INTERVAL)
     return float(draws[0]), float(low), float(high)
 
@@ -146,7 +147,7 @@ def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floa
 
 
 def draw_patches(patch: NDArray[np.integer]) -> Ints:
-    """Return how often each of p patches is in the surface itself, once, and in bootstrap samples, (1 + N_DRAWS, p)."""
+    """Return how often each of p patches is in the surface (once) and in each bootstrap sample, (1 + N_DRAWS, p)."""
     count = int(patch.max()) + 1
     drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
     return np.concatenate([np.ones((1, count), np.int64), drawn])

@@ -139,13 +139,13 @@ def roughness_mm(mesh: TriangleMesh) -> float:
 def add_skill(rows: pd.DataFrame) -> pd.DataFrame:
     """Add skill = 1 − distance / distance of the best baseline of the week, with its 95 % interval.
 
-    The best baseline is chosen in each bootstrap sample anew, so the interval includes that choice.
+    The best baseline is chosen anew in each bootstrap sample, so the interval includes the uncertainty of that choice.
 
     Parameters
     ----------
     rows
-        Columns week, model and drawn_mm, which the result does not have. All rows of a week have the same samples.
-        Baselines are all models but `run`; without baselines, skill, skill_low and skill_high are NaN.
+        Columns week, model and drawn_mm, which is dropped. All rows of a week have the same samples. Baselines are all
+        models but `run`; without baselines, skill, skill_low and skill_high are NaN.
     """
     baselines = rows[rows["model"] != "run"]
     best = {week: np.min(list(drawn), axis=0) for week, drawn in baselines.groupby("week")["drawn_mm"]}

@@ -18,10 +18,10 @@ AGREEMENT_TOL = 0.1
 MAX_WEAK_SHARE = 0.05
 """Share of the spectrum's power below which a band counts as very weak."""
 SHARE_TOL = 0.01
-"""Smallest difference of shares that counts as one between the hemispheres."""
+"""Difference of a band's share between the hemispheres up to which they count as equal."""
 MAX_MIRROR_MM = 0.2
-"""Mean distance of one hemisphere from the other's mirror image up to which a brain has no asymmetry to show: 0.06 to
-0.09 mm in the shipped atlas."""
+"""Mean distance of one hemisphere from the other's mirror image up to which a brain counts as symmetric. The shipped
+atlas has 0.06 to 0.09 mm."""
 MAX_OCCIPITAL_SHARE = 0.25
 """Share of the brain's length, from the back, that counts as the occipital lobe."""
 NOT_RUN, AGREES, NOT_COMPARABLE = "not run", "as in the paper", "another machine and mesh"
@@ -47,7 +47,7 @@ class SweepTables:
 
 
 def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str:
-    """Describe the observed brains that a sweep is compared with, and say whether they are of another population.
+    """Describe the observed brains that a sweep is compared with, and note any of another population.
 
     The comparison has the columns real, real_population, same_population.
     """
@@ -63,7 +63,7 @@ def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str
 
 
 def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTables]) -> pd.DataFrame:
-    """Return the nearest runs by each measure for which the paper reports a nearest value too.
+    """Return the nearest runs by each measure for which the paper also reports a nearest value.
 
     The paper compares with other brains (a normal atlas). Its spectra are of the shape index, cut at Weyl's number.
 
@@ -112,14 +112,14 @@ def replication_table(
     costs
         Power and carbon intensity for the costs of the run.
     rates, used_rate
-        Growth rates by areas, with the columns from_week, to_week, rate_per_s, and that of the same run.
+        Growth rates from surface areas (columns from_week, to_week, rate_per_s), and the rate used by the same run.
     from_back
-        Place of the largest displacement, from `place_of_largest`.
+        `place_of_largest` of the displacement from 24 to 25 GW.
     mirror_mm
         `mirror_distance` of the start brain's hemispheres.
 
-    Bands are of the shape index, cut at the largest Weyl number of all surfaces compared, per side, as in the paper.
-    Values of whole bands are added.
+    Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
+    side. Values of whole bands are listed in addition.
     """
     modes = published["weyl_number"]
     rows = [
@@ -145,10 +145,10 @@ def replication_table(
 
 
 def place_of_largest(before: Floats, after: Floats, pial: Ints) -> float:
-    """Return where the largest displacement of pial nodes begins: 0 at the back of the brain, 1 at its front."""
+    """Return the place of the pial node with the largest displacement: 0 at the back of the brain, 1 at its front."""
     y = before[pial, 1]
-    place = np.linalg.norm((after - before)[pial], axis=1).argmax()
-    return float((y[place] - y.min()) / np.ptp(y))
+    largest = np.linalg.norm((after - before)[pial], axis=1).argmax()
+    return float((y[largest] - y.min()) / np.ptp(y))
 
 
 def mirror_distance(left: TriangleMesh, right: TriangleMesh) -> float:
@@ -189,8 +189,8 @@ def _growth_rate(published: Mapping[str, Any], rates: pd.DataFrame | None, used:
         within = rates.loc[(rates["from_week"] >= first) & (rates["to_week"] <= last), "rate_per_s"]
         if len(within):
             here = f"{within.min():.2g} to {within.max():.2g} by areas; {used} used"
-            verdict = _verdict(within >= published["least_per_s"])
-    paper = f"at least {published['least_per_s']:g} by areas; {published['used_per_s']:g} used, twice as much"
+            verdict = _verdict(within >= published["min_per_s"])
+    paper = f"at least {published['min_per_s']:g} by areas; {published['used_per_s']:g} used, twice as much"
     return f"growth rate of the cortex, {first}-{last} GW (1/s)", published["place"], paper, here, verdict
 
 
@@ -198,8 +198,8 @@ def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: Cost
     weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
     energy_wh = summary["cpu_seconds"] / 3600 * costs.core_power_w / weeks
     values = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * costs.carbon_g_per_kwh)
-    size = f"{summary['tets']} elements, {summary['ranks']} ranks, {costs.core_power_w:g} W a core, "
-    size += f"{costs.carbon_g_per_kwh:g} g/kWh"
+    size = f"{summary['tets']} elements, {summary['ranks']} ranks"
+    size += f", {costs.core_power_w:g} W a core, {costs.carbon_g_per_kwh:g} g/kWh"
     for entry, value in zip(published["rows"], values, strict=True):
         result = f"{entry['quantity']} per gestational week"
         paper = f"{entry['value']:g} ({published['machine']})"
@@ -226,27 +226,26 @@ def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]
         for row in nearest[nearest["measure"] == measure].to_dict("records"):
             flag = "" if row["flag"] == "ok" else f" ({row['flag']})"
             texts.append(f"{row['hemisphere']}, {bands}: {row[entry['parameter']]:g}{flag}")
-            # the paper's are cut
+            # the paper's bands are cut
             if bands == "cut" and pd.notna(row["run"]):
                 equal.append(row[entry["parameter"]] == entry["value"])
-    if texts and not equal:
-        return "; ".join(texts), NOT_TESTABLE
-    return "; ".join(texts) or MISSING, _verdict(pd.Series(equal))
+    verdict = NOT_TESTABLE if texts and not equal else _verdict(pd.Series(equal))
+    return "; ".join(texts) or MISSING, verdict
 
 
 def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[str, str]:
     if check.startswith("all_"):
         holds, text = sweep.members["outcome"].eq("finished"), ""
-        if check == "all_come":
+        if check == "all_without_collisions":
             is_count = (sweep.comparison["measure"] == CROSSING_FACES) & (sweep.comparison["hemisphere"] == "whole")
             crossing = sweep.comparison[is_count].groupby("run")["value"].max()
             text = f"; crossing faces: {', '.join(f'{count:.0f}' for count in crossing)}"
             holds &= sweep.members["run"].map(crossing).eq(0)
         return f"{holds.sum()} of {len(holds)} runs{text}", _verdict(holds)
-    shares = _shares(sweep.comparison, "_weyl")
+    shares = _cut_shares(sweep.comparison)
     if check == "most_B4":
-        others = shares[["B5", "B6"]].max(axis=1)
-        holds = (shares["B4"] > others)[shares["B4"].notna() & others.notna()]
+        finer = shares[["B5", "B6"]].max(axis=1)
+        holds = (shares["B4"] > finer)[shares["B4"].notna() & finer.notna()]
     elif check == "little_B6":
         holds = shares["B6"].dropna() < MAX_WEAK_SHARE
     elif check in ("right_B4", "left_B5_B6"):
@@ -254,36 +253,31 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
             found = "one hemisphere" if mirror_mm is None else f"hemispheres are mirror images to {mirror_mm:.2f} mm"
             return found, NOT_TESTABLE
         right, left = (shares.xs(side, level="hemisphere") for side in ("right", "left"))
-        more = (
-            right["B4"] - left["B4"]
-            if check == "right_B4"
-            else pd.concat([left[band] - right[band] for band in ("B5", "B6")])
-        )
-        holds = more.dropna() > SHARE_TOL
+        if check == "right_B4":
+            difference = right["B4"] - left["B4"]
+        else:
+            difference = pd.concat([left[band] - right[band] for band in ("B5", "B6")])
+        holds = difference.dropna() > SHARE_TOL
     else:
         is_real = shares.index.get_level_values("brain").str.startswith(REAL)
-        smallest_real = shares.loc[is_real, "B5"].groupby("hemisphere").min().dropna()
-        largest = shares.loc[~is_real, "B5"].groupby("hemisphere").max().dropna()
-        smallest_real, largest = smallest_real.align(largest, join="inner")
-        holds = smallest_real > largest
+        smallest_real = shares.loc[is_real, "B5"].groupby("hemisphere").min()
+        margin = (smallest_real - shares.loc[~is_real, "B5"].groupby("hemisphere").max()).dropna()
+        holds = margin > 0
     if holds.empty:
         return "the bands are cut off or not resolved", NOT_TESTABLE
     text = f"{holds.sum()} of {len(holds)} cases"
-    lost = [str(band) for band in shares if shares[band].isna().all()]
-    if check == "most_B4" and lost:
-        return f"{text}, without {' and '.join(lost)}: cut off or not resolved", _verdict(holds)
+    unknown = [str(band) for band in shares if shares[band].isna().all()]
+    if check == "most_B4" and unknown:
+        text += f", without {' and '.join(unknown)}: cut off or not resolved"
     return text, _verdict(holds)
 
 
-def _shares(comparison: pd.DataFrame, suffix: str) -> pd.DataFrame:
-    """Return the share of each band in the power, with a row per brain (simulated or observed) and hemisphere."""
-    bands = {f"shape_index_relative_power_B{band}{suffix}": f"B{band}" for band in FOLD_BANDS}
+def _cut_shares(comparison: pd.DataFrame) -> pd.DataFrame:
+    """Return the share of each band in the cut spectra, a row per brain (simulated or observed) and hemisphere."""
+    bands = {f"shape_index_relative_power_B{band}_weyl": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands) & (comparison["flag"] == "ok")]
-    simulated, observed = (
-        rows.assign(brain=rows["run"]),
-        rows.assign(brain=REAL + rows["real"], value=rows["real_value"]),
-    )
-    both = pd.concat([simulated, observed]).replace({"measure": bands})
+    observed = rows.assign(brain=REAL + rows["real"], value=rows["real_value"])
+    both = pd.concat([rows.assign(brain=rows["run"]), observed]).replace({"measure": bands})
     table = both.pivot_table("value", ["brain", "hemisphere"], "measure", aggfunc="first")
     return table.reindex(columns=list(bands.values()))
 

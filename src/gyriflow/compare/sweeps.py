@@ -14,11 +14,13 @@ from .distances import aligned_distances
 SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
-"""The metric whose largest value among the brains compared is the number of modes at which spectra are cut."""
+"""The metric whose largest value among the compared brains is the number of modes in cut spectra."""
 CROSSING_FACES = "crossing_faces"
 """The metric that counts collisions."""
 NOT_RESOLVED = "not resolved"
-"""Flag of a band that edges or curvature radius do not resolve: it has no distance."""
+"""Flag of a band that is too fine for the edges or the curvature radius: it has no distance."""
+NO_NEAREST = "no nearest run: the band is not resolved; use shorter edges and a smaller metrics.curvature_radius_mm"
+"""Flag of a measure that no run resolves."""
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
@@ -27,7 +29,7 @@ PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
     *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
 )
-"""Parameters of each run in `members.csv`: those of the tables of the FetalFoldSim paper."""
+"""Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim paper."""
 LABELS = ("subject", "run", "real", "real_population", "same_population")
 COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
 
@@ -135,9 +137,9 @@ def _band_row(hemisphere: str, measure: str, value: float, real_value: float, *,
 def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.DataFrame:
     """Add the shares of spectra that are all cut at one number of modes per side, as in the FetalFoldSim paper.
 
-    The number is the largest Weyl number of the surfaces compared, simulated and observed. The measures are
-    `shape_index_relative_power_B4_weyl` to `B6_weyl`, "cut off" where fewer modes were computed, or the band begins
-    beyond the cut.
+    The number is the largest Weyl number of the compared surfaces, simulated and observed. The measures are
+    `shape_index_relative_power_B4_weyl` to `B6_weyl`, with the flag "cut off" if fewer modes were computed or the band
+    begins beyond the cut.
 
     Parameters
     ----------
@@ -151,27 +153,26 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
     cuts = numbers.groupby("hemisphere")[["value", "real_value"]].max().max(axis=1).to_dict()
     shares = {}
     for (run, subject, side), modes in coefficients.groupby(["run", "subject", "hemisphere"]):
-        cut = modes[modes["mode"] < cuts.get(side, np.inf)]
-        power = (cut["coefficient_shape_index"] ** 2).groupby(cut["band"]).sum().reindex(range(1, max(FOLD_BANDS) + 1))
-        covered = len(modes) >= cuts.get(side, np.inf)
-        shares[run, subject, side] = power / power.sum() if covered else power * np.nan
+        cut = cuts.get(side, np.inf)
+        powers = modes[modes["mode"] < cut].set_index("band")["coefficient_shape_index"] ** 2
+        power = powers.groupby("band").sum().reindex(range(1, max(FOLD_BANDS) + 1))
+        shares[run, subject, side] = power / power.sum() if len(modes) >= cut else power * np.nan
     rows = []
     flags = comparison.set_index(["run", "subject", "real", "hemisphere", "measure"])["flag"]
     for row in numbers.to_dict("records"):
         labels, side = [row[name] for name in LABELS], row["hemisphere"]
-        own, real = shares[row["run"], row["subject"], side], shares[MEASURED, row["real"], side]
+        simulated, observed = shares[row["run"], row["subject"], side], shares[MEASURED, row["real"], side]
         for band in FOLD_BANDS:
             name = f"shape_index_relative_power_B{band}"
             resolved = flags[row["run"], row["subject"], row["real"], side, name] != NOT_RESOLVED
-            rows.append([*labels, *_band_row(side, f"{name}_weyl", own[band], real[band], resolved=resolved)])
+            values = simulated[band], observed[band]
+            rows.append([*labels, *_band_row(side, f"{name}_weyl", *values, resolved=resolved)])
     return joined_comparisons([comparison, pd.DataFrame(rows, columns=COMPARISON_COLUMNS)])
 
 
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
-    pairs = _pairs(
-        metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])], observed, ["hemisphere", "metric"]
-    )
-    for pair in pairs.to_dict("records"):
+    rows = metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])]
+    for pair in _pairs(rows, observed, ["hemisphere", "metric"]).to_dict("records"):
         has_distance = pair["metric"] not in WITHOUT_DISTANCE
         distance = abs(pair["value"] / pair["value_real"] - 1) if has_distance else np.nan
         yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
@@ -208,9 +209,6 @@ def member_row(
     }
 
 
-REFUSED = "no nearest run: the band is not resolved; use shorter edges and a smaller metrics.curvature_radius_mm"
-
-
 def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per hemisphere.
 
@@ -228,7 +226,7 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     DataFrame
         subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
         distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
-        of the range, or not resolved). Without a run if no run resolves the band.
+        of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
     """
     keys, varied = ["subject", "real", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]
@@ -239,7 +237,7 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     for names, group in table.groupby(keys, sort=False):
         ordered = group.dropna(subset=["distance"]).sort_values("distance", kind="stable").to_dict("records")
         if not ordered:
-            rows.append(dict(zip(keys, names, strict=True)) | {"flag": REFUSED})
+            rows.append(dict(zip(keys, names, strict=True)) | {"flag": NO_NEAREST})
             continue
         best, *further = ordered
         row = {name: best[name] for name in (*keys, *varied, "run", "distance")}

@@ -24,7 +24,7 @@ from gyriflow.compare.published import (
 )
 from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
-    REFUSED,
+    NO_NEAREST,
     comparison_table,
     distances_to,
     joined_comparisons,
@@ -157,7 +157,7 @@ def test_the_nearest_run_has_the_second_nearest_and_flags():
 def test_a_band_that_no_run_resolves_has_no_nearest_run():
     coarse = compared(t1=float("nan"), t2=float("nan")).assign(flag="not resolved")
     (row,) = nearest_runs(coarse, MEMBERS, ["thickness_mm"]).to_dict("records")
-    assert (row["run"], row["flag"]) == (pytest.approx(float("nan"), nan_ok=True), REFUSED)
+    assert (row["run"], row["flag"]) == (pytest.approx(float("nan"), nan_ok=True), NO_NEAREST)
     (row,) = nearest_runs(pd.concat([coarse, compared(t3=0.2)]), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["run"] == "t3"
 
@@ -275,7 +275,7 @@ def test_energy_and_emissions_are_those_of_a_week_of_the_run():
 def test_findings_of_a_sweep_are_checked_one_by_one():
     found = verdicts(moves(), sweep(SHARES, (0.4, 0.35, 0.04)), mirror_mm=1.0)
     checked = {entry["check"]: found[entry["finding"]] for entry in PUBLISHED["findings"][::-1]}
-    assert checked["all_come"] == (Facts(1, 2), "in part")
+    assert checked["all_without_collisions"] == (Facts(1, 2), "in part")
     name = "shape_index_relative_power_B4"
     (nearest,) = (row for result, row in found.items() if result == Facts("thickness_mm", name, "28 GW"))
     assert nearest == (Facts("left", 2.25, "right", 0.8, "not resolved by the mesh"), "in part")
