@@ -1,12 +1,12 @@
-"""Measure how the folds of a brain depend on the mesh, the elements and the time step.
+"""Measure how the folds of a brain depend on the mesh, the order of the elements and the time step.
 
     ./run python benchmarks/convergence.py --folder FOLDER
 
 The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness, stiffness and growth, the same
-at all places, free and in contact with itself, until its gyrification index is 1.3. Resolution is the number of node
-distances per cortical thickness. Three quadratic meshes have the same step of a day, one of them also half a day and
-two days, and one mesh is of linear elements. Every run carries the same surface, which is measured, and is compared
-with the finest run at the same material points.
+everywhere, free and in contact with itself, until its gyrification index is 1.3. Resolution is the number of node
+distances per cortical thickness. Three meshes of quadratic elements and one of linear elements are folded with time
+steps of a day, one of the quadratic ones also with half a day and two days. Every run carries the same surface, which
+is measured and compared with that of the finest run at the same material points.
 
 Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
 last line is one JSON object with `runs`, the values of the finest one and the differences from it (`against_finest`).
@@ -136,7 +136,7 @@ def mesh_of(surface: TriangleMesh, case: Case) -> TetrahedralMesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class CarriedSurface:
     """The measured surface moved by a run, its shape index at the vertices, and its metrics."""
 
     surface: TriangleMesh
@@ -150,7 +150,7 @@ def measured_surface() -> TriangleMesh:
     return remesh(start_surface(), MEASURED_EDGE_MM)
 
 
-def carried(frames: Path, week: float) -> Carried:
+def carry_surface(frames: Path, week: float) -> CarriedSurface:
     """Return the measured surface as a run moved it until a week, with its metrics."""
     start = TetrahedralMesh(read_positions(frames, START_WEEK), read_tets(frames))
     boundary, nodes = boundary_surface(start)
@@ -163,7 +163,7 @@ def carried(frames: Path, week: float) -> Carried:
     surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
     side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, 2)
     metrics = size_metrics(surface, side.crossing) | folding_metrics([side])
-    return Carried(surface, side.curvature_maps.shape_index, metrics)
+    return CarriedSurface(surface, side.curvature_maps.shape_index, metrics)
 
 
 def parse() -> argparse.Namespace:
@@ -208,7 +208,7 @@ def runs_of_cases(folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def difference(run: Carried, reference: Carried, start: Carried) -> dict[str, float]:
+def difference(run: CarriedSurface, reference: CarriedSurface, start: CarriedSurface) -> dict[str, float]:
     """Return how a run differs from a reference: material points and surfaces (mm), shape index, metrics (relative)."""
     areas = vertex_areas(reference.surface)
     gaps = without_rigid_motion(reference.surface.vertices, run.surface.vertices, areas)
@@ -266,16 +266,16 @@ def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any
 
 
 def against_finest(folder: Path) -> dict[str, Any]:
-    """Return how all runs differ from the finest one, when it has the gyrification index, or at the end."""
+    """Return how all runs differ from the finest one, in the first week in which that reaches `END_GI`."""
     frames = {case: folder / "runs" / case.name / "frames.h5" for case in CASES}
-    start = carried(frames[FINEST], START_WEEK)
+    start = carry_surface(frames[FINEST], START_WEEK)
     for week in read_weeks(frames[FINEST]):
-        exact = carried(frames[FINEST], week)
+        exact = carry_surface(frames[FINEST], week)
         if exact.values["gyrification_index"] >= END_GI:
             break
     values = {"week": week} | {name: exact.values[name] for name in (*COMPARED, "crossing_faces")}
-    others = [case for case in CASES if case is not FINEST and week in read_weeks(frames[case])]
-    rows = [{"run": case.name} | difference(carried(frames[case], week), exact, start) for case in others]
+    cases = [case for case in CASES if case is not FINEST and week in read_weeks(frames[case])]
+    rows = [{"run": case.name} | difference(carry_surface(frames[case], week), exact, start) for case in cases]
     return {"finest": {"run": FINEST.name} | values, "against_finest": rows}
 
 

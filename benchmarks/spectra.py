@@ -1,8 +1,8 @@
-"""Print spectra of folds of one wavelength by both proxies, and the share of curvature that waves keep.
+"""Print spectra of folds of one wavelength for both proxies, and the share of its curvature that a wave keeps.
 
-The folds are radial waves of degree 8 on a sphere of 25 mm: 18.5 mm long, in the middle of B3; what is in B4 is
-harmonics. `isotropic` waves run in all directions, `parallel` folds from pole to pole. The shallow waves of the second
-table are on a plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
+The folds are radial waves of degree 8 on a sphere of 25 mm radius: 18.5 mm long, in the middle of B3; the power in B4
+is of harmonics. `isotropic` waves run in all directions, `parallel` folds from pole to pole. The shallow waves of the
+second table are on a plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
 """
 
 import numpy as np
@@ -31,8 +31,8 @@ def folded_sphere(kind: str, rms_mm: float) -> TriangleMesh:
     return TriangleMesh((RADIUS_MM + height)[:, None] * ball.vertices, ball.faces)
 
 
-def kept(wavelength_radii: float, edges_per_radius: float) -> tuple[float, float]:
-    """Return the share of its curvature that a shallow wave keeps on a plane, and the radius in its wavelengths."""
+def kept_share(wavelength_radii: float, edges_per_radius: float) -> tuple[float, float]:
+    """Return the share of its curvature that a shallow wave keeps on a plane, and the radius of the fit."""
     edge, wavelength = 1.0 / edges_per_radius, wavelength_radii
     size = int(max(4 * wavelength, 8.0) / edge)
     i, j = np.meshgrid(np.arange(size), np.arange(size), indexing="ij")
@@ -57,6 +57,6 @@ if __name__ == "__main__":
     print("\n| wavelength / radius | edges / radius | kept | closed form |\n| --- | --- | --- | --- |")
     for wavelength in (2.0, 3.0, 4.0, 6.0):
         for edges_per_radius in (2.0, 3.0, 4.0):
-            share, radius = kept(wavelength, edges_per_radius)
+            share, radius = kept_share(wavelength, edges_per_radius)
             closed = float(kept_curvature(np.array(wavelength), radius))
             print(f"| {wavelength / radius:.2f} | {radius * edges_per_radius:.1f} | {share:.2f} | {closed:.2f} |")

@@ -24,7 +24,7 @@ def code_hash(program: Path, *modules: Path) -> str:
 def modules_behind(program: Path) -> set[Path]:
     """Return the files of all modules of this package that a Python program imports, directly or through others.
 
-    A module's C code, in a file of its name beside it, comes with it.
+    A module's C code, in a file of the same name in its folder, is included.
     """
     reached: set[Path] = set()
     waiting = set(imported_modules(program))

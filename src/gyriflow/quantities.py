@@ -1,4 +1,4 @@
-"""What is measured on brains: a record for each map over a surface and for each number of the tables of metrics.
+"""Quantities that are measured on brains: a record for each map over a surface and each number in metrics tables.
 
 Whatever measures, draws, tabulates or exports a quantity looks it up here by name; a name without a record is an error.
 Units are written as in the tables: "1/mm2" for mm⁻², "1" for none.
@@ -59,7 +59,7 @@ class Metric:
 
     @property
     def is_signed(self) -> bool:
-        """Whether it may be negative."""
+        """Whether the metric may be negative."""
         return SIGNED_NAMES.fullmatch(self.name) is not None
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
-OPTION = {"help": "File in .snakemake/log for all that Snakemake says", "env_var": False, "required": True}
+OPTION = {"help": "File in .snakemake/log for all messages of Snakemake", "env_var": False, "required": True}
 
 
 @dataclass

@@ -1,4 +1,6 @@
 # Tables of a study: all measured brains and all runs; and the export.
+from gyriflow.study.checks import norm_settings
+
 PLACES = study.measurements.values()
 WITH_WHITE = [brain.id for brain in study.brains.values() if brain.has_white]
 LABELLED = [brain for brain in study.brains.values() if brain.labels]
@@ -37,7 +39,7 @@ rule metrics_tables:
         reference=study.norm_reference,
         individuals=study.are_individuals(study.norm_reference),
         subjects={brain.id: brain.subject for brain in study.brains.values()},
-        made_with=study.norm_settings,
+        made_with=norm_settings(study.config),
         population=sorted({study.brains[brain].population for brain in study.norm_reference}),
     script:
         "../scripts/metrics_tables.py"

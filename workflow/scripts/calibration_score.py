@@ -28,14 +28,13 @@ with step(snakemake.log[0]):
     # a diverged run has not reached the week
     simulated = [] if causes else list(map(surfaces_at_week, files.regions, files.frames))
 
-    def paired(values, brains):
-        """Pair the value of each simulation with those of its observed brains."""
-        brains = iter(brains)
-        counts = zip(values, params.compared, strict=True)
-        return ((value, brain) for value, count in counts for brain in islice(brains, count))
+    def pair_up(simulations, observed):
+        """Yield each simulation's surface or table with that of each of its observed brains."""
+        for simulation, count in zip(simulations, params.compared, strict=True):
+            yield from ((simulation, brain) for brain in islice(observed, count))
 
-    pairs = paired((whole for whole, _, _ in simulated), map(read_surface, files.real))
-    own = (surface_spectra(left, right, radius_mm, modes) for _, left, right in simulated)
-    spectra = paired(own, map(read_table, files.spectra))
+    pairs = pair_up((whole for whole, _, _ in simulated), map(read_surface, files.real))
+    simulated_spectra = (surface_spectra(left, right, radius_mm, modes) for _, left, right in simulated)
+    spectra = pair_up(simulated_spectra, map(read_table, files.spectra))
     score = run_score(pairs, params.weights, causes, radius_mm=radius_mm, spectra=spectra)
     write_table(snakemake.output[0], pd.DataFrame([{"run": run, "round": params.round, **values, **score}]))

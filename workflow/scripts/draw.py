@@ -25,13 +25,13 @@ def read_boundary(path):
 
 
 def read_elements(path):
-    """Return the elements of a run, and the model's fields at its first and last week."""
+    """Return the elements of a run, and the fields of the model at its first and last week."""
     frames, run = path.replace(".xdmf", ".h5"), Path(path).parents[1]
     params, weeks = parameters_from(read_yaml(run / "params.yaml")), read_weeks(frames)
     mesh = TetrahedralMesh(read_positions(frames, weeks[0]), read_tets(frames))
     zones = zones_of_run(mesh, params)
-    ends = {week: read_positions(frames, week) for week in (weeks[0], weeks[-1])}
-    return mesh.tets, {week: model_fields(zones, nodes, params, week) for week, nodes in ends.items()}
+    ends = (weeks[0], weeks[-1])
+    return mesh.tets, {week: model_fields(zones, read_positions(frames, week), params, week) for week in ends}
 
 
 READERS = {

@@ -34,7 +34,7 @@ with step(snakemake.log[0]):
     displacement = displacement[(displacement["run"] == run) & (displacement["subject"] == brain)]
     from_back, week = None, published["largest"]["from_week"]
     if {week, week + 1} <= set(read_weeks(files.frames[0])):
-        before, after = (read_positions(files.frames[0], at) for at in (week, week + 1))
+        before, after = (read_positions(files.frames[0], end) for end in (week, week + 1))
         _, pial = boundary_surface(TetrahedralMesh(before, read_tets(files.frames[0])))
         from_back = place_of_largest(before, after, pial)
     sides = [read_surface(path) for path in files.sides]

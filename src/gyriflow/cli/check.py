@@ -145,7 +145,7 @@ def _contents(study: Study) -> str:
 
 
 def coarse_cortices(study: Study) -> Iterator[str]:
-    """Yield a warning for each number of elements too small for the cortex at its start, or with a large error."""
+    """Yield a warning, with its runs, for each number of elements through the cortex that is too small or inexact."""
     mesh = study.config.mesh
     coarse: dict[str, list[str]] = defaultdict(list)
     needed = ELEMENTS_NEEDED[mesh.order]

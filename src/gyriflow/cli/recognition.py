@@ -176,7 +176,7 @@ def recognise(
     for name, group in found.items():
         if not any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
             brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
-    # templates beside subjects are no scans
+    # templates among subjects are not scans
     if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (0, len(brains)):
         unused |= {brain.files: brain.problem for brain in brains if brain.is_template}
         brains = own_scans

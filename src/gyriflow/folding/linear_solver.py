@@ -78,7 +78,7 @@ class TwoLevelPreconditioner:
 
     def renew(self) -> None:
         """Update the diagonal to the present tangent, and the coarse level after `COARSE_LIFETIME` tangents."""
-        self._set_diagonal()
+        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(np.float32)
         if self._tangent.elastic.assembled >= self._made_at + COARSE_LIFETIME:
             self._made_at = self._tangent.elastic.assembled
             self._set_coarse_level()
@@ -92,9 +92,6 @@ class TwoLevelPreconditioner:
         y.array_w[self._fixed] = 0.0
         if self._tangent.motions is not None:
             self._tangent.motions.remove(y.array_w)
-
-    def _set_diagonal(self) -> None:
-        self._inverse_diagonal = inverse_blocks(self._tangent.diagonal()).astype(np.float32)
 
     def _set_coarse_level(self) -> None:
         matrix = self._tangent.elastic.matrix

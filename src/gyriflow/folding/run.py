@@ -179,14 +179,11 @@ def seconds_to(week: float, parameters: FoldingParameters) -> float:
 
 def delete_old_checkpoints(out: Path, own: Path) -> list[str]:
     """Delete all but the newest two checkpoints of other meshes or parameters, and return messages about these two."""
-    others = sorted(
-        (path for path in out.glob("checkpoint-*") if path != own),
-        key=lambda path: path.stat().st_mtime,
-        reverse=True,
-    )
-    for old in others[2:]:
-        shutil.rmtree(old, ignore_errors=True)
-    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in others[:2]]
+    folders = [path for path in out.glob("checkpoint-*") if path != own]
+    folders.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for folder in folders[2:]:
+        shutil.rmtree(folder, ignore_errors=True)
+    return [f"{path} belongs to another mesh or other parameters: kept but not used" for path in folders[:2]]
 
 
 def shortened_step_note(parameters: FoldingParameters) -> str:

@@ -151,7 +151,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
     The planes are a quarter of `contact.gap_mm` left and right of the middle of the fissure. With any kind of contact,
-    facets near the fissure are not clamped; with `planes`, elements that begin between the planes do not grow. The
+    facets near the fissure are not clamped; with `planes`, the `medial_vertices` do not grow. The
     ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
     has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
@@ -215,9 +215,9 @@ def bridge_vertices(
 def medial_vertices(
     mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
-    """Return the vertices of the elements whose medial-most vertex lies between the planes, each once.
+    """Return the vertices, each once, of the elements whose medial-most vertex lies between the planes.
 
-    Nothing grows there in the prototype of the FetalFoldSim paper: walls between the planes have no contact.
+    Walls between the planes have no contact; the prototype of the FetalFoldSim paper does not let them grow.
     """
     x = mesh.vertices[mesh.tets, 0]
     medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
@@ -225,10 +225,10 @@ def medial_vertices(
 
 
 def model_fields(zones: Zones, positions: Floats, p: FoldingParameters, week: float) -> dict[str, Floats]:
-    """Return fields of a run without maps at its nodes, at `positions` (n, 3) in mm of a week.
+    """Return the fields of a run without maps at its nodes, whose `positions` (n, 3) of a week are in mm.
 
-    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential growth in a step) and normals
-    (n, 3) of the pial surface at the nearest points.
+    They are positions, weight (of the cortex), growing (0 or 1), increment (tangential growth in a step) and the
+    normals (n, 3) of the pial surface at the nearest points.
     """
     pial = PialSearch(positions, zones.cortex_facets)
     weight = cortical_weight(pial.distance(positions), value_at(p.thickness_mm, week, {}))

@@ -86,7 +86,7 @@ def _check_share_near(share: float) -> None:
             "the regions do not lie along the pial surface",
             found=f"{100 * share:.0f} % within {REACH_MM:g} mm",
             expected=f"{100 * MIN_NEAR:.0f} % or more",
-            remedy="Give them in the space of the brain's own files. Surfaces of FreeSurfer in tkr RAS lie beside "
+            remedy="Give them in the space of the brain's own files. Surfaces of FreeSurfer in tkr RAS lie off "
             "volumes by C_RAS: convert them with mris_convert --to-scanner.",
         )
     if share < USUAL_NEAR:

@@ -65,7 +65,9 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     # greedy starts at the identity, so the later brain is passed in its start position
     placed = np.linalg.inv(start) @ later.affine
     images |= {f"moving_{name}": _image(getattr(later, name), placed) for name in names}
-    images["where"] = _image(_round_cerebrum(earlier), earlier.affine)
+    rounds = int(np.ceil(NEAR_MM / earlier.voxel_mm))
+    near_cerebrum = binary_dilation(earlier.tissue & CEREBRUM_BIT > 0, iterations=rounds)
+    images["where"] = _image(near_cerebrum.astype(np.float32), earlier.affine)
     pairs = " ".join(f"-w {WEIGHTS[name]:g} -i fixed_{name} moving_{name}" for name in names)
     common = f"-threads {threads} -seed 1 -V 0"
     greedy = Greedy3D()
@@ -100,11 +102,6 @@ def _image(values: NDArray[np.float32], affine: Floats) -> SimpleITK.Image:
     image.SetDirection((affine[:3, :3] / spacing).ravel().tolist())
     image.SetOrigin(affine[:3, 3].tolist())
     return image
-
-
-def _round_cerebrum(brain: Channels) -> NDArray[np.float32]:
-    rounds = int(np.ceil(NEAR_MM / brain.voxel_mm))
-    return binary_dilation(brain.tissue & CEREBRUM_BIT > 0, iterations=rounds).astype(np.float32)
 
 
 def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> tuple[Floats, Floats]:

@@ -51,8 +51,8 @@ def run_mesher(name: str, arrays: Mapping[str, Any], time_limit_s: float) -> Tet
         raise MeshError(
             f"the mesher {name} failed with exit code {code}",
             found=last or "no message",
-            remedy="A negative code is a signal: -9 means that memory ran out. What cannot be imported is to be "
-            "installed as envs/requirements.txt names it.",
+            remedy="A negative code is a signal: -9 means that memory ran out. A module that cannot be imported has "
+            "to be installed in the version of envs/requirements.txt.",
         )
     with np.load(io.BytesIO(output)) as received:
         return TetrahedralMesh(received["vertices"], received["tets"])

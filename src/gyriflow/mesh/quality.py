@@ -88,7 +88,7 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
     """Return the widths of gaps and the area of their walls.
 
     `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
-    no gap; at the bottom of a gap the width ends in 0, so that the least one says nothing), `area_mm2` is that area.
+    no gap; the minimum is not given, since the width is 0 at the bottom of every gap), `area_mm2` is that area.
     """
     widths: list[float | None] = [None, None]
     if len(walls.width):
@@ -99,8 +99,8 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
     """Return the share of the walls' area before which another surface leaves the gap open; None without a gap.
 
-    It is open where its middle is outside the closed surface `mesh`, and the walls of that are at least half as far
-    apart there.
+    It is open where its middle is outside the closed surface `mesh`, and the gap of `mesh` there is at least half as
+    wide.
     """
     if not len(walls.width):
         return None
@@ -141,7 +141,7 @@ def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Return the (m, 6) angles in degrees between the faces at each edge, as they are between the corners."""
+    """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat between corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
     for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, OPPOSITE, strict=True)):

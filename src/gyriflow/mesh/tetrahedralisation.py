@@ -34,8 +34,8 @@ def edge_length_at(
 ) -> NDArray[np.float64]:
     """Return the requested edge length in mm of elements of an order at depths in mm below the surface.
 
-    It is that of the surface down to a depth, grows from there on, and ends at that of the core. With depth, nodes of
-    elements of both orders are as far apart.
+    It is that of the surface down to a depth, and then grows to that of the core. With depth, elements of both orders
+    have the same node distance.
     """
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)

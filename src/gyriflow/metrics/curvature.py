@@ -82,7 +82,7 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
-    local edges are longer than half of `radius_mm`, the ball grows to two of them, and a warning says so
+    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning
     where it is more than a tenth larger. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
     neighbourhood.
     """
@@ -163,10 +163,10 @@ type Quadrics = tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]
 def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     """Return quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
 
-    The ball takes in what is linked to its centre by edges inside it: not the other wall of a sulcus. The weight is
-    area × cosine × (1 − d²/radius²): area of the vertex, turned into the tangent plane, so that the sum stands for an
-    integral that does not depend on the mesh; nothing changes by a jump at the rim; and what is turned offset by more
-    than 90° does not count. The tangent plane is that of the weighted mean of the normals.
+    The ball contains the vertices that edges inside it link to its centre, so not the other wall of a sulcus. The
+    weight is area × cosine × (1 − d²/radius²). The area of the vertex is projected onto the tangent plane: the sum is
+    like an integral and does not depend on the mesh. The weight falls to zero at the rim, and vertices whose normal
+    differs by more than 90° do not count. The tangent plane is that of the weighted mean of the normals.
 
     Returns
     -------

@@ -111,7 +111,7 @@ def local_gyrification_index(mesh: TriangleMesh, around: Pieces) -> Floats:
     """Return the (n,) area of the pial surface over that of the envelope, round each vertex.
 
     As Schaer et al. 2008 (IEEE Trans. Med. Imaging 27, 161-170), a patch of the envelope, here all within
-    `LOCAL_RADIUS_MM` of the point nearest to the vertex, is compared with the pial surface that belongs to it: what is
+    `LOCAL_RADIUS_MM` of the point nearest to the vertex, is compared with the part of the pial surface that is
     nearest to that patch. Patches of 25 mm, as for adults, would hold half a fetal hemisphere.
     """
     tree = cKDTree(around.centres)

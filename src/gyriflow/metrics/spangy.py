@@ -104,19 +104,14 @@ def bands_of_modes(eigenvalues: Floats) -> Ints:
 
 
 def spectrum(
-    proxy: Floats,
-    modes: Modes,
-    mass: sparse.csc_matrix,
-    *,
-    radius_mm: float,
-    reach: float | None = None,
+    proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, radius_mm: float, reach: float | None = None
 ) -> Spectrum:
     """Return the band spectrum of a folding proxy, (n,) values per vertex.
 
     `radius_mm` is the radius of the curvature fit. `reach` is the λ in mm⁻² below which no mode is missing, by default
-    that of the highest mode. The dominant band is as in Germanaud et al. 2012, each of B1 to B6 recomposed by
-    itself: a vertex where the proxy is positive belongs to the band that adds most, another to the band that takes most
-    away, with a minus sign.
+    that of the highest mode. The dominant band is as in Germanaud et al. 2012, from the part of the proxy in each of B1
+    to B6: at a vertex where the proxy is positive the band with the largest part, elsewhere the one with the smallest,
+    with a minus sign.
     """
     coefficients = modes.functions.T @ (mass @ proxy)
     band = bands_of_modes(modes.eigenvalues)
@@ -130,20 +125,11 @@ def spectrum(
     return Spectrum(modes.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
-def _powers(band: Ints, coefficients: Floats) -> Floats:
-    parts = [coefficients[band == k] for k in range(BANDS + 1)]
-    return np.array([np.sum(part**2) if len(part) else np.nan for part in parts])
-
-
-def _relative(power: Floats) -> Floats:
-    total = np.nansum(power[1:])
-    return np.concatenate([[np.nan], power[1:] / total if total > 0 else 0 * power[1:]])
-
-
 def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm: float, reach: float) -> pd.DataFrame:
     limits = band_limits(eigenvalues[1])
-    power = _powers(band, coefficients)
     numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
+    power = np.array([np.sum(coefficients[band == k] ** 2) if numbers[k] else np.nan for k in range(BANDS + 1)])
+    total = np.nansum(power[1:])
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
     complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
     whole = np.arange(BANDS + 1) == 0
@@ -155,7 +141,7 @@ def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm
             "wavelength_max_mm": wavelengths[:-1],
             "modes": numbers,
             "power": power,
-            "relative_power": _relative(power),
+            "relative_power": np.append(np.nan, power[1:] / total if total > 0 else 0 * power[1:]),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
             "resolved": whole | (share >= MIN_KEPT_CURVATURE),

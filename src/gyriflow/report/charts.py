@@ -146,7 +146,7 @@ def metrics_chart(
 
 
 MANY_BRAINS = 30
-"""With more reference brains, their marks are small."""
+"""Number of reference brains above which their marks are small."""
 
 
 @styled
@@ -256,7 +256,7 @@ def _region_lines(axes: Axes, values: pd.DataFrame, colours: Mapping[Any, Any], 
 
 
 def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
-    """Return the rows of the bands by a proxy with a column `trusted`."""
+    """Return the rows of some bands in the spectra of a proxy, with a column `trusted`."""
     trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
     return spectra.assign(trusted=trusted)[spectra["band"].isin(bands) & (spectra["proxy"] == proxy)]
 
@@ -360,7 +360,7 @@ def spectra_weeks_chart(
     subjects: Mapping[str, str] = NO_SUBJECTS,
     groups: Mapping[str, str] = NO_SUBJECTS,
 ) -> Figure:
-    """Draw the relative power of the bands of the folds over weeks, by mean curvature: hemispheres by bands.
+    """Draw the relative power of the fold bands of mean curvature over weeks: a row per hemisphere, a column per band.
 
     Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
     the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
@@ -378,9 +378,9 @@ def spectra_weeks_chart(
     layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
     figure, panels = panel_figure(len(sides) * len(bands), **layout)
     for axes, (hemisphere, band) in zip(panels, product(sides, bands), strict=True):
-        here = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
+        cell = rows[(rows["hemisphere"] == hemisphere) & (rows["band"] == band)]
         for run in [*colours, MEASURED]:
-            series = here[here["run"] == run].sort_values("week")
+            series = cell[cell["run"] == run].sort_values("week")
             if run == MEASURED:
                 _stars(axes, series, subjects=subjects, column="relative_power", markersize=0)
             else:
@@ -392,7 +392,7 @@ def spectra_weeks_chart(
                 else:
                     axes.plot(part["week"], part["relative_power"], "o", color=colours[run], markersize=3, **style)
         week_axis(axes, rows["week"])
-        if not here["relative_power"].notna().any():
+        if not cell["relative_power"].notna().any():
             _beyond_the_modes(axes, 0.5, axes.transAxes)
             axes.set_yticks([])
         if hemisphere == sides[0]:

@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property
 from itertools import count
 from typing import Any
 
@@ -40,8 +39,8 @@ FIRST_PAGE_FIGURES = ("predicted_figure", "weekly_figure")
 BRAIN_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """Metrics in the table of brains."""
 NORM_WORDS = {
-    "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval that "
-    "the norm's own uncertainty leaves, and z. Sex and site are ignored.",
+    "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval from "
+    "the uncertainty of the norm, and z. Sex and site are ignored.",
     "few brains": "Below each number: its centile for this age among the norm's other subjects, with the 90 % "
     "interval, and z. The norm has fewer than 30 subjects, so centiles end at 5 and 95.",
     SPREAD_UNKNOWN: "Below each number: its difference from the curve of the norm ({norm}). The norm has one average "
@@ -49,9 +48,9 @@ NORM_WORDS = {
     "too few brains": "There are too few subjects for centiles: a norm needs ten others.",
 }
 """Explanations of the table of brains, by flag of the norm."""
-NOT_COMPARED = "There is no observed brain of the same population and week to compare a simulation with."
+NOT_COMPARED = "No simulation is compared: an observed brain of the same population and week is missing."
 MAX_PENETRATION_MM = 0.5
-"""Penetration of the contact planes at the start from which the report warns."""
+"""Penetration of the contact planes at the start above which the report warns."""
 
 
 def page_figures(
@@ -136,10 +135,6 @@ class Origin:
     provenance: Mapping[str, Any]
     methods: str
     configuration: str
-
-    @cached_property
-    def methods_html(self) -> Markup:
-        return caption_html(self.methods)
 
 
 def study_page(
@@ -228,7 +223,7 @@ def _shared(
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
         "provenance": provenance_line(provenance),
-        "methods": origin.methods_html,
+        "methods": caption_html(origin.methods),
         "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
         "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
         "configuration": origin.configuration,
@@ -414,7 +409,7 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
         words.append(too_coarse)
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
         words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
-    if (elements := run["elements_through_cortex"]) > 0:  # not NaN
+    if (elements := run["elements_through_cortex"]) > 0:
         error, text = element_error(int(run["order"]), elements)
         words += [text] if error > LARGE_ELEMENT_ERROR else []
     return "; ".join(words)

@@ -48,7 +48,7 @@ def validation_chart(
     """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
 
     Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Stars are the room,
-    the gain of the observed brain of the adjacent week; dotted is the start carried by registration alone.
+    the gain of the observed brain of the week before; a dotted line is the start carried by registration alone.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colou
 
 
 def _bars(rows: pd.DataFrame, name: str, measure: str) -> Any:
-    """Return the lengths (2, n) of the bars below and above values, to the ends of their intervals."""
+    """Return the (2, n) lengths of error bars below and above values, to the ends of their intervals."""
     value, low, high = (rows[f"{part}_{measure}"] for part in (name, f"{name}_low", f"{name}_high"))
     return np.stack([value - low, high - value]).clip(min=0)
 

@@ -1,4 +1,4 @@
-"""Plane sections: superimposed outlines of surfaces, and the model's fields in its elements."""
+"""Plane sections: superimposed outlines of surfaces, and fields of the model in its elements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -46,14 +46,14 @@ def draw_outline(axes: Axes, surface: TriangleMesh, plane: str, at: float, colou
     axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=thickness, capstyle="round"))
 
 
-def _cut(positions: Floats, tets: Ints, at: float, fields: Mapping[str, Floats]) -> pv.PolyData:
-    """Return the coronal section of linear elements at y in mm: a polygon per element, with fields at its points."""
+def _coronal_section(positions: Floats, tets: Ints, fields: Mapping[str, Floats]) -> pv.PolyData:
+    """Cut linear elements at the median y of their nodes: a polygon per element, with fields at its points."""
     cells = np.insert(np.asarray(tets), 0, 4, axis=1)
     body = pv.UnstructuredGrid(cells.ravel(), np.full(len(tets), pv.CellType.TETRA), np.asarray(positions))
     for name, values in fields.items():
         body.point_data[name] = values
-    # elements as they are, not as triangles
-    return body.slice(normal="y", origin=(0, at, 0), generate_triangles=False)
+    # one polygon per element, not triangles
+    return body.slice(normal="y", origin=(0.0, float(np.median(positions[:, 1])), 0.0), generate_triangles=False)
 
 
 @styled
@@ -75,25 +75,28 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
     titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
     for row, week in zip(rows, (min(weeks), max(weeks)), strict=True):
         fields = dict(weeks[week])
-        nodes = fields.pop("positions")
-        cut = _cut(nodes, tets[:, :4], float(np.median(nodes[:, 1])), fields)
-        places = np.asarray(cut.points)[:, [0, 2]]
-        faces = cut.irregular_faces
+        section = _coronal_section(fields.pop("positions"), tets[:, :4], fields)
+        points, values = np.asarray(section.points)[:, [0, 2]], section.point_data
+        polygons = [points[face] for face in section.irregular_faces]
+        style: dict[str, Any] = {"linewidths": 0.05}
         for axes, (name, top) in zip(row, scales.items(), strict=False):
-            values = np.array([cut.point_data[name][face].mean() for face in faces])
-            style: dict[str, Any] = {"array": values, "cmap": "YlGnBu", "norm": Normalize(0, top), "linewidths": 0.05}
-            axes.add_collection(PolyCollection([places[face] for face in faces], edgecolors="black", **style))
-        outlines: dict[str, Any] = {"facecolors": "none", "edgecolors": MUTED_COLOUR, "linewidths": 0.05}
-        row[3].add_collection(PolyCollection([places[face] for face in faces], **outlines))
+            means = np.array([values[name][face].mean() for face in section.irregular_faces])
+            colours: dict[str, Any] = {
+                "array": means,
+                "cmap": "YlGnBu",
+                "norm": Normalize(0, top),
+                "edgecolors": "black",
+            }
+            axes.add_collection(PolyCollection(polygons, **colours, **style))
+        row[3].add_collection(PolyCollection(polygons, facecolors="none", edgecolors=MUTED_COLOUR, **style))
         # arrows at one point of the cortex in each square
-        _, first = np.unique(np.floor(places / ARROW_MM), axis=0, return_index=True)
-        arrows = first[cut.point_data["weight"][first] > 0.5]
-        normals = cut.point_data["normals"][arrows][:, [0, 2]] * ARROW_MM
-        row[3].quiver(*places[arrows].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
-        low, high = places.min(axis=0) - ARROW_MM, places.max(axis=0) + ARROW_MM
+        _, first = np.unique(np.floor(points / ARROW_MM), axis=0, return_index=True)
+        arrows = first[values["weight"][first] > 0.5]
+        normals = values["normals"][arrows][:, [0, 2]] * ARROW_MM
+        row[3].quiver(*points[arrows].T, *normals.T, angles="xy", scale_units="xy", scale=1, width=0.005)
+        (left, bottom), (right, top) = points.min(axis=0) - ARROW_MM, points.max(axis=0) + ARROW_MM
         for axes in row:
-            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-            axes.set_aspect("equal")
+            axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
             axes.set_axis_off()
         row[0].text(-0.02, 0.5, week_label(week), transform=row[0].transAxes, rotation=90, ha="right", va="center")
     for axes, title in zip(rows[0], titles, strict=True):

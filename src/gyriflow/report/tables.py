@@ -314,7 +314,7 @@ def _kind(name: object, value: object, text: str) -> str:
 def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object]:
     flat: dict[str, object] = {}
     for name, value in values.items():
-        if isinstance(value, Mapping) and value and all(_is_number(week) for week in value):
+        if isinstance(value, Mapping) and value and all(str(week).replace(".", "", 1).isdigit() for week in value):
             ends = [(week, value[week]) for week in sorted(value, key=float)]
             flat[f"{prefix}{name}"] = " to ".join(f"{_text(at, 4)} at {week} GW" for week, at in (ends[0], ends[-1]))
         elif isinstance(value, Mapping):
@@ -322,10 +322,6 @@ def _flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, object
         else:
             flat[f"{prefix}{name}"] = value
     return flat
-
-
-def _is_number(name: object) -> bool:
-    return str(name).replace(".", "", 1).isdigit()
 
 
 def _text(value: object, digits: int = 6) -> str:

@@ -233,7 +233,7 @@ class CalibrationSettings(ComparisonSettings):
 
     @property
     def is_spectral(self) -> bool:
-        """Whether spectra are compared."""
+        """Whether a score compares spectra."""
         return not set(self.score).isdisjoint(SPECTRAL_SCORES)
 
     @property

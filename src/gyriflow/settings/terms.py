@@ -56,10 +56,10 @@ fewer, folds may depend on the mesh. The value for quadratic elements comes from
 brain): two node distances through the thickness at the surface are enough, and that mesh has a count of 0.81 at its
 start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious."""
 ELEMENT_ERRORS = {1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5}, 2: {1.0: 4.3, 2.0: 0.9}}
-"""How much too slowly the fastest wave grows, in %, by element order and cells per thickness of a uniform slab
-(docs/verification.md, Elements). Its mean edge is 1.26 cells, so for as many elements these are upper bounds."""
+"""How much too slowly the fastest wave grows (%), by element order and cells per thickness of a uniform slab
+(docs/verification.md, Elements). The slab's mean edge is 1.26 cells, so for as many elements these are upper bounds."""
 LARGE_ELEMENT_ERROR = 10.0
-"""Smallest error in % that is a warning."""
+"""Error in % above which there is a warning."""
 
 MAX_NAME_LENGTH = 100
 """Longest name of a brain, run or study; file names are limited to 255 bytes."""
@@ -90,7 +90,7 @@ CURVATURE_RADIUS_MM = 3.0
 SPANGY_MODES: LastBand = "B5"
 
 PROXIES = ("mean_curvature", "shape_index")
-"""Maps whose spectra are computed; the first is that of the method (Germanaud et al. 2012), the second the paper's."""
+"""Maps whose spectra are computed: as in SpAnGy (Germanaud et al. 2012), and as in the FetalFoldSim paper."""
 SPECTRUM_PREFIXES = {"mean_curvature": "", "shape_index": "shape_index_"}
 """Prefixes of the names of metrics and measures of a proxy's spectrum."""
 MIN_KEPT_CURVATURE = 0.8
@@ -121,7 +121,7 @@ STIFFNESS_RATIO = "stiffness_ratio"
 
 
 def element_error(order: int, elements: float) -> tuple[float, str]:
-    """Return the error of the fastest wave in % with so many elements through the cortex, and a clause with it."""
+    """Return the error of the fastest wave in % for a number of elements through the cortex, and text with both."""
     errors = ELEMENT_ERRORS[order]
     error = float(np.exp(np.interp(np.log(max(0.1, elements)), np.log(list(errors)), np.log(list(errors.values())))))
     bound = "up to" if elements >= 0.99 * ELEMENTS_NEEDED[order] else "more than"

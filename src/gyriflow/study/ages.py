@@ -22,7 +22,7 @@ AGE_WORDS = frozenset(("age", "ga", "pma", "gw", "gestational", "gestation", "ge
 OTHER_WORDS = frozenset(
     ("postnatal", "chronological", "corrected", "conception", "postconception", "postconceptional", "pna", "pca")
 )
-"""Words in names of columns whose ages are no gestational ages at the scan."""
+"""Words in names of columns whose ages are not gestational ages at the scan."""
 PARENT_WORDS = frozenset(["mother", "maternal", "father", "paternal", "parental", "parent"])
 Kind = Literal["scan", "gestational", "age", "postnatal"]
 SINCE_BIRTH = (
@@ -102,25 +102,25 @@ def is_missing(text: str) -> bool:
 
 def _kind(words: Sequence[str]) -> Kind | None:
     """Return the kind of the ages in a column, from the words of its name."""
-    joined, some = "_".join(words), set(words)
-    if some & PARENT_WORDS or some & {"birth", "delivery", "born"}:
+    joined, distinct = "_".join(words), set(words)
+    if distinct & PARENT_WORDS or distinct & {"birth", "delivery", "born"}:
         return None
-    if not (some & AGE_WORDS or "menstrual" in joined or some <= {"day", "days"}):
-        return "postnatal" if some & {"pna", "pca"} else None
-    if some & OTHER_WORDS or "post_natal" in joined or "post_concept" in joined:
+    if not (distinct & AGE_WORDS or "menstrual" in joined or distinct <= {"day", "days"}):
+        return "postnatal" if distinct & {"pna", "pca"} else None
+    if distinct & OTHER_WORDS or "post_natal" in joined or "post_concept" in joined:
         return "postnatal"
-    if some & SCAN_WORDS or "pma" in some or "menstrual" in joined:
+    if distinct & SCAN_WORDS or "pma" in distinct or "menstrual" in joined:
         return "scan"
-    if some == {"age"}:
+    if distinct == {"age"}:
         return "age"
-    return "gestational" if some <= AGE_WORDS | UNIT_WORDS and some - {"d", "w", "y", "mo"} else None
+    return "gestational" if distinct <= AGE_WORDS | UNIT_WORDS and distinct - {"d", "w", "y", "mo"} else None
 
 
 def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[AgeColumn]:
     """Return the columns with ages of scans; `sidecar` is the content of the table's JSON file.
 
     Ages at birth are not returned. Ages since birth or conception are `postnatal`, or have a problem if only the
-    sidecar says so.
+    sidecar describes them so.
     """
     keys = sidecar.items() if isinstance(sidecar, dict) else ()
     described = {column_key(str(key)): value for key, value in keys}
@@ -162,7 +162,7 @@ def unit_of(name: str) -> str | None:
 def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None, marks: Sequence[TableAge] = ()) -> ScanAge:
     """Return the age of a scan from all its ages in tables; `marks` are ages at the scan of other scans.
 
-    Ages at the scan take precedence, since a gestational age beside them is the one at birth, also if they are missing
+    Ages at the scan take precedence, since a gestational age in addition is the one at birth, also if they are missing
     or given for other scans only; next are ages of the scan's session. If all are missing, or if two differ, the age is
     None, with the cause.
     """
@@ -200,7 +200,7 @@ def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None, marks: S
 
 
 def _shows_birth(age: TableAge) -> bool:
-    """Return whether an age shows that a gestational one beside it is at birth: one at the scan, or since birth."""
+    """Return whether an age (at the scan or since birth) shows that a gestational one is at birth."""
     is_since_birth = age.column.kind == "postnatal" or "not a gestational age" in age.column.problem
     return age.column.kind == "scan" or (is_since_birth and not is_missing(age.text))
 

@@ -157,7 +157,7 @@ def growth(config: Config) -> Iterator[KeyProblem]:
 
 
 def norm_settings(config: Config) -> dict[str, Any]:
-    """Return the settings and the version that norms of metrics depend on."""
+    """Return the version and the settings that the norms of metrics depend on."""
     return {
         "version": RELEASE,
         "open_sulci": config.opens_sulci,
@@ -168,21 +168,21 @@ def norm_settings(config: Config) -> dict[str, Any]:
     }
 
 
-def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[KeyProblem]:
+def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in what the norms of a file cannot be used with the expected `norm_settings`."""
     try:
         content = read_json(path)
     except InputError as error:
-        yield KeyProblem(str(error), ("metrics", "norms"))
+        yield str(error)
         return
     found = content.get("made_with") if isinstance(content, dict) else None
     if not isinstance(found, dict) or not isinstance(content.get("norms"), list):
-        yield KeyProblem(f"{path}: expected the results/study/norms.json of a study", ("metrics", "norms"))
+        yield f"{path}: expected the results/study/norms.json of a study"
         return
     for name, value in expected.items():
         # a study may have fewer label schemes than the cohort
         if found.get(name) != value and not (name == "schemes" and set(value) <= set(found.get(name, ()))):
-            text = f"{path}: made with other settings; found {name}: {found.get(name)}; expected {value}, as here"
-            yield KeyProblem(text, ("metrics", "norms"))
+            yield f"{path}: made with other settings; found {name}: {found.get(name)}; expected {value}, as here"
 
 
 def metrics(config: Config) -> Iterator[KeyProblem]:
@@ -192,7 +192,8 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     norm = [name for name in settings.norm_reference or () if name not in atlases]
     yield from _unknown(norm, config, ("metrics", "norm_reference"))
     if settings.norms is not None:
-        yield from _norms_problems(settings.norms, norm_settings(config))
+        for problem in _norms_problems(settings.norms, norm_settings(config)):
+            yield KeyProblem(problem, ("metrics", "norms"))
     values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
     if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
         yield KeyProblem(

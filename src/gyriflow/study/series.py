@@ -88,7 +88,7 @@ def series_of(config: Config, brains: Mapping[str, Brain], atlases: Iterable[Use
     """Return the growth series of a configuration, limited to the given brains.
 
     Surfaces are read to find out whether their vertices are matched. For atlas files that have yet to be downloaded,
-    the description of the atlas says so.
+    the description of the atlas decides.
     """
     names = growth_series([brain.config for brain in brains.values()], config.growth.brains)
     assumed = {str(file.path) for used in atlases for file in used.missing if used.atlas.series[file.series].matched}

@@ -13,7 +13,6 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import UsedAtlas
-from .checks import norm_settings
 from .records import Brain, CalibrationRuns, Chain, Measurement, Origin, Simulation, Sweep
 from .series import Series, several_subjects
 
@@ -296,11 +295,6 @@ class Study:
         }
 
     # contents of the report and the quality table, other than figures
-
-    @property
-    def norm_settings(self) -> dict[str, Any]:
-        """The settings and the version that norms of metrics depend on."""
-        return norm_settings(self.config)
 
     @property
     def used_settings(self) -> dict[str, Any]:
