@@ -117,12 +117,7 @@ _BRAIN_MAPS = (
         description="Local gyrification index",
     ),
     VertexMap(
-        name="reliable",
-        unit="1",
-        label="reliable",
-        bids_suffix="reliable",
-        description="Reliable",
-        is_averaged=False,
+        name="reliable", unit="1", label="reliable", bids_suffix="reliable", description="Reliable", is_averaged=False
     ),
     VertexMap(
         name="thickness_mm",

@@ -70,11 +70,7 @@ def find_sulci(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> 
 
 
 def name_sulci(
-    mesh: TriangleMesh,
-    sulci: NDArray[np.integer],
-    labels: NDArray[np.integer],
-    names: Mapping[int, str],
-    side: str,
+    mesh: TriangleMesh, sulci: NDArray[np.integer], labels: NDArray[np.integer], names: Mapping[int, str], side: str
 ) -> tuple[Ints, dict[int, str]]:
     """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
 

@@ -43,10 +43,7 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
 
 
 def score_placement(
-    simulated: PreparedSurface,
-    observed: PreparedSurface,
-    start: PreparedSurface,
-    adjacent: PreparedSurface,
+    simulated: PreparedSurface, observed: PreparedSurface, start: PreparedSurface, adjacent: PreparedSurface
 ) -> dict[str, float | bool | str]:
     """Score how well the positions of a simulated brain's folds agree with those of the observed brain.
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..geometry.alignment import MIRROR
 from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
 from ..settings.stages import CostSettings
 from ..settings.terms import FOLD_BANDS
@@ -137,9 +138,8 @@ def replication_table(
         sweep = _sweep_of(entry, sweeps)
         here, verdict = _finding(entry["check"], sweep, mirror_mm) if sweep else (MISSING, NOT_RUN)
         rows.append((entry["finding"], entry["place"], "stated", here, verdict))
-    rows += [
-        (entry["finding"], entry["place"], "stated", entry["reason"], NOT_TESTED) for entry in published["untested"]
-    ]
+    for entry in published["untested"]:
+        rows.append((entry["finding"], entry["place"], "stated", entry["reason"], NOT_TESTED))
     rows += _costs(published["cost"], summary, costs)
     return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
 
@@ -153,7 +153,7 @@ def place_of_largest(before: Floats, after: Floats, pial: Ints) -> float:
 
 def mirror_distance(left: TriangleMesh, right: TriangleMesh) -> float:
     """Return the mean distance in mm of the right hemisphere from the mirror image of the left one."""
-    return aligned_distances(transformed(left, np.diag([-1.0, 1.0, 1.0, 1.0])), right)["distance_mm"]
+    return aligned_distances(transformed(left, MIRROR), right)["distance_mm"]
 
 
 def _sweep_of(entry: Mapping[str, Any], sweeps: Sequence[SweepTables]) -> SweepTables | None:

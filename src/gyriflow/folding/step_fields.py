@@ -38,11 +38,7 @@ class StepFields:
     """
 
     def __init__(
-        self,
-        problem: NonlinearProblem,
-        contact: SelfContact | None,
-        zones: Zones,
-        parameters: FoldingParameters,
+        self, problem: NonlinearProblem, contact: SelfContact | None, zones: Zones, parameters: FoldingParameters
     ) -> None:
         self.problem, self.contact, domain = problem, contact, problem.domain
         self._remembers = parameters.stress_memory_gw > 0

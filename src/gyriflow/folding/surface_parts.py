@@ -95,8 +95,5 @@ def part_of_surface(
     numbers = numbers.reshape(-1, 3)
     sides = edges(TriangleMesh(positions[vertices], numbers))[0]
     return SurfacePart(
-        vertices,
-        np.asfortranarray(numbers, dtype=np.int32),
-        np.asfortranarray(sides, dtype=np.int32),
-        owned[vertices],
+        vertices, np.asfortranarray(numbers, dtype=np.int32), np.asfortranarray(sides, dtype=np.int32), owned[vertices]
     )

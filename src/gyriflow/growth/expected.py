@@ -180,7 +180,4 @@ def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Fl
     """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
-    return {
-        "area_cm2": np.array(list(map(area_cm2, surfaces))),
-        "volume_ml": np.array(list(map(volume_ml, surfaces))),
-    }
+    return {"area_cm2": np.array(list(map(area_cm2, surfaces))), "volume_ml": np.array(list(map(volume_ml, surfaces)))}

@@ -30,10 +30,7 @@ def group_name(week: float) -> str:
 
 
 def write_frame(
-    path: AnyPath,
-    week: float,
-    vertex_fields: Mapping[str, NDArray],
-    cell_fields: Mapping[str, NDArray] | None = None,
+    path: AnyPath, week: float, vertex_fields: Mapping[str, NDArray], cell_fields: Mapping[str, NDArray] | None = None
 ) -> None:
     """Write the frame of a gestational week to a file of its own.
 

@@ -159,11 +159,7 @@ def _mode_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
 
 def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
     """Return volume and area of a hemisphere or of the whole, and the number of faces that cut others."""
-    return {
-        "volume": volume_ml(cap(mesh)),
-        "area": area_cm2(mesh),
-        "crossing_faces": float(crossing),
-    }
+    return {"volume": volume_ml(cap(mesh)), "area": area_cm2(mesh), "crossing_faces": float(crossing)}
 
 
 def folding_metrics(sides: Sequence[Folds]) -> Metrics:

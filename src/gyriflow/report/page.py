@@ -16,14 +16,7 @@ from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
 from ..settings.growth import GROWTH_MODELS
-from ..settings.terms import (
-    ELEMENTS_NEEDED,
-    LARGE_ELEMENT_ERROR,
-    MEASURED,
-    SPREAD_UNKNOWN,
-    element_error,
-    run_names,
-)
+from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, MEASURED, SPREAD_UNKNOWN, element_error, run_names
 from .labels import metric_title, plain, week_label
 from .tables import VERDICTS, accuracy_table, brain_table, centile_text, html_table, predicted_table, range_text
 

@@ -30,14 +30,7 @@ from .scene import (
     restricted,
     uniform_colours,
 )
-from .style import (
-    NEUTRAL_COLOUR,
-    OBSERVED_SURFACE_COLOUR,
-    RIGHT_COLOUR,
-    RUN_COLOURS,
-    SIMULATED_SURFACE_COLOUR,
-    styled,
-)
+from .style import NEUTRAL_COLOUR, OBSERVED_SURFACE_COLOUR, RIGHT_COLOUR, RUN_COLOURS, SIMULATED_SURFACE_COLOUR, styled
 
 SurfaceMap = tuple[TriangleMesh, Floats]
 """A surface in RAS+ mm and a value per vertex."""
@@ -381,9 +374,7 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 
 
 @styled
-def regions_picture(
-    brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]],
-) -> Figure:
+def regions_picture(brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]]) -> Figure:
     """Draw brains coloured by region, a column per brain and a row per view, with the regions' names.
 
     Parameters

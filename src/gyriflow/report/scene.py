@@ -168,13 +168,7 @@ def render(
     try:
         plotter.set_background("white")  # type: ignore[arg-type]
         plotter.add_mesh(
-            surface,
-            scalars="colour",
-            rgb=True,
-            interpolation="phong",
-            specular_power=15,
-            culling="back",
-            **light,
+            surface, scalars="colour", rgb=True, interpolation="phong", specular_power=15, culling="back", **light
         )
         # the inside of a surface that is open where the hemispheres were separated
         plotter.add_mesh(surface, color=NEUTRAL_COLOUR, ambient=0.6, diffuse=0.4, culling="front")

@@ -33,10 +33,7 @@ Timed = tuple[float, TriangleMesh, dict[str, Floats]]
 
 
 def surfaces_view(
-    runs: Mapping[str, Sequence[tuple[float, Halves]]],
-    observed: Sequence[tuple[float, Halves]],
-    *,
-    observed_name: str,
+    runs: Mapping[str, Sequence[tuple[float, Halves]]], observed: Sequence[tuple[float, Halves]], *, observed_name: str
 ) -> dict[str, Any]:
     """Return the surfaces, decimated to fit the budget, with their maps and colour scales, for JSON.
 

@@ -82,17 +82,10 @@ GROWTH_MODELS: dict[ModelName, GrowthModel] = {
         sentence=_rates_sentence,
     ),
     "sizes": GrowthModel(
-        keys=("thickness_mm", *SIZES),
-        rates=("radial_growth_rate_per_s",),
-        measured="sizes",
-        sentence=_sizes_sentence,
+        keys=("thickness_mm", *SIZES), rates=("radial_growth_rate_per_s",), measured="sizes", sentence=_sizes_sentence
     ),
     "shapes": GrowthModel(
-        keys=("of", "thickness_mm"),
-        rates=(),
-        measured="shapes",
-        sentence=_shapes_sentence,
-        resolved=SIZES,
+        keys=("of", "thickness_mm"), rates=(), measured="shapes", sentence=_shapes_sentence, resolved=SIZES
     ),
 }
 BEFORE_GW = 1.0
