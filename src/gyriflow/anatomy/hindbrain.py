@@ -54,7 +54,7 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
         if (share := np.linalg.norm(offset) / size) < MIN_HINDBRAIN_DISTANCE:
             raise InputError(
                 f"with the scheme {scheme.name!r} the {name} lies inside the cerebrum",
-                found=f"centres {share:.2f} times the cerebrum's size (cube root of its volume) apart",
+                found=f"distance of the centres: {share:.2f} times the cerebrum's size (cube root of its volume)",
                 expected=f"{MIN_HINDBRAIN_DISTANCE} or more",
             )
     sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None

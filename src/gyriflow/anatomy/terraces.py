@@ -21,7 +21,7 @@ ROUNDS = 16
 GAUSSIAN_VOXELS2, ROUGHNESS_SHARE = 0.35, 0.14
 # pivots on the diagonal keep the factors sparse: 60 times faster
 SYMMETRIC = {"SymmetricMode": True}
-# rounds in which vertices of faces that cross others, rotate by 60° or become needles are reset, with neighbours
+# how often vertices of faces that cross others, rotate by 60° or become needles are reset, with their neighbours
 N_RESETS = 8
 MIN_COSINE, MIN_SHAPE_RATIO = 0.5, 0.75
 

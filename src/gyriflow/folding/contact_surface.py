@@ -1,4 +1,4 @@
-"""The contact surface: its positions on every rank, and sums over ranks, each of which computes on a part of it."""
+"""The contact surface: its positions on every rank, and sums over ranks, which each compute on a part of it."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -28,7 +28,7 @@ class Size:
     volume_mm3: float
 
     def rates_to(self, after: "Size", step_s: float) -> Floats:
-        """Return the (2,) rates in 1/s of the logarithms of area and volume between two sizes a step apart."""
+        """Return the (2,) rates in 1/s of ln area and ln volume between the sizes before and after a step."""
         return np.log([after.area_mm2 / self.area_mm2, after.volume_mm3 / self.volume_mm3]) / step_s
 
 

@@ -19,7 +19,7 @@ from .growth import Floats, GrowthByRates, GrowthInputs, Size, StepGrowth, StepS
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
 
 JOINING_GW = 1.0
-"""Time in which a brain that does not start on its curves joins them."""
+"""Time within which a brain that does not start on its curves joins them."""
 MAX_RATE_PER_S = 1e-5
 """Largest rate that is set, the upper bound of prescribed rates."""
 MAX_CONTRAST = 5.0

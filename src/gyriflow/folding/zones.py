@@ -215,7 +215,7 @@ def bridge_vertices(
 def medial_vertices(
     mesh: TetrahedralMesh, fissure_x_mm: float, left_plane: float, right_plane: float
 ) -> NDArray[np.int64]:
-    """Return the vertices, each once, of the elements whose medial-most vertex lies between the planes.
+    """Return the vertices, each once, of the elements whose most medial vertex lies between the planes.
 
     Walls between the planes have no contact; the prototype of the FetalFoldSim paper does not let them grow.
     """

@@ -282,7 +282,7 @@ def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:
     if values.dtype.kind == "f":
         require_finite(values.ravel(), path, "values", "voxels")
         errors = np.abs(values - np.rint(values))
-        # small values of which nothing is left were divided by their slope
+        # values that all round to zero were divided by their slope
         broken = (errors > MAX_LABEL_ERROR) | (not np.rint(values).any() and values != 0)
         if broken.any():
             problem = f"contains values that are not labels, whole numbers within {MAX_LABEL_ERROR:g}"

@@ -138,7 +138,7 @@ def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
 
 @styled
 def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw a row for each sulcus that observed brains do not have at the start, with the weeks in which it begins.
+    """Draw a row for each sulcus that observed brains do not have at the start, with the weeks when it begins.
 
     A cross at the right edge means never. If there are several start brains, their names follow those of the sulci.
 

@@ -144,7 +144,7 @@ def gather_messages(
 
 
 BENCHMARK_COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}
-"""Our column names, by those in Snakemake's files, in which a megabyte is 2²⁰ bytes."""
+"""Our column names, by those in Snakemake's files. Their megabyte is 2²⁰ bytes."""
 
 
 def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
