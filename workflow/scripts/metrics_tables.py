@@ -23,8 +23,10 @@ with step(snakemake.log[0]):
     metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
     reference = [] if files.cohort else params.reference
+    population = params.population
     if files.cohort:
-        cohort = cohort_from_plain(read_json(files.cohort[0]))
+        content = read_json(files.cohort[0])
+        cohort, population = cohort_from_plain(content), content.get("population")
     else:
         cohort = cohort_norms(people, reference, individuals=params.individuals, made_with=params.made_with)
     parts = [asymmetry(table.fillna({"region": ""})) for table in (metrics.assign(region=""), *regions)]
@@ -43,7 +45,7 @@ with step(snakemake.log[0]):
         brains = [LabelledBrain(*brain, by_label) for brain, by_label in zip(params.labelled, volumes, strict=True)]
         norms = published_norms(read_yaml(files.norms))
         tables["volumes"], tables["published_centiles"] = volume_tables(brains, norms)
-    write_json(snakemake.output.norms, {"population": params.population, **cohort.plain})
+    write_json(snakemake.output.norms, {"population": population, **cohort.plain})
     for name, path in snakemake.output.items():
         if name in tables:
             write_table(path, tables[name])

@@ -26,6 +26,7 @@ atlas has 0.06 to 0.09 mm."""
 MAX_OCCIPITAL_SHARE = 0.25
 """Share of the brain's length, from the back, that counts as the occipital lobe."""
 NOT_RUN, AGREES, NOT_COMPARABLE = "not run", "as in the paper", "another machine and mesh"
+NO_BANDS = "the bands are cut off or not resolved"
 NOT_TESTABLE, NOT_TESTED = "not testable", "not tested"
 MISSING = "–"
 REAL = "real "
@@ -225,10 +226,11 @@ def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]
     for measure, bands in ((f"{entry['measure']}_weyl", "cut"), (entry["measure"], "whole bands")):
         for row in nearest[nearest["measure"] == measure].to_dict("records"):
             flag = "" if row["flag"] == "ok" else f" ({row['flag']})"
-            texts.append(f"{row['hemisphere']}, {bands}: {row[entry['parameter']]:g}{flag}")
+            nearest_value = f"{row[entry['parameter']]:g}" if pd.notna(row["run"]) else "none"
+            texts.append(f"{row['hemisphere']}, {bands}: {nearest_value}{flag}")
             # the paper's bands are cut
             if bands == "cut" and pd.notna(row["run"]):
-                equal.append(row[entry["parameter"]] == entry["value"])
+                equal.append(row["flag"] == "ok" and row[entry["parameter"]] == entry["value"])
     verdict = NOT_TESTABLE if texts and not equal else _verdict(pd.Series(equal))
     return "; ".join(texts) or MISSING, verdict
 
@@ -252,6 +254,8 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         if mirror_mm is None or mirror_mm <= MAX_MIRROR_MM:
             found = "one hemisphere" if mirror_mm is None else f"hemispheres are mirror images to {mirror_mm:.2f} mm"
             return found, NOT_TESTABLE
+        if not {"right", "left"} <= set(shares.index.get_level_values("hemisphere")):
+            return NO_BANDS, NOT_TESTABLE
         right, left = (shares.xs(side, level="hemisphere") for side in ("right", "left"))
         if check == "right_B4":
             difference = right["B4"] - left["B4"]
@@ -264,11 +268,12 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         margin = (smallest_real - shares.loc[~is_real, "B5"].groupby("hemisphere").max()).dropna()
         holds = margin > 0
     if holds.empty:
-        return "the bands are cut off or not resolved", NOT_TESTABLE
+        return NO_BANDS, NOT_TESTABLE
     text = f"{holds.sum()} of {len(holds)} cases"
     unknown = [str(band) for band in shares if shares[band].isna().all()]
     if check == "most_B4" and unknown:
         text += f", without {' and '.join(unknown)}: cut off or not resolved"
+        return text, "in part" if holds.all() else _verdict(holds)
     return text, _verdict(holds)
 
 

@@ -130,7 +130,7 @@ def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
 
 
 def _band_row(hemisphere: str, measure: str, value: float, real_value: float, *, resolved: bool) -> tuple:
-    flag = "cut off" if np.isnan(value + real_value) else "ok" if resolved else NOT_RESOLVED
+    flag = NOT_RESOLVED if not resolved else "cut off" if np.isnan(value + real_value) else "ok"
     return hemisphere, measure, value, real_value, abs(value - real_value) if flag == "ok" else np.nan, "1", flag
 
 

@@ -18,7 +18,7 @@ from ..geometry.triangles import Floats
 
 MIN_SUBJECTS = 10
 """With fewer subjects there are no centiles."""
-MIN_SUBJECTS_FOR_SPLINES = 30
+MIN_SUBJECTS_FOR_CURVES = 30
 """With fewer subjects the relative scatter is the same at all weeks, and centiles are cut at `FEW_CENTILES`."""
 FEW_CENTILES = (5.0, 95.0)
 INTERVAL_Z = 1.645
@@ -28,7 +28,7 @@ LOCATION_FREEDOM, SCALE_FREEDOM = (5.0, 7.5), 3.0
 subjects whose volumes scatter by 8 %, the median is wrong by up to 5 centiles."""
 SUBJECTS_PER_FREEDOM = 20
 """Subjects for each degree of freedom of the location, between these bounds."""
-MIN_WEEKS_OF_SPLINES = 8
+MIN_WEEKS_FOR_SPLINES = 8
 INTERVALS = 6
 """Intervals between the knots of the splines."""
 SKEWNESS_SD = 3.0
@@ -130,7 +130,7 @@ def fit_norm(
     first, last, count = float(weeks.min()), float(weeks.max()), len(np.unique(weeks))
     start = np.log(values) if is_positive else values
     size = 3 if count > 3 else 2 if count > 1 else 1
-    with_curves = subjects >= MIN_SUBJECTS_OF_CURVES if with_curves is None else with_curves
+    with_curves = subjects >= MIN_SUBJECTS_FOR_CURVES if with_curves is None else with_curves
     if not with_curves:
         rows = _basis(weeks, first, last, size, False)
         normal = (rows.T * weights) @ rows
@@ -142,7 +142,7 @@ def fit_norm(
         covariance[size, size] = 0.5 / freedom
         scale = np.array([np.log(scatter)])
         return WeeklyNorm(first, last, is_positive, location, scale, 0.0, covariance, subjects, False, float(freedom))
-    is_spline = count >= MIN_WEEKS_OF_SPLINES
+    is_spline = count >= MIN_WEEKS_FOR_SPLINES
     sizes = (INTERVALS + 3,) * 2 if is_spline else (size, min(size, 2))
     rows, scale_rows = (_basis(weeks, first, last, each, is_spline) for each in sizes)
     normal = (rows.T * weights) @ rows

@@ -28,6 +28,9 @@ WINDOW_GW = 0.5
 MAX_ONE_STEP_Z = 1.5
 """Subjects up to this z are removed from the norm by one Newton step; beyond it, the norm is fitted again."""
 
+MIN_SPREAD = 1e-6
+"""Smallest spread of a norm over its values for which there are scores."""
+
 CURVE_POINTS = 41
 """Number of points of a norm's curve."""
 
@@ -56,6 +59,15 @@ class PublishedNorm:
     scheme: str = ""
     tissue: str = ""
     side: Side | None = None
+
+    def values(self, week: float, z: float) -> Floats:
+        """Return the value with a z at a week (1,), as `WeeklyNorm.values` does."""
+        return np.atleast_1d(np.polyval(self.mean, week) + z * np.polyval(self.sd, week))
+
+    def scores(self, week: float, value: float) -> tuple[Floats, Floats]:
+        """Return z of a value at a week (1,) and its standard error, which is unknown."""
+        z = (value - self.values(week, 0.0)) / (self.values(week, 1.0) - self.values(week, 0.0))
+        return z, np.full(1, np.nan)
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -115,8 +127,8 @@ def published_scores(
         inside = norm.weeks[0] <= week <= norm.weeks[1]
         is_present = len(sides) == len(SIDES) or norm.side in sides
         scored = inside and is_present
-        mean, sd = (float(np.polyval(curve, week)) if scored else np.nan for curve in (norm.mean, norm.sd))
-        z = (value - mean) / sd
+        mean = float(norm.values(week, 0.0)[0]) if scored else np.nan
+        sd, z = float(norm.values(week, 1.0)[0]) - mean, float(norm.scores(week, value)[0][0]) if scored else np.nan
         brains = np.nan if norm.subjects is None else norm.subjects
         flag = "other labels" if name in substitutes else "ok"
         if not scored:
@@ -168,20 +180,26 @@ class CohortNorms:
     made_with: Mapping[str, Any]
 
     @property
+    def hemispheres(self) -> str:
+        """The hemispheres of its brains, as of `_hemispheres_of`."""
+        return " ".join(sorted({hemisphere for hemisphere, _ in self.norms}))
+
+    @property
     def plain(self) -> dict[str, Any]:
         """The norms as plain values for JSON."""
         keys = ("hemisphere", "metric", "unit")
         rows = [dict(zip(keys, (*name, unit), strict=True)) | norm.plain for name, (unit, norm) in self.norms.items()]
         subjects = max((norm.subjects for _, norm in self.norms.values()), default=0)
         method = "LMS (Cole and Green 1992); sex and site are ignored"
-        return {"subjects": subjects, "method": method, "made_with": dict(self.made_with), "norms": rows}
+        facts = {"subjects": subjects, "individuals": self.individuals, "method": method}
+        return {**facts, "made_with": dict(self.made_with), "norms": rows}
 
 
 def cohort_from_plain(content: Mapping[str, Any]) -> CohortNorms:
     """Return the norms that `CohortNorms.plain` gives as plain values."""
     rows = [dict(row) for row in content["norms"]]
     norms = {(row.pop("hemisphere"), row.pop("metric")): (row.pop("unit"), norm_from_plain(row)) for row in rows}
-    return CohortNorms(norms, True, content["made_with"])
+    return CohortNorms(norms, content["individuals"], content["made_with"])
 
 
 def cohort_norms(
@@ -204,11 +222,11 @@ def cohort_norms(
     return CohortNorms(norms, individuals, made_with or {})
 
 
-def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
+def _fit(brains: pd.DataFrame, metric: str, with_curves: bool | None = None) -> WeeklyNorm:
     values = brains["value"].to_numpy(dtype=float)
     is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
-    people = brains["person"].nunique()
-    return fit_norm(brains["week"].to_numpy(float), values, _weights(brains), people, is_positive=is_positive)
+    weeks, people = brains["week"].to_numpy(float), brains["person"].nunique()
+    return fit_norm(weeks, values, _weights(brains), people, is_positive=is_positive, with_curves=with_curves)
 
 
 def _weights(brains: pd.DataFrame) -> Floats:
@@ -224,12 +242,12 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd (half the distance between z = −1
     and 1), z, z_low, z_high, centile (0 to 100), centile_low, centile_high (90 % intervals from the norm's own
     uncertainty), brains (subjects of the norm), flag: "ok"; "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN`
-    (only expected is given); "outside the reference's weeks", "too few brains" or "other hemispheres" (than the
-    reference), whose scores are NaN.
+    (only expected is given); "outside the reference's weeks", "too few brains", "other hemispheres" (than the
+    reference), "not positive" (as all values of the norm are) or "no spread" (of the norm), whose scores are NaN.
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
-    is_comparable = same_sides(metrics, reference) if len(reference) else True
+    is_comparable = same_sides(metrics, reference) if len(reference) else _hemispheres_of(metrics) == cohort.hemispheres
     table = _with_norm(metrics.assign(is_comparable=is_comparable))
     rows = []
     for row, person, has_same_sides in zip(
@@ -263,7 +281,7 @@ def _score(
             return _no_score("too few brains", subjects)
         scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
         if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > MAX_ONE_STEP_Z:
-            norm = _fit(remaining, key[1])
+            norm = _fit(remaining, key[1], with_curves=norm.freedom is None)
         else:
             norm = norm.without(*scans, _weights(own))
     if not norm.first - WINDOW_GW <= week <= norm.last + WINDOW_GW:
@@ -271,6 +289,9 @@ def _score(
     low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
     if not cohort.individuals:
         return (expected, *[np.nan] * (len(SCORES) - 3), norm.subjects, SPREAD_UNKNOWN)
+    has_spread = high - low > MIN_SPREAD * max(abs(low), abs(high))
+    if (norm.is_positive and value <= 0) or not has_spread:
+        return _no_score("not positive" if has_spread else "no spread", norm.subjects)
     (z,), (error,) = norm.scores([week], [value])
     bounds, flag = ((0.0, 100.0), "ok") if norm.freedom is None else (FEW_CENTILES, "few brains")
     scores = np.array([z, z - INTERVAL_Z * error, z + INTERVAL_Z * error])
@@ -283,9 +304,13 @@ def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
 
     The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
     """
-    sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
+    sides = _hemispheres_of(metrics)
     is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
     return sides.isin(sides[is_reference])
+
+
+def _hemispheres_of(metrics: pd.DataFrame) -> pd.Series:
+    return metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
 
 
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:

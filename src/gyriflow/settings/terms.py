@@ -125,7 +125,7 @@ def element_error(order: int, elements: float) -> tuple[float, str]:
     errors = ELEMENT_ERRORS[order]
     error = float(np.exp(np.interp(np.log(max(0.1, elements)), np.log(list(errors)), np.log(list(errors.values())))))
     bound = "up to" if elements >= 0.99 * ELEMENTS_NEEDED[order] else "more than"
-    text = f"the fastest wave of folding grows {bound} {error:.0f} % too slowly"
+    text = f"the fastest wave of folding grows {bound} {error:.0f} % too slowly (at Poisson's ratio 0.45)"
     if order == 1 and error > LARGE_ELEMENT_ERROR:
         text += f" (quadratic elements on as many nodes: up to {element_error(2, max(elements / 2, 1.0))[0]:.0f} %)"
     return error, f"{elements:.1f} {'linear' if order == 1 else 'quadratic'} elements through the cortex: {text}"

@@ -25,7 +25,7 @@ from .study import Study
 BRAIN_FIGURES = f"{BRAIN}/figures"
 ZONES = {"contact", "no_growth", "support"}
 """Settings that determine the zones of a run. Runs with equal ones share a figure of the zones."""
-MIN_NORM_SUBJECTS, MAX_SERIES = 5, 4
+MIN_NORM_SUBJECTS, MIN_NORM_AVERAGES, MAX_SERIES = 10, 5, 4
 
 
 def figures_of(study: Study) -> list[Figure]:
@@ -367,7 +367,8 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
         yield Figure(METRICS_TABLE, metrics, {"observed_name": observed_name(study.brains.values())})
     yield Figure(SPECTRA, spectra, options)
     reference = study.norm_reference
-    if len({study.brains[brain].subject for brain in reference}) >= MIN_NORM_SUBJECTS:
+    needed = MIN_NORM_SUBJECTS if study.are_individuals(reference) else MIN_NORM_AVERAGES
+    if study.config.metrics.norms or len({study.brains[brain].subject for brain in reference}) >= needed:
         yield norms_figure(study, options)
 
 
@@ -455,7 +456,9 @@ def norms_figure(study: Study, options: Arguments) -> Figure:
     reference = [study.brains[brain] for brain in study.norm_reference]
     tables = {"metrics": f"{STUDY}/metrics.csv", "curves": f"{STUDY}/norm_curves.csv"}
     comparable = [brain.id for brain in study.brains.values() if brain.sides == reference[0].sides]
-    arguments = {"observed_name": observed_name(reference), "reference": study.norm_reference, "brains": comparable}
+    # norms of another study have no brains here
+    own = [] if study.config.metrics.norms else study.norm_reference
+    arguments = {"observed_name": observed_name(reference), "reference": own, "brains": comparable}
     return Figure(NORMS, tables, options | arguments)
 
 

@@ -124,6 +124,35 @@ def test_a_small_head_of_22_weeks_is_found() -> None:
     assert (found["flag"], found["brains"]) == ("ok", 100)
 
 
+def test_whole_weeks_of_many_subjects_have_their_own_scatter() -> None:
+    random = np.random.default_rng(3)
+    weeks = random.integers(22, 29, 500).astype(float)
+    values = growing(weeks) + (weeks - 20) * random.standard_normal(500)
+    found = scores(*table(weeks, values))
+    assert set(found["flag"]) == {"ok"}
+    for week in (22.0, 28.0):
+        of_week = found[found["week"] == week]
+        assert of_week["sd"].mean() == pytest.approx(week - 20, rel=0.2)
+        assert (of_week["centile"] < 10).mean() == pytest.approx(0.1, abs=0.08)
+
+
+def test_thirty_subjects_are_compared_alike() -> None:
+    random = np.random.default_rng(4)
+    weeks = random.uniform(21, 36, 30)
+    found = scores(*table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(30))))
+    assert set(found["flag"]) == {"ok"}
+
+
+def test_values_that_a_norm_cannot_have_are_not_scored() -> None:
+    random = np.random.default_rng(4)
+    weeks = random.uniform(21, 36, 40)
+    metrics, reference = table(weeks, growing(weeks) * (1 + 0.08 * random.standard_normal(40)), ("flat", 25.0, 0.0))
+    flat = scores(metrics, reference).query("run == 'flat'").iloc[0]
+    assert (flat["flag"], np.isnan(flat["centile"])) == ("not positive", True)
+    same = scores(*table(weeks, np.full(40, 5.0), ("other", 25.0, 6.0))).query("run == 'other'").iloc[0]
+    assert (same["flag"], np.isnan(same["z"])) == ("no spread", True)
+
+
 def test_a_brain_of_the_reference_is_compared_with_the_others() -> None:
     random = np.random.default_rng(0)
     weeks = random.uniform(21, 36, 60)
@@ -154,6 +183,15 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
     pd.testing.assert_frame_equal(norm_curves(cohort), norm_curves(again))
     (score,) = measured_scores(metrics[metrics["run"] == "new"], [], again).to_dict("records")
     assert score["centile"] == pytest.approx(scores(metrics, reference).query("run == 'new'")["centile"].iloc[0])
+    # averages and hemispheres stay what they are
+    averages = cohort_norms(metrics, reference, individuals=False)
+    write_json(path, averages.plain)
+    new = metrics[metrics["run"] == "new"]
+    again = cohort_from_plain(read_json(path))
+    assert measured_scores(new, [], again)["flag"].tolist() == [SPREAD_UNKNOWN]
+    one_side = pd.concat([new, new.assign(hemisphere="left")])
+    assert measured_scores(one_side, [], again)["flag"].tolist() == ["other hemispheres"]
+    write_json(path, cohort.plain)
     raw = study(metrics={"norms": str(path)})
     assert problems(raw) == []
     other = {"surface": {"edge_length_mm": 0.7}, "metrics": {"norms": str(path), "curvature_radius_mm": 4.0}}
