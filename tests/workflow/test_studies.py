@@ -53,14 +53,12 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_
     assert members.loc["rate-1e-05", "cause"] == Facts("GW", "mm")
     assert members.loc["rate-1e-05", "reached_week"] < 28
     for table in ("comparison", "nearest"):
-        assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"]) == {"rate-1e-07"}
+        # bands that are not resolved have no nearest run
+        assert set(pd.read_csv(folder / "rate" / f"{table}.csv")["run"].dropna()) == {"rate-1e-07"}
     table = pd.read_csv(folder / "replication.csv", keep_default_na=False).set_index("result")
     assert set(table["verdict"][["21-22 GW" in result for result in table.index]]) == {NOT_RUN}
-    assert tuple(table.loc["all thicknesses come to 28 GW without collisions", ["here", "verdict"]]) == (
-        Facts("2 of 2"),
-        AGREES,
-    )
-    (ratios,) = (result for result in table.index if "ratios" in result)
+    thick, ratios = (next(result for result in table.index if part in result) for part in ("thicknesses", "ratios"))
+    assert tuple(table.loc[thick, ["here", "verdict"]]) == (Facts("2 of 2"), AGREES)
     assert table.loc[ratios, "verdict"] == NOT_RUN
     # the coarse surfaces have no whole bands of folds to be nearest by
     assert {"study", "nearest", "paper", "place"} <= set(pd.read_csv(folder / "paper_nearest.csv"))

@@ -13,6 +13,7 @@ def files_of_member(wildcards):
     return {
         "metrics": [f"{row.folder}/metrics.csv" for row in rows],
         "spectra": [f"{row.folder}/spectra.csv" for row in rows],
+        "coefficients": [f"{row.folder}/coefficients.csv" for row in rows],
         "simulated": list(simulated.parts.values()),
         "measured": [path for row in rows[1:] for path in row.parts.values()],
     }
@@ -25,22 +26,14 @@ def from_members(pattern):
     ]
 
 
-def coefficients_of(wildcards):
-    """Return the coefficients of all surfaces that a sweep compares, without runs that have not reached its week."""
-    compared = study.sweeps[wildcards.study]
-    reached = [run for run, _ in compared.members if reaches(run.run, run.start.id, compared.week)]
-    rows = {run.at(compared.week).folder for run in reached}
-    rows |= {real.measurement.folder for run in reached for real in compared.observed[run.start.id]}
-    return [f"{folder}/coefficients.csv" for folder in sorted(rows)]
-
-
 rule compare_member:
     input:
         unpack(files_of_member),
         # solved even if it diverges
         summary=FOLDING["summary"],
     output:
-        COMPARED_MEMBER,
+        table=COMPARED_MEMBER,
+        coefficients=MEMBER_COEFFICIENTS,
     log:
         f"{SWEEP}/logs/compare_member.{{run}}.{{brain}}.log",
     benchmark:
@@ -58,7 +51,7 @@ rule compare_member:
 rule study_tables:
     input:
         comparisons=from_members(COMPARED_MEMBER),
-        coefficients=coefficients_of,
+        coefficients=from_members(MEMBER_COEFFICIENTS),
         params=from_members(PARAMETERS),
         summaries=from_members(FOLDING["summary"]),
         zones=from_members(FOLDING["zones"]),

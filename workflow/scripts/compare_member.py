@@ -4,8 +4,8 @@ from itertools import batched
 
 import pandas as pd
 
-from gyriflow.compare.sweeps import comparison_table, joined_comparisons
-from gyriflow.io.files import read_table, write_table
+from gyriflow.compare.sweeps import COEFFICIENTS, comparison_table, joined_comparisons
+from gyriflow.io.files import read_tables, write_table
 from gyriflow.io.surfaces import read_surface
 from gyriflow.step import step
 
@@ -18,14 +18,13 @@ def parts(paths):
 
 
 with step(snakemake.log[0]):
-    table = joined_comparisons([])
+    table, coefficients = joined_comparisons([]), pd.DataFrame(columns=COEFFICIENTS)
     if files.get("metrics"):
-        metrics, spectra = (
-            pd.concat(map(read_table, paths), ignore_index=True) for paths in (files.metrics, files.spectra)
-        )
+        metrics, spectra, coefficients = map(read_tables, (files.metrics, files.spectra, files.coefficients))
         observed = map(parts, batched(files.measured, len(params.parts)))
         observed = dict(zip(params.real, observed, strict=True))
         populations = {names.brain: params.population, **params.real}
         simulated = parts(files.simulated)
         table = comparison_table(names.run, names.brain, populations, metrics, spectra, simulated, observed)
-    write_table(snakemake.output[0], table)
+    write_table(snakemake.output.table, table)
+    write_table(snakemake.output.coefficients, coefficients[COEFFICIENTS])

@@ -18,8 +18,10 @@ with step(snakemake.log[0]):
         rows.append(member_row(labels, member["values"], read_yaml(settings), read_json(zones), read_json(summary)))
     members, varied = pd.DataFrame(rows), list(params.members[0]["values"])
     found = joined_comparisons(map(read_table, files.comparisons))
-    if files.coefficients:
-        found = with_common_cut(found, read_tables(files.coefficients))
+    # observed brains are compared with several runs
+    coefficients = read_tables(files.coefficients).drop_duplicates()
+    if len(coefficients):
+        found = with_common_cut(found, coefficients)
     comparison = members[["subject", "run", *varied, "resolution"]].merge(found, on=["subject", "run"])
     write_table(output.members, members)
     write_table(output.comparison, comparison)

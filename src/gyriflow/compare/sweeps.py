@@ -21,6 +21,8 @@ NOT_RESOLVED = "not resolved"
 """Flag of a band that is too fine for the edges or the curvature radius: it has no distance."""
 NO_NEAREST = "no nearest run: the band is not resolved; use shorter edges and a smaller metrics.curvature_radius_mm"
 """Flag of a measure that no run resolves."""
+COEFFICIENTS = ["subject", "run", "hemisphere", "mode", "band", "coefficient_shape_index"]
+"""Columns of the coefficients that spectra are cut with."""
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")

@@ -109,6 +109,7 @@ DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/met
 VALIDATION = f"{RUN}/metrics/validation.csv"
 ONSET = f"{RUN}/metrics/onset.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}.csv"
+MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}.coefficients.csv"
 CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
 
 
