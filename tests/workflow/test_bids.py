@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 SETTINGS = "surface: {edge_length_mm: 3.0}\nmetrics: {curvature_radius_mm: 7.0, spangy_modes: 50}\n"
 SCAN = "sub-01/ses-1/anat/sub-01_ses-1"
 MAPS = ("curv", "curvedness", "gaussCurv", "localGyrificationIndex", "reliable", "shapeIndex", "sulc")
-PIAL_MAPS = (*MAPS, "spangyDominantBand", "thickness")
+PIAL_MAPS = (*MAPS, "spangyDominantBand", "spangyShapeIndexDominantBand", "thickness")
 EXPECTED = {
     *(".bidsignore", "README.md", "dataset_description.json", "descriptions.tsv", "sessions.json"),
     *(f"{name}.json" for name in ("pial", "white", *PIAL_MAPS)),

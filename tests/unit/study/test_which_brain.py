@@ -98,8 +98,8 @@ def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start():
     assert resolved(brains, start="well22", **named).norm_reference == ["ill21", "well22"]
 
 
-@pytest.mark.parametrize(("subjects", "drawn"), [(4, False), (5, True)])
-def test_norms_are_drawn_of_five_subjects_however_often_each_was_scanned(subjects, drawn):
+@pytest.mark.parametrize(("subjects", "drawn"), [(9, False), (10, True)])
+def test_norms_are_drawn_of_ten_subjects_however_often_each_was_scanned(subjects, drawn):
     brains = [brain(f"s{n}w{week}", week, subject=f"s{n}") for n in range(subjects) for week in (21, 22)]
     found = resolved(brains, start="s0w21", runs={"reference": {"end_week": 22}})
     assert ("norms_figure" in {figure.kind.name for figure in figures_of(found)}) == drawn
