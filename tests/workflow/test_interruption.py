@@ -54,6 +54,7 @@ def started(workflow, until):
 
 @pytest.mark.fault(33, 38)
 @pytest.mark.promise(3)
+@pytest.mark.extended
 def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on_with_the_same_command(workflow):
     # an ellipsoid's
     workflow.count_ellipsoid_as_meshed(STUDY, cells=10)

@@ -34,6 +34,7 @@ def ellipsoids(first_week, *semi_axes_mm):
 
 @pytest.mark.fault(55)
 @pytest.mark.slow
+@pytest.mark.extended
 def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_beside_the_papers(workflow):
     rates = {
         "base": "reference",
