@@ -58,8 +58,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     InputError for a configuration that is not valid, with all its problems.
     """
     file = path.absolute()
-    # paths may be relative to the working directory
-    with chdir(directory if directory.is_dir() else Path()):
+    with _working_in(directory):
         config = load(read_keys(file), folder_of(file))
         study, problems = resolve(config), list(input_problems(config))
         valid = not any(bad for *_, bad in problems)
@@ -78,6 +77,11 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
     yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
+
+
+def _working_in(directory: Path) -> chdir:
+    # paths of a configuration may be relative to the working directory
+    return chdir(directory if directory.is_dir() else Path())
 
 
 def work_of(
@@ -101,7 +105,7 @@ def work_of(
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     if study is None:
         file = path.absolute()
-        with chdir(directory if directory.is_dir() else Path()):
+        with _working_in(directory):
             study = resolve(load(read_keys(file), folder_of(file)))
     yield from _needs(jobs, study, directory, cores)
 

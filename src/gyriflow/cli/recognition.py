@@ -63,7 +63,7 @@ class FoundBrain:
 
     `problem` is about its files, `contradiction` about its age; `notes` are values to fill in. It `is_unreadable` if
     files are damaged or missing, `is_template` if its folder is that of a template. `fits` is the result of
-    `scheme_fits` for its labels.
+    `scheme_fits` for its labels, `named_age` the text of an age that is from its name.
     """
 
     entry: dict[str, Any]
@@ -75,6 +75,7 @@ class FoundBrain:
     warnings: list[str] = field(default_factory=list)
     fits: dict[str, str] | None = None
     is_template: bool = False
+    named_age: str = ""
 
     @property
     def causes(self) -> list[str]:
@@ -105,12 +106,8 @@ class _Candidate:
     space: str = ""
     problem: str = ""
 
-    def labels(self, entity: str) -> list[str]:
-        return sorted({label for name, label in ENTITY.findall(self.file.as_posix()) if name == entity})
-
     def label(self, entity: str) -> str | None:
-        # a path with several labels is refused
-        return next(iter(self.labels(entity)), None)
+        return _label(self.file, entity)
 
     @property
     def data_set(self) -> Path:
@@ -121,15 +118,29 @@ class _Candidate:
 
     @property
     def scan(self) -> str:
-        subject, session = self.label("sub"), self.label("ses")
-        if subject:
-            return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
-        name = SIDE_NAME.sub("", FREESURFER_INPUT.sub("", self.file.name))
-        name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", name)))
-        folders = [part for part in self.file.parts[:-1] if not GENERIC_FOLDER.fullmatch(part)]
-        if folders and not re.search(r"\d", name):
-            name = folders[-1]
-        return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
+        return _scan_of(self.file)
+
+
+def _labels(file: Path, entity: str) -> list[str]:
+    return sorted({label for name, label in ENTITY.findall(file.as_posix()) if name == entity})
+
+
+def _label(file: Path, entity: str) -> str | None:
+    # a path with several labels is refused
+    return next(iter(_labels(file, entity)), None)
+
+
+def _scan_of(file: Path) -> str:
+    """Return the id of the scan that a file is of: by `sub-` and `ses-`, or else by the name of the file or folder."""
+    subject, session = _label(file, "sub"), _label(file, "ses")
+    if subject:
+        return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
+    name = SIDE_NAME.sub("", FREESURFER_INPUT.sub("", file.name))
+    name = SUFFIXES.sub("", RESAMPLED_NAME.sub("", LAYER_NAME.sub("", name)))
+    folders = [part for part in file.parts[:-1] if not GENERIC_FOLDER.fullmatch(part)]
+    if folders and not re.search(r"\d", name):
+        name = folders[-1]
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
 
 
 def recognise(
@@ -158,8 +169,8 @@ def recognise(
             found[candidate.scan].append(candidate)
     # sessions without labels or surfaces count
     sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
-    for candidate in (_Candidate(file, {}) for file in files):
-        sessions_of[candidate.label("sub")] |= {candidate.label("ses")} - {None}
+    for file in files:
+        sessions_of[_label(file, "sub")] |= {_label(file, "ses")} - {None}
     if not found:
         raise _no_brain(folder, {str(file): _rejection(file) for file in files})
     selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
@@ -184,8 +195,7 @@ def recognise(
         if unused:
             raise _no_brain(folder, unused)
         raise InputError("has no scan of these participants in these sessions", path=folder)
-    named = [brain.age_source[len("name (") : -1] for brain in brains if brain.age_source.startswith("name (")]
-    by_name = "" if notation else ambiguity_of(named)
+    by_name = "" if notation else ambiguity_of(brain.named_age for brain in brains if brain.named_age)
     if ambiguity := tables.ambiguity or by_name:
         raise InputError(ambiguity, path=folder)
     _refuse_equal_weeks(brains)
@@ -292,13 +302,10 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
         if not (match := SIDE_NAME.search(file.name)):
             continue
         side: Side = "left" if match[1] else "right"
-        files_of[_Candidate(file, {}).scan].setdefault(side, file)
+        files_of[_scan_of(file)].setdefault(side, file)
         name = FREESURFER_INPUT.sub("", file.name)
         layer = LAYER_NAME.search(name)
-        # GIFTI files may have other data than pial surfaces
-        is_pial = (
-            layer[1] if layer else not NO_BRAIN_NAME.search(name) and not name.lower().endswith((".gii", ".gii.gz"))
-        )
+        is_pial = layer[1] if layer else _may_be_brain(name)
         is_double = name != file.name and file.with_name(name) in existing
         if (layer or is_pial) and name.lower().endswith(SURFACE_SUFFIXES) and not is_double:
             # sides may be in other folders or in another order of parts
@@ -317,7 +324,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
             problem = "white surfaces alone; pial ones are needed"
         elif len(pair) == 1:
             source = {"hemisphere": {"file": str(file), "side": first}}
-            for side, sign in files_of[_Candidate(file, {}).scan].items():
+            for side, sign in files_of[_scan_of(file)].items():
                 if side != first:
                     found = f"found {sign}; expected both sides, or no file of the {side} one"
                     problem = f"has no pial surface of the {side} hemisphere; {found}"
@@ -328,13 +335,17 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
         yield _Candidate(file, source, _space(file, is_surface=True), problem)
 
 
+def _may_be_brain(name: str) -> bool:
+    """Return whether a surface whose name has no layer may be a pial one."""
+    # GIFTI files may have other data than pial surfaces
+    return not (NO_BRAIN_NAME.search(name) or name.lower().endswith((".gii", ".gii.gz")))
+
+
 def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
     for file in files:
         name = file.name.lower()
         layer = LAYER_NAME.search(name)
-        # GIFTI files may have other data than surfaces
-        is_surface = bool(layer) or not (NO_BRAIN_NAME.search(name) or name.endswith((".gii", ".gii.gz")))
-        if name.endswith(SURFACE_SUFFIXES) and is_surface and not SIDE_NAME.search(name):
+        if name.endswith(SURFACE_SUFFIXES) and (layer or _may_be_brain(name)) and not SIDE_NAME.search(name):
             problem = "a white surface alone; a pial one is needed" if layer and layer[2] else ""
             yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
 
@@ -376,11 +387,11 @@ def _found_brain(
     entry: dict[str, Any] = {"id": candidate.scan, "week": UNSET if age.week is None else age.week}
     entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
     entry |= (covariates(facts.values) if facts else {}) | candidate.source
-    brain = FoundBrain(entry, age.source, candidate.problem)
+    brain = FoundBrain(entry, age.source, candidate.problem, named_age=age.named)
     if age.week is None:
         brain.contradiction = age.cause
         brain.notes += [] if age.cause else ["week: neither its name nor a table gives the week"]
-    labels = {entity: candidate.labels(entity) for entity in ("ses", "sub")}
+    labels = {entity: _labels(candidate.file, entity) for entity in ("ses", "sub")}
     if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
         brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
     elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in (*labels["sub"], *labels["ses"])):
@@ -426,15 +437,14 @@ def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
     """Return the subjects of tables whose ids are whole parts of a path without `sub-`: of the name or of a folder."""
     parts = re.split(r"[._]", candidate.file.name)
     beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {candidate.scan}
-    ids = dict.fromkeys(row.subject for table in tables.tables for row in table.rows)
-    in_name = [subject for subject in ids if subject in beginnings]
-    in_folders = [subject for subject in ids if subject in candidate.file.parts[:-1]]
+    in_name = [subject for subject in tables.ids if subject in beginnings]
+    in_folders = [subject for subject in tables.ids if subject in candidate.file.parts[:-1]]
     return [max(in_name, key=len)] if in_name else in_folders
 
 
 def _similar_ids(subject: str, tables: ScanTables, *, only_similar: bool = False) -> str:
     """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
-    ids = {row.subject: row.place for table in tables.tables for row in table.rows}
+    ids = tables.ids
     similar = [f"{name} ({ids[name]})" for name in ids if _plain_id(name) == _plain_id(subject)]
     found = ", ".join(similar or ([] if only_similar else [*list(ids)[:5], "…"]))
     return (
@@ -464,7 +474,7 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
     """Return the entry of a label volume: its id, file and scheme; InputError if the scheme is unknown or unclear."""
     if scheme not in (None, *SCHEMES):
         raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
-    entry = {"id": _Candidate(file, {}).scan, "labels": str(file), "scheme": UNSET}
+    entry = {"id": _scan_of(file), "labels": str(file), "scheme": UNSET}
     fits = scheme_fits(read_label_volume(file, cropped=True).labels)
     fitting = [name for name, against in fits.items() if not against]
     if scheme and fitting and scheme not in fitting:

@@ -58,12 +58,16 @@ AMBIGUOUS_ENDING = re.compile(
 
 @dataclass(frozen=True)
 class AgeColumn:
-    """A column of ages, with its unit, and the problem if it cannot be used."""
+    """A column of ages, with its unit, and the problem if it cannot be used.
+
+    `is_other` is whether the problem is that its ages are not gestational ones at the scan.
+    """
 
     name: str
     kind: Kind
     unit: str
     problem: str
+    is_other: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,12 +86,16 @@ class TableAge:
 
 @dataclass(frozen=True)
 class ScanAge:
-    """The age of a scan in weeks with its source and columns, or None with the cause."""
+    """The age of a scan in weeks with its source and columns, or None with the cause.
+
+    `named` is its text if it is from a name.
+    """
 
     week: float | None
     source: str = ""
     cause: str = ""
     columns: frozenset[str] = frozenset()
+    named: str = ""
 
 
 def column_key(name: str) -> str:
@@ -135,7 +143,8 @@ def age_columns(names: Iterable[str], sidecar: Any, sidecar_name: str) -> list[A
     return columns
 
 
-def _unit(kind: Kind, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str]:
+def _unit(kind: Kind, ending: str, described: Mapping[str, Any], sidecar_name: str) -> tuple[str, str, bool]:
+    """Return the unit of a column, its problem or "", and whether that is another age than at the scan."""
     facts = {column_key(key): str(value).strip() for key, value in described.items()}
     text = f"{facts.get('long_name', facts.get('longname', ''))} {facts.get('description', '')}"
     in_text = re.search(r"\b(months?|years?)\b", text, re.IGNORECASE)
@@ -145,12 +154,12 @@ def _unit(kind: Kind, ending: str, described: Mapping[str, Any], sidecar_name: s
     reference = facts.get("age_reference", facts.get("agereference", ""))
     if len(units) > 1 or None in units:
         found = f"found the unit {' and '.join(names)}" if names else "has no unit"
-        return "weeks", f"{found}; expected Units weeks or days in {sidecar_name}"
+        return "weeks", f"{found}; expected Units weeks or days in {sidecar_name}", False
     is_other = kind in OTHER_DESCRIPTION and OTHER_DESCRIPTION[kind].search(text) and "plus" not in text
     if is_other or OTHER_TYPE.search(reference):
         found = reference or text.strip()
-        return "weeks", f"is not a gestational age at the scan: {sidecar_name} has {found!r}"
-    return str(units.pop()), ""
+        return "weeks", f"is not a gestational age at the scan: {sidecar_name} has {found!r}", True
+    return str(units.pop()), "", False
 
 
 def unit_of(name: str) -> str | None:
@@ -201,7 +210,7 @@ def choose_age(ages: Sequence[TableAge], notation: WeekNotation | None, marks: S
 
 def _shows_birth(age: TableAge) -> bool:
     """Return whether an age (at the scan or since birth) shows that a gestational one is at birth."""
-    is_since_birth = age.column.kind == "postnatal" or "not a gestational age" in age.column.problem
+    is_since_birth = age.column.kind == "postnatal" or age.column.is_other
     return age.column.kind == "scan" or (is_since_birth and not is_missing(age.text))
 
 
@@ -253,5 +262,5 @@ def week_in_name(parts: Sequence[str], notation: WeekNotation | None = None) -> 
     if len({week for week, _ in found.values()}) > 1:
         return ScanAge(None, cause=f"the names give several ages: found {' and '.join(found)}; expected one")
     for text, (week, problem) in found.items():
-        return ScanAge(week, f"name ({text})", f"the name: {problem}" if problem else "")
+        return ScanAge(week, f"name ({text})", f"the name: {problem}" if problem else "", named=text)
     return ScanAge(None)

@@ -85,7 +85,8 @@ class Table:
         )
         for column in self.ages:
             if kinds and OTHER_TYPE.search(kinds[0]):
-                column = replace(column, problem=f"is not a gestational age: its type (age_type) is {kinds[0]}")
+                problem = f"is not a gestational age: its type (age_type) is {kinds[0]}"
+                column = replace(column, problem=problem, is_other=True)
             elif units and column_key(column.name) == "age":
                 unit = unit_of(units[0])
                 problem = "" if unit else f"found the unit {units[0]}; expected weeks or days"
@@ -114,7 +115,8 @@ class ScanFacts:
 def read_table_of_scans(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or has no ids.
 
-    A table in a folder `sub-…` applies to the folder around it, another one to its own.
+    A table of sessions or scans in a folder `sub-…` is of this subject, and applies to the folder around it. Another
+    table applies to its own folder.
     """
     empty = _empty_table(path)
     texts = read_text_table(path)
@@ -150,13 +152,14 @@ def read_table_of_scans(path: Path) -> Table:
 
 
 def _empty_table(path: Path) -> Table:
-    name = TABLE_NAME.fullmatch(path.name)
-    folders = [part for part in path.parent.parts if SUBJECT_FOLDER.fullmatch(part)]
-    subject = name[1] if name and name[1] else folders[-1] if folders else None
-    scope = path.parent
-    while folders and any(SUBJECT_FOLDER.fullmatch(part) for part in scope.parts[-3:]):
-        scope = scope.parent
-    return Table(path, data_set_of(scope), subject.removeprefix("sub-") if subject else None)
+    name, folder = TABLE_NAME.fullmatch(path.name), path.parent
+    subject = name[1] if name else None
+    if name and not path.name.lower().startswith("participants."):
+        # the table of a session may be in its folder, or in one within it
+        around = (place for place in path.parents[:3] if SUBJECT_FOLDER.fullmatch(place.name))
+        if own := next(around, None):
+            subject, folder = subject or own.name, own.parent
+    return Table(path, data_set_of(folder), subject.removeprefix("sub-") if subject else None)
 
 
 def data_set_of(folder: Path) -> Path:
@@ -180,24 +183,36 @@ class ScanTables:
     @cached_property
     def ambiguity(self) -> str:
         """The problem that all ages may be either decimals or weeks and days, or ""."""
-        ages = [age for table in self.tables for row in table.rows for age in table.ages_in(row)]
-        kinds = [age.column.kind for age in ages if age.column.kind != "postnatal"]
+        kinds = [age.column.kind for age in self._ages if age.column.kind != "postnatal"]
         first = min(kinds, key=["scan", "gestational", "age"].index, default="age")
-        texts = [age.text for age in ages if age.column.kind == first and age.column.unit == "weeks"]
+        texts = [age.text for age in self._ages if age.column.kind == first and age.column.unit == "weeks"]
         return ambiguity_of(texts) if self.notation is None else ""
 
     @cached_property
     def ages_at_scans(self) -> list[TableAge]:
         """The ages that are named as at a scan."""
-        ages = (age for table in self.tables for row in table.rows for age in table.ages_in(row))
-        return [age for age in ages if age.column.kind == "scan" and not is_missing(age.text)]
+        return [age for age in self._ages if age.column.kind == "scan" and not is_missing(age.text)]
+
+    @cached_property
+    def ids(self) -> dict[str, str]:
+        """The last row of each subject, for messages."""
+        return {subject: rows[-1][1].place for subject, rows in self._by_subject.items()}
+
+    @cached_property
+    def _ages(self) -> list[TableAge]:
+        return [age for table in self.tables for row in table.rows for age in table.ages_in(row)]
+
+    @cached_property
+    def _by_subject(self) -> dict[str, list[tuple[Table, Row]]]:
+        rows: dict[str, list[tuple[Table, Row]]] = {}
+        for table in self.tables:
+            for row in table.rows:
+                rows.setdefault(row.subject, []).append((table, row))
+        return rows
 
     def rows_of(self, subject: str, place: Path | None = None) -> list[tuple[Table, Row]]:
         """Return the rows of a subject, with their tables, in the tables that apply to a file (default: in all)."""
-        return [(table, row) for table in self._tables_of(place) for row in table.rows if row.subject == subject]
-
-    def _tables_of(self, place: Path | None) -> list[Table]:
-        return [table for table in self.tables if place is None or place.is_relative_to(table.scope)]
+        return [(table, row) for table, row in self._by_subject.get(subject, ()) if _applies(table, place)]
 
     def facts(
         self, subject: str, session: str | None, is_only_scan: bool = True, place: Path | None = None
@@ -207,7 +222,8 @@ class ScanTables:
         A row without a session is of a subject's only scan.
         """
         own = self.rows_of(subject, place)
-        unread = [table for table in self._tables_of(place) if table.problem and table.subject in (None, subject)]
+        unread = [table for table in self.tables if table.problem and table.subject in (None, subject)]
+        unread = [table for table in unread if _applies(table, place)]
         if not own and not unread:
             return None
         sessions = list(dict.fromkeys(row.session for _, row in own if row.session is not None))
@@ -235,6 +251,10 @@ class ScanTables:
         if age.week is None and not age.cause:
             return _unknown(_missing_age(own, ages, session, sessions))
         return ScanFacts(age, {key: text for key, text in values.items() if key not in age.columns})
+
+
+def _applies(table: Table, place: Path | None) -> bool:
+    return place is None or place.is_relative_to(table.scope)
 
 
 def ambiguity_of(texts: Iterable[str]) -> str:
@@ -312,11 +332,13 @@ def participants_brains(
             else:
                 entries.append(entry)
                 sources[scan] = facts.age.source
+    by_files: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
-        source = [entry["subject"], *(entry.get(key) for key in SOURCES)]
-        same = [each["id"] for each in entries if [each["subject"], *(each.get(key) for key in SOURCES)] == source]
-        if len(same) > 1:
-            cause = f"{path}: {entry['id']}: {' and '.join(same)} have the same files; expected files of each session"
+        by_files.setdefault(repr([entry["subject"], *(entry.get(key) for key in SOURCES)]), []).append(entry)
+    for same in (group for group in by_files.values() if len(group) > 1):
+        found = " and ".join(entry["id"] for entry in same)
+        for entry in same:
+            cause = f"{path}: {entry['id']}: {found} have the same files; expected files of each session"
             left_out[entry["id"]] = {"week": entry["week"], "cause": cause}
     entries = [entry for entry in entries if entry["id"] not in left_out]
     return entries, left_out, sources

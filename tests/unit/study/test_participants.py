@@ -179,3 +179,13 @@ def test_a_participant_has_a_brain_for_each_session(folder):
         ("sub-2_ses-2", 23.5, "sub-2"),
     ]
     assert resolve(found).scans == {"sub-1": ["sub-1_ses-1", "sub-1_ses-2"], "sub-2": ["sub-2_ses-1", "sub-2_ses-2"]}
+
+
+@pytest.mark.fault(80)
+@pytest.mark.parametrize("place", ["sub-x", "sub-x/study", "sub-x/a/b"])
+def test_a_table_of_participants_in_a_folder_of_one_subject_has_any_participants(tmp_path, place):
+    (tmp_path / place / "bids").mkdir(parents=True)
+    (tmp_path / place / "bids" / "a.nii.gz").touch()
+    head = ("participant_id", "scan_age", "files", "scheme")
+    write(tmp_path / place, head, ("sub-1", "24.5", "a.nii.gz", "feta-7"), ("sub-2", "25", "a.nii.gz", "feta-7"))
+    assert {brain.id: brain.week for brain in config(tmp_path / place).brains} == {"sub-1": 24.5, "sub-2": 25}
