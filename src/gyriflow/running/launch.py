@@ -311,6 +311,9 @@ def main(arguments: Sequence[str]) -> int:
     # in the working directory, where jobs on other machines of a cluster find it too
     folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
     exit_file = folder / f"gyriflow-exit-{os.getpid()}"
+    # a killed run may have had the same process number, as in containers
+    with suppress(OSError):
+        exit_file.unlink()
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
     has_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
     complete = [*([] if has_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]

@@ -1,5 +1,9 @@
 """What `gyriflow check` says of input files, of the mesh and of what a study takes, and what it leaves behind."""
 
+import os
+import tempfile
+from pathlib import Path
+
 import nibabel as nib
 import numpy as np
 import pytest
@@ -121,6 +125,13 @@ def test_a_look_leaves_nothing_behind(tmp_path):
     ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert not any(character.isdigit() for character in said)
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+
+
+def test_the_exit_code_of_an_earlier_process_with_the_same_number_does_not_count(tmp_path):
+    config = tmp_path / "a.yaml"
+    config.write_text("brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\n")
+    Path(tempfile.gettempdir(), f"gyriflow-exit-{os.getpid()}").write_text("3")
+    assert plan(config, tmp_path / "new", ["surface"])
 
 
 @pytest.mark.fault(75)
