@@ -38,7 +38,7 @@ BY_TESTS = {
         ("src/gyriflow/study/study.py", "return min(sources, key", "return max(sources, key"),
         ("src/gyriflow/study/records.py", "brain.sides == self.sides", "True"),
         ("src/gyriflow/study/series.py", "all(brain.sides == start.sides for brain in brains)", "True"),
-        ("src/gyriflow/study/figures.py", "MIN_NORM_AVERAGES, MAX_SERIES = 10,", "MIN_NORM_AVERAGES, MAX_SERIES = 19,"),
+        ("src/gyriflow/settings/terms.py", "10 if individuals", "19 if individuals"),
     ],
     "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],

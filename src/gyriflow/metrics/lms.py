@@ -16,8 +16,6 @@ from scipy.optimize import brentq, minimize
 
 from ..geometry.triangles import Floats
 
-MIN_SUBJECTS = 10
-"""With fewer subjects there are no centiles."""
 MIN_SUBJECTS_FOR_CURVES = 30
 """With fewer subjects the relative scatter is the same at all weeks, and centiles are cut at `FEW_CENTILES`."""
 FEW_CENTILES = (5.0, 95.0)

@@ -12,15 +12,12 @@ from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
-from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side
-from .lms import FEW_CENTILES, INTERVAL_Z, MIN_SUBJECTS, WeeklyNorm, fit_norm, norm_from_plain
+from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side, min_norm_subjects
+from .lms import FEW_CENTILES, INTERVAL_Z, WeeklyNorm, fit_norm, norm_from_plain
 from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
-
-MIN_AVERAGES = 5
-"""Minimum number of an atlas' average brains for a curve."""
 
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
@@ -213,11 +210,11 @@ def cohort_norms(
 
     `metrics` has the columns subject (the brain), run, week, hemisphere, metric, value, unit, and person (the subject
     scanned; may be absent if no one was scanned twice). All scans of a subject together have the weight of one.
-    Metrics with fewer than `MIN_SUBJECTS` individuals, or `MIN_AVERAGES` averages, have no norm.
+    Metrics with fewer subjects than `min_norm_subjects` have no norm.
     """
     norms = {}
     for name, brains in _by_metric(metrics, reference):
-        if brains["person"].nunique() >= (MIN_SUBJECTS if individuals else MIN_AVERAGES):
+        if brains["person"].nunique() >= min_norm_subjects(individuals=individuals):
             norms[name] = (str(brains["unit"].iloc[0]), _fit(brains, name[1]))
     return CohortNorms(norms, individuals, made_with or {})
 
@@ -277,7 +274,7 @@ def _score(
     if brains is not None:
         is_own = brains["person"] == person
         own, remaining = brains[is_own], brains[~is_own]
-        if (subjects := remaining["person"].nunique()) < (MIN_SUBJECTS if cohort.individuals else MIN_AVERAGES):
+        if (subjects := remaining["person"].nunique()) < min_norm_subjects(individuals=cohort.individuals):
             return _no_score("too few brains", subjects)
         scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
         if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > MAX_ONE_STEP_Z:

@@ -98,6 +98,12 @@ MIN_KEPT_CURVATURE = 0.8
 FOLD_BANDS = (4, 5, 6)
 """Bands of the primary, secondary and tertiary folds (Germanaud et al. 2012)."""
 
+
+def min_norm_subjects(*, individuals: bool) -> int:
+    """Return how many subjects a norm needs at least: individuals, or average brains as in an atlas."""
+    return 10 if individuals else 5
+
+
 # scores of calibration
 
 SpectralScore = Literal["relative_power_b4", "relative_power_b5", "relative_power_b6", "spectral_distance"]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from ..settings.terms import MAX_COLOURS, run_names
+from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
 from .comparison_figures import comparison_figures
 from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY
 from .records import Brain, Simulation
@@ -25,7 +25,7 @@ from .study import Study
 BRAIN_FIGURES = f"{BRAIN}/figures"
 ZONES = {"contact", "no_growth", "support"}
 """Settings that determine the zones of a run. Runs with equal ones share a figure of the zones."""
-MIN_NORM_SUBJECTS, MIN_NORM_AVERAGES, MAX_SERIES = 10, 5, 4
+MAX_SERIES = 4
 
 
 def figures_of(study: Study) -> list[Figure]:
@@ -367,7 +367,7 @@ def _metric_figures(study: Study) -> Iterator[Figure]:
         yield Figure(METRICS_TABLE, metrics, {"observed_name": observed_name(study.brains.values())})
     yield Figure(SPECTRA, spectra, options)
     reference = study.norm_reference
-    needed = MIN_NORM_SUBJECTS if study.are_individuals(reference) else MIN_NORM_AVERAGES
+    needed = min_norm_subjects(individuals=study.are_individuals(reference))
     if study.config.metrics.norms or len({study.brains[brain].subject for brain in reference}) >= needed:
         yield norms_figure(study, options)
 
