@@ -128,7 +128,7 @@ def read_table_of_scans(path: Path) -> Table:
         raise InputError("has no column of ids", path=path, found=", ".join(columns), expected=expected)
     session = next((names[key] for key in SESSIONS if key in names), None)
     common = path.stem.rpartition("_")[2].lower() + ".json"
-    folders = dict.fromkeys((path.parent, *(parent for parent in path.parents[1:3] if path.stem != common)))
+    folders = [folder for folder in path.parents[:3] if folder.is_relative_to(empty.scope)]
     beside = (file for folder in folders for file in sorted(folder.glob("*.[jJ][sS][oO][nN]")))
     sidecar: Any = next(
         (read_json(file) for file in beside if file.name.lower() in (f"{path.stem.lower()}.json", common)), {}
