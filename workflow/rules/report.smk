@@ -134,8 +134,7 @@ rule html_report:
         prediction=study.prediction_facts,
         surfaces=SURFACES,
         observed_name=observed_name(VIEWED),
-        norm=CONFIG.metrics.norms
-        or observed_name(study.brains[brain] for brain in study.norm_reference),
+        norm=CONFIG.metrics.norms or observed_name(study.brains[brain] for brain in study.norm_reference),
         config=study.used_settings,
     script:
         "../scripts/html_report.py"

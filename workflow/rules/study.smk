@@ -24,8 +24,8 @@ rule metrics_tables:
         # norms of another study
         cohort=[CONFIG.metrics.norms] if CONFIG.metrics.norms else [],
     output:
-        norms=f"{STUDY}/norms.json",
         **{name: f"{STUDY}/{name}.csv" for name in METRICS_TABLES},
+        norms=f"{STUDY}/norms.json",
     log:
         f"{STUDY}/logs/metrics_tables.log",
     benchmark:
