@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.expected import carry_sharply, predict_shapes, sizes_of
 from gyriflow.io.registrations import WeeklyShapes, read_correspondence, write_weekly_shapes
@@ -25,9 +26,13 @@ with step(snakemake.log[0]):
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
     if snakemake.wildcards.origin == "self":
-        weeks, positions, further = [params.start_week, *params.weeks], carry_sharply(mesh, pairs, surfaces), {}
+        weeks, positions, further = (
+            [params.start_week, *params.weeks],
+            carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh)),
+            {},
+        )
     else:
         inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, further = predict_shapes(mesh, *inputs)
+        weeks, positions, further = predict_shapes(mesh, *inputs, body_of=ElasticFit)
     targets = WeeklyShapes(np.array(weeks), positions, sizes_of(mesh, positions), further)
     write_weekly_shapes(snakemake.output[0], targets)

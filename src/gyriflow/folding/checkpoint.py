@@ -44,7 +44,8 @@ class State:
     correction
         Feedback of the last step to growth by sizes (`StepGrowth.correction`).
     log_growth, log_growth_s
-        Logarithm (6, n) of growth since the last output week, unless growth is by rates, and the time since then.
+        Logarithm (6, n) of growth since the last output week, in axes that turn with the tissue, unless growth is by
+        rates, and the time since then.
     rows
         The step table so far.
     """
@@ -93,12 +94,8 @@ class State:
     ) -> "State":
         """Return the state after an accepted step with its displacement (n, 3) in m.
 
-        The other arguments are as the attributes, but `log_growth` is that of this step alone.
+        The other arguments are as the attributes.
         """
-        if log_growth is None:
-            log_growth = self.log_growth
-        elif self.log_growth is not None:
-            log_growth = self.log_growth + log_growth
         return replace(
             self,
             positions=self.positions + displacement,

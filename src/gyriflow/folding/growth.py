@@ -92,6 +92,13 @@ class StepGrowth(ABC):
         """Return ln G (6, n) at all vertices, None if growth is by the rates of the parameters."""
         return None
 
+    def added_to(self, log_growth: Floats | None, displacement_mm: Floats) -> Floats | None:
+        """Return the sum (6, n) of a growth before this step, if any, and of this step's growth.
+
+        Its axes turn with the tissue in the step's displacement (n, 3). None if growth is by rates.
+        """
+        return None
+
     def correction(self, after: Size) -> tuple[float, ...] | None:
         """Return the feedback to the next steps after a step that has reached a size, None without feedback."""
         return None

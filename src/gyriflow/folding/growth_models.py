@@ -13,7 +13,7 @@ from .targets import GrowthToTargets
 BUILDERS: dict[str, Callable[[FoldingParameters, GrowthInputs, Floats, Share], StepModel]] = {
     "rates": lambda p, inputs, positions_mm, share: partial(GrowthByRates, p),
     "sizes": lambda p, inputs, positions_mm, share: SteeredGrowth(p, inputs, inputs.size(positions_mm)).growth,
-    "shapes": lambda p, inputs, positions_mm, share: GrowthToTargets.of(p, inputs, share).growth,
+    "shapes": lambda p, inputs, positions_mm, share: GrowthToTargets.of(p, inputs, positions_mm, share).growth,
 }
 """Functions that return a model, given the parameters, inputs, (n, 3) start positions and this rank's share of work."""
 

@@ -110,7 +110,8 @@ class Folding:
             "rung": RUNGS[solution.rung],
         }
         self.solved = SolvedStep(u, step_s, growth)
-        after = state.after(displacement, step_s, row, stretch, growth.correction(size), growth.logarithm())
+        log_growth = growth.added_to(state.log_growth, displacement * MM_PER_M)
+        after = state.after(displacement, step_s, row, stretch, growth.correction(size), log_growth)
         row["seconds"] = time.monotonic() - began
         return after
 

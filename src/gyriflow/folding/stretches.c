@@ -1,4 +1,4 @@
-// The stretches of tetrahedra, and their stiffness to diffusion.
+// The stretches and rotations of tetrahedra, and their stiffness to diffusion.
 
 #include <math.h>
 #include <stdint.h>
@@ -42,5 +42,25 @@ void stretch(long count, double small, const int64_t (*tets)[4], const double (*
         double share_of_corner[7] = {share * log[0][0], share * log[1][1], share * log[2][2],
                                share * log[0][1], share * log[0][2], share * log[1][2], volume / 4};
         EACH(a, 4) EACH(i, 7) sums[n[a]][i] += share_of_corner[i];
+    }
+}
+
+// Adds V/4 times the axial vector of F and V/4 to the `sums` (., 4) of the corners of `count` elements.
+void rotation(long count, const int64_t (*tets)[4], const double (*X)[3], const double (*x)[3], double (*sums)[4]) {
+    for (long e = 0; e < count; e++) {
+        const int64_t *n = tets[e];
+        double edge[3][3], moved[3], slope[3], axial[3] = {0}, turned[3];
+        EACH(a, 3) EACH(i, 3) edge[a][i] = X[n[a + 1]][i] - X[n[0]][i];
+        cross(edge[1], edge[2], slope);
+        double volume = dot(edge[0], slope) / 6;
+        // half of the curl of x, times the volume
+        EACH(a, 3) {
+            cross(edge[(a + 1) % 3], edge[(a + 2) % 3], slope);
+            EACH(i, 3) moved[i] = x[n[a + 1]][i] - x[n[0]][i];
+            cross(slope, moved, turned);
+            EACH(i, 3) axial[i] += turned[i] / 12;
+        }
+        double share_of_corner[4] = {axial[0] / 4, axial[1] / 4, axial[2] / 4, volume / 4};
+        EACH(a, 4) EACH(i, 4) sums[n[a]][i] += share_of_corner[i];
     }
 }

@@ -1,4 +1,4 @@
-"""Stretches of a mesh's elements under a displacement, and the stiffness matrix of diffusion on it, in C code."""
+"""Stretches and rotations of a mesh's elements under a displacement, and its matrix of diffusion, in C code."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial.transform import Rotation
 
 from ..geometry.diffusion import ALONE, Share
 from ..geometry.triangles import Floats, Ints
@@ -19,7 +20,8 @@ MAX_SERIES_NORM = 0.12
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 """Corners of an element's edges, in the order of the pairs in the C code."""
 DECLARATION = """void stretch(long count, double small, void *tets, void *X, void *x,
-                              void *sums, void *pairs, void *gradients, void *large);"""
+                              void *sums, void *pairs, void *gradients, void *large);
+void rotation(long count, void *tets, void *X, void *x, void *sums);"""
 
 
 class Stretches:
@@ -64,6 +66,20 @@ class Stretches:
         entries = np.concatenate([off_diagonal, off_diagonal, diagonal])[self._pattern.data]
         matrix = sparse.csr_matrix((entries, self._pattern.indices, self._pattern.indptr), shape=(count, count))
         return sums[:, :6], sums[:, 6], matrix
+
+    def rotations(self, positions: Floats, displacement: Floats) -> Rotation:
+        """Return the n rotations of the tissue at the vertices, means of the elements around them.
+
+        Positions and displacement are (n, 3) in mm. Shear must be small, as in a time step.
+        """
+        own = np.zeros((self._count, 4))
+        both = (np.ascontiguousarray(x, dtype=float) for x in (positions, positions + displacement))
+        self._code.rotation(len(self.tets), *map(self._interface.from_buffer, (self.tets, *both, own)))
+        sums = self.share.summed(own)
+        # the axial vector of a rotation has the length of its sine
+        axial = sums[:, :3] / np.where(sums[:, 3:] > 0, sums[:, 3:], 1.0)
+        sine = np.minimum(np.linalg.norm(axial, axis=1, keepdims=True), 1.0)
+        return Rotation.from_rotvec(axial * np.where(sine > 0, np.arcsin(sine) / np.where(sine > 0, sine, 1.0), 1.0))
 
 
 def log_stretch(F: NDArray[np.floating]) -> Floats:

@@ -1,14 +1,18 @@
-"""Growth towards known shapes: in each step the growth that takes the brain towards its next target.
+"""Growth towards known shapes: in each step the growth that keeps the brain on a path through its targets.
 
 This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result, and mechanics shows whether
-such growth is possible. Growth that smoothing and mechanics prevent in a step is made up for in the next ones.
+such growth is possible. docs/model.md has the equations. The path X*(t) is smooth in time, and the growth of a step is
+the smoothed stretch of its velocity plus feedback: what smoothing and mechanics prevent is made up for with a time
+constant, so that growth and stress have limits as the time step tends to zero.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import CubicHermiteSpline
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
@@ -17,14 +21,16 @@ from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
 from ..settings.folding import AXES, FoldingParameters
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
-from .stress import unpacked
+from .stress import packed, unpacked
 from .stretches import Stretches
 from .tissue import Tissue
 
-SMOOTHING_MM = 1.5
+SMOOTHING_MM = 0.75
 """Standard deviation of the spatial smoothing of growth."""
 SMOOTHING_TOL = 1e-3
-"""Relative tolerance of smoothing; the next step makes up for the error."""
+"""Relative tolerance of smoothing; feedback makes up for the error."""
+FEEDBACK_GW = 0.5
+"""Time constant with which growth takes the brain back to its path."""
 WEEK_TOL_GW = 1e-6
 """Time before a target at which it counts as reached."""
 
@@ -33,12 +39,13 @@ WEEK_TOL_GW = 1e-6
 class TargetGrowth(StepGrowth):
     """Growth of a step towards a shape.
 
-    `strain` (6, n) is ln G at all vertices, `misfit_mm` the root mean square distance to the target at the start of the
+    `strain` (6, n) is ln G at all vertices, `misfit_mm` the root mean square distance to the path at the start of the
     step, without rigid motion.
     """
 
     strain: Floats
     misfit_mm: float
+    stretches: Stretches
 
     def inverse(self, tissue: Tissue) -> Floats:
         elements = tissue.elements
@@ -51,57 +58,69 @@ class TargetGrowth(StepGrowth):
     def logarithm(self) -> Floats:
         return self.strain
 
+    def added_to(self, log_growth: Floats | None, displacement_mm: Floats) -> Floats:
+        total = self.strain if log_growth is None else log_growth + self.strain
+        turn = self.stretches.rotations(self.start.positions_mm, displacement_mm).as_matrix()
+        return packed(turn @ unpacked(total.T) @ np.swapaxes(turn, 1, 2)).T
+
     def row(self, after: Size) -> dict[str, Any]:
-        return super().row(after) | {"to_target_mm": self.misfit_mm}
+        return super().row(after) | {"to_path_mm": self.misfit_mm}
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthToTargets:
-    """The model of growth towards shapes of the whole mesh at later weeks.
+    """The model of growth along a path through shapes of the whole mesh at later weeks.
 
-    The run's maps contain the shapes, in any pose; `stretches` are those of the moving mesh.
+    The run's maps contain the shapes, in any pose; `path` leads through them, from the start. `stretches` are those of
+    the moving mesh.
     """
 
     parameters: FoldingParameters
     inputs: GrowthInputs
+    path: CubicHermiteSpline
     stretches: Stretches
 
     @classmethod
-    def of(cls, p: FoldingParameters, inputs: GrowthInputs, share: Share) -> "GrowthToTargets":
-        """Return the model of a run whose maps contain the targets that its parameters name."""
+    def of(cls, p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats, share: Share) -> "GrowthToTargets":
+        """Return the model of a run from (n, 3) positions; its maps contain the targets that its parameters name."""
         if (last := max(p.targets)) < p.end_week - WEEK_TOL_GW:
             raise InputError(
                 "the target shapes of the run end before it does",
                 found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        return cls(p, inputs, Stretches(inputs.pieces, len(inputs.zones.growth), share))
+        shapes = {p.start_week: positions_mm}
+        for week in sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW):
+            shapes[week] = np.stack([inputs.maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1)
+        path = path_through(list(shapes), list(shapes.values()), vertex_sizes(positions_mm, inputs.pieces))
+        return cls(p, inputs, path, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> StepGrowth:
-        """Return the growth of a step: its share of the misfit to the next target.
-
-        A step that crosses a target goes on towards the next one.
-        """
-        week, end, positions = start.week(self.parameters, 0.0), start.week(self.parameters, 1.0), start.positions_mm
+        """Return the growth of a step: that of the path, and of the part of the misfit that feedback makes up for."""
+        p, positions = self.parameters, start.positions_mm
+        week, end = (min(start.week(p, part), float(self.path.x[-1])) for part in (0.0, 1.0))
         sizes = vertex_sizes(positions, self.inputs.pieces)
-        targets = self.parameters.targets
-
-        def aligned(target: float, fixed: Floats) -> Floats:
-            shape = np.stack([self.inputs.maps[f"{targets[target]}_{axis}"] for axis in AXES], axis=1)
-            return transform_points(shape, rigid_fit(shape, fixed, sizes))
-
-        later = sorted(target for target in targets if target > week + WEEK_TOL_GW) or [max(targets)]
-        misfit = aligned(later[0], positions) - positions
-        reached, reached_week = positions, week
-        while len(later) > 1 and later[0] < end - WEEK_TOL_GW:
-            reached_week = later.pop(0)
-            reached = aligned(reached_week, positions)
-        part = min(1.0, (end - reached_week) / max(later[0] - reached_week, WEEK_TOL_GW))
-        goal = reached + part * (aligned(later[0], reached) - reached)
+        motion = rigid_fit(self.path(week), positions, sizes)
+        now, later = (transform_points(self.path(at), motion) for at in (week, end))
+        misfit = now - positions
+        goal = later - np.exp(-(end - week) / FEEDBACK_GW) * misfit
         strain = log_growth(positions, self.stretches, goal - positions, SMOOTHING_MM)
         misfit_mm = float(np.sqrt(np.average((misfit**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
-        return TargetGrowth(self.parameters, start, (strain * growing).T, misfit_mm)
+        return TargetGrowth(p, start, (strain * growing).T, misfit_mm, self.stretches)
+
+
+def path_through(weeks: Sequence[float], shapes: Sequence[Floats], sizes: Floats) -> CubicHermiteSpline:
+    """Return a path through (n, 3) shapes in mm at ascending weeks, as a function of the week.
+
+    Each shape is first aligned rigidly to the one before, its points weighted by their (n,) sizes. The velocity is
+    continuous: at each week that of the parabola through this shape and its neighbours, at the ends the mean velocity
+    to the neighbour.
+    """
+    aligned = [shapes[0]]
+    for shape in shapes[1:]:
+        aligned.append(transform_points(shape, rigid_fit(shape, aligned[-1], sizes)))
+    return CubicHermiteSpline(weeks, np.stack(aligned), np.gradient(np.stack(aligned), weeks, axis=0))
 
 
 def log_growth(positions: Floats, stretches: Stretches, displacement: Floats, smoothing_mm: float) -> Floats:

@@ -44,11 +44,14 @@ def vertex_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
     return np.bincount(cells.ravel(), share, minlength=len(vertices)).astype(np.float64)
 
 
-def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float) -> Floats:
+def diffuse(
+    vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_mm: float, tolerance: float = 1e-8
+) -> Floats:
     """Smooth (n,) or (n, k) values along the mesh, as a Gaussian of standard deviation `sigma_mm` would.
 
     Implicit steps of the heat equation over the time σ²/2, with linear finite elements and lumped mass, preserve the
-    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted.
+    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. `tolerance` is
+    that of `conjugate_gradients`.
     """
     if sigma_mm == 0:
         return values.copy()
@@ -57,7 +60,7 @@ def diffuse(vertices: Floats, cells: NDArray[np.integer], values: Floats, sigma_
     matrix = sparse.csr_matrix(sparse.diags(mass) + sigma_mm**2 / 2 / STEPS * stiffness_matrix(vertices, cells))
     smooth: Floats = values.reshape(len(values), -1).astype(float)
     for _ in range(STEPS):
-        smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, 1e-8)
+        smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
     return smooth.reshape(values.shape)
 
 

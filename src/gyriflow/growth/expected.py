@@ -1,7 +1,8 @@
 """Predict a brain's later shapes: carry its mesh through an atlas and keep its individual differences."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
+from typing import Protocol
 
 import numpy as np
 
@@ -16,10 +17,16 @@ from ..settings.growth import BEFORE_GW
 from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
 
-PULL_MM = (4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 1.0)
+PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
+PULL_TOL = 1e-3
+"""Relative tolerance of that smoothing; the next round makes up for the error."""
+AGAIN_MM = (1.0, 1.0)
+"""The same for the fit of a body that is close to the surface."""
 REACH_MM = 4.0
 """Largest distance over which a surface pulls."""
+CONTINUATION_TOL = 1e-4
+"""Relative tolerance of the harmonic continuation that a body follows."""
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""
 FADING_GW = 4.0
@@ -27,16 +34,25 @@ FADING_GW = 4.0
 (docs/science.md)."""
 
 
-def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
+class FittedBody(Protocol):
+    """A mesh that is drawn to shapes, without inverted elements and crossing faces (`folding.elastic_fit`)."""
+
+    @property
+    def boundary(self) -> TriangleMesh: ...
+    def follow(self, shape: Floats) -> Floats: ...
+    def draw(self, goals: Floats) -> Floats: ...
+
+
+def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh, pull_mm: Sequence[float] = PULL_MM) -> Floats:
     """Deform a surface smoothly onto another one close to it; return its (n, 3) vertices in mm.
 
     Each round pulls the vertices to the nearest points of the other surface whose normals agree. Vertices of the other
     surface also pull their nearest points, so that the fundus of a sulcus has an effect although it is nearest to no
-    vertex. The pull is smoothed along the moving surface.
+    vertex. The pull is smoothed along the moving surface, in each round as `pull_mm` says.
     """
     vertices, faces = moving.vertices, moving.faces
     normals, areas = vertex_normals(surface), vertex_areas(surface)
-    for spread in PULL_MM:
+    for spread in pull_mm:
         moved = TriangleMesh(vertices, faces)
         moved_areas = vertex_areas(moved)
         forward = match_points(vertices, vertex_normals(moved), surface)
@@ -47,9 +63,8 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
         misfit = surface.vertices - values_at(backward, vertices)
         np.add.at(weight, backward.corners, shares)
         np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
-        smooth = diffuse(
-            vertices, faces, np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None], spread
-        )
+        pulled = np.column_stack([pull, weight]) / np.maximum(moved_areas, 1e-9)[:, None]
+        smooth = diffuse(vertices, faces, pulled, spread, PULL_TOL)
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
         # a mean of pulls is at most as long as these; near obtuse faces smoothed weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
@@ -58,7 +73,10 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh) -> Floats:
 
 
 def carry_sharply(
-    mesh: TetrahedralMesh, pairs: Sequence[Correspondence], surfaces: Sequence[TriangleMesh] | None
+    mesh: TetrahedralMesh,
+    pairs: Sequence[Correspondence],
+    surfaces: Sequence[TriangleMesh] | None,
+    body: FittedBody | None = None,
 ) -> Floats:
     """Carry a mesh's vertices through w brains with its boundary fitted to theirs; return (w + 1, n, 3) positions.
 
@@ -66,29 +84,43 @@ def carry_sharply(
     Therefore the boundary is fitted to that brain's surface week by week, and the inside is continued harmonically.
     Matched surfaces need no fit: the boundary keeps its place relative to them.
 
+    Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
+    week to a shape that has not, and is fitted to the surface once more from there; the next week starts from it.
+
     The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
     of the later brains, all in the spaces of these correspondences. Without surfaces nothing is fitted.
 
     InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
-    extend = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)
+    pieces = linear_pieces(mesh)
+    extend = harmonic_continuation(mesh.vertices, pieces, used)
     positions = [mesh.vertices]
 
-    def move_boundary(places: Floats, moved: Floats) -> None:
-        positions.append(places + extend(moved - places[used]))
-
-    for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
-        numbered, before = list(group), positions[-1]
+    def carried(numbered: Sequence[tuple[int, Correspondence]]) -> Iterator[tuple[Floats, Floats, int | None]]:
+        """Yield (n, 3) places after each pair of one kind, the boundary's there, and the surface it is fitted to."""
         if matched := [pair for _, pair in numbered if isinstance(pair, MatchedSurfaces)]:
-            for moved in follow_surfaces(TriangleMesh(before[used], boundary.faces), matched)[1:]:
-                move_boundary(before, moved)
+            for moved in follow_surfaces(TriangleMesh(positions[-1][used], boundary.faces), matched)[1:]:
+                yield positions[-1], moved, None
         for number, pair in numbered:
             if isinstance(pair, Deformation):
                 places = carry_over_weeks(positions[-1], [pair])[-1]
-                carried = TriangleMesh(places[used], boundary.faces)
-                fitted = carried.vertices if surfaces is None else fit_onto_surface(carried, surfaces[number])
-                move_boundary(places, fitted)
+                moved, surface = places[used], None if surfaces is None else number
+                if surfaces is not None:
+                    moved = fit_onto_surface(TriangleMesh(moved, boundary.faces), surfaces[number])
+                yield places, moved, surface
+
+    for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
+        for places, moved, surface in carried(list(group)):
+            if body is not None:
+                # on the shape of the week before, which has no inverted elements
+                extend = harmonic_continuation(positions[-1], pieces, used, CONTINUATION_TOL)
+            shape = places + extend(moved - places[used])
+            if body is not None:
+                shape = body.follow(shape)
+                if surfaces is not None and surface is not None:
+                    shape = body.draw(fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM))
+            positions.append(shape)
     return np.stack(positions)
 
 
@@ -156,6 +188,7 @@ def predict_shapes(
     surfaces: Sequence[TriangleMesh],
     weeks: Sequence[float],
     also: Sequence[float] = (),
+    body_of: Callable[[TetrahedralMesh], FittedBody] | None = None,
 ) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
@@ -164,11 +197,15 @@ def predict_shapes(
 
     `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
     `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
-    further weeks.
+    further weeks. `body_of` makes bodies of the mesh, which follow the atlas' shapes and the predicted ones; without
+    it, elements of these may be inverted.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    carried = carry_sharply(mesh, pairs, surfaces)[1:]
+    carried = carry_sharply(mesh, pairs, surfaces, body_of(mesh) if body_of else None)[1:]
     shape_weeks, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
+    if body_of:
+        body = body_of(mesh)
+        positions = np.stack([positions[0], *(body.follow(shape) for shape in positions[1:])])
     baselines = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
     for name, path in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
         _, places = expected_positions(mesh, start_week, path, weeks, also=also, smoothing_mm=0)

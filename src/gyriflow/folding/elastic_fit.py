@@ -1,0 +1,172 @@
+"""Elastic registration with contact: the finite-element brain is drawn to shapes that its elements can have.
+
+A shape made by carrying vertices along a registration may turn elements inside out, or move one bank of a sulcus
+through the other. Here the body itself does the fitting: it takes the smoothed stretch of that shape as growth, springs
+draw its boundary there, and elasticity and the contact barrier keep elements positive and folds apart. It is the same
+solver as that of a simulation; stress is forgotten after each step.
+"""
+
+import math
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..errors import SolverError
+from ..geometry.alignment import rigid_fit
+from ..geometry.deformations import transform_points
+from ..geometry.diffusion import vertex_sizes
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, signed_volumes
+from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas
+from ..mechanics.materials import MATERIALS
+from ..settings.terms import FREE
+from ..units import M_PER_MM, MM_PER_M
+from .contact import STIFFNESS_PER_MODULUS, SelfContact
+from .diagnosis import worst_places
+from .domain import Domain
+from .linear_solver import NotConvergedError
+from .newton import NewtonSettings, NewtonSolver
+from .problem import NonlinearProblem
+from .stress import unpacked
+from .stretches import Stretches
+from .targets import inverse_exponential, log_growth
+from .tissue import Elements
+from .zones import Zones
+
+MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
+"""Of the body that is fitted. The modulus only sets the unit of forces; a compressible body yields more evenly."""
+SPRING_LENGTH_MM = 3.3
+"""Shear modulus over the springs' stiffness: a spring holds as strongly as this depth of tissue. Springs a third as
+long halve the misfit, and take twice the iterations and the worst elements to a hundredth of their volume."""
+SMOOTHING_MM = 1.5
+"""Smoothing (SD, mm) of the stretch that the body grows by."""
+STEPS = 2
+"""Steps in which the body moves to a shape."""
+MAX_HALVINGS = 5
+"""Largest number of times that a step which fails is halved."""
+SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=30)
+"""Loose tolerances: the next step starts from where the body is."""
+
+
+class Springs:
+    """Springs from the nodes on the boundary to their goals, a contribution to the energy of a step.
+
+    `vertices` (b,) are the ascending vertices of the mesh that have a spring, `stiffness_pa_per_m` is per area.
+    """
+
+    def __init__(self, domain: Domain, vertices: Ints, stiffness_pa_per_m: float) -> None:
+        self._domain, self._stiffness = domain, stiffness_pa_per_m
+        owned = domain.vertex_of_node[: domain.n_owned]
+        place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
+        self._local = np.flatnonzero(vertices[place] == owned)
+        self._rows, self._vertices = place[self._local], vertices
+
+    def draw_to(self, goals_mm: Floats, areas_mm2: Floats) -> None:
+        """Set the (b, 3) goals in mm and the (b,) areas of the vertices, for a step from the present positions."""
+        weights = self._stiffness * areas_mm2 * M_PER_MM**2
+        self._weights = weights[self._rows, None]
+        self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[self._rows]
+
+    def energy(self, u: Floats) -> float:
+        local = 0.5 * float((self._weights * (u[self._local] + self._gaps) ** 2).sum())
+        return self._domain.comm.allreduce(local)
+
+    def add_forces(self, u: Floats, out: Floats) -> None:
+        out.reshape(-1, 3)[self._local] += self._weights * (u[self._local] + self._gaps)
+
+    def stiffness(self, u: Floats, *, convex: bool = False) -> PETSc.Mat:
+        domain = self._domain
+        diagonal = np.zeros((domain.n_owned, 3))
+        diagonal[self._local] = self._weights
+        rows = np.arange(diagonal.size + 1, dtype=PETSc.IntType)
+        columns = rows[:-1] + 3 * domain.space.dofmap.index_map.local_range[0]
+        size = diagonal.size, 3 * len(domain.positions)
+        csr = rows, columns.astype(PETSc.IntType), diagonal.ravel()
+        return PETSc.Mat().createAIJ((size, size), bsize=3, csr=csr, comm=domain.comm)
+
+    def max_step(self, u: Floats, direction: Floats) -> float:
+        return 1.0
+
+
+class ElasticFit:
+    """A brain's mesh that is drawn to one shape after the other, on one process.
+
+    `positions_mm` (n, 3) are those of its vertices now. Quadratic elements are fitted as their linear pieces.
+    MeshError if the boundary of the mesh crosses itself.
+    """
+
+    def __init__(self, mesh: TetrahedralMesh) -> None:
+        pieces = linear_pieces(mesh)
+        mesh = TetrahedralMesh(mesh.vertices, pieces)
+        self.positions_mm: Floats = mesh.vertices
+        self._surface, self._used = boundary_surface(mesh)
+        self._pieces, self._stretches = pieces, Stretches(pieces, len(mesh.vertices))
+        facets = self._used[self._surface.faces]
+        whole = np.ones(len(mesh.vertices))
+        zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
+        domain = self._domain = Domain(MPI.COMM_SELF, mesh)
+        self._problem = NonlinearProblem(domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO))
+        self._contact = SelfContact(domain, facets, STIFFNESS_PER_MODULUS * MODULUS_PA)
+        self._springs = Springs(domain, self._used, MODULUS_PA / (SPRING_LENGTH_MM * M_PER_MM))
+        self._problem.contributions += [self._contact, self._springs]
+        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
+        floor = 1e-11 * MODULUS_PA * edge**2 * math.sqrt(len(mesh.vertices))
+        self._solver = NewtonSolver(self._problem, SETTINGS, floor)
+        self._elements = Elements(domain.cells, domain.vertex_of_node, self._problem.points)
+
+    @property
+    def boundary(self) -> TriangleMesh:
+        """The boundary of the body as it is now."""
+        return TriangleMesh(self.positions_mm[self._used], self._surface.faces)
+
+    def follow(self, shape: Floats) -> Floats:
+        """Move the body to near a shape (n, 3) in mm, which may have inverted elements; return its (n, 3) positions.
+
+        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. SolverError
+        with the place where it cannot go on.
+        """
+        motion = rigid_fit(shape, self.positions_mm, vertex_sizes(self.positions_mm, self._pieces))
+        goal = transform_points(shape, motion)
+        strain = log_growth(self.positions_mm, self._stretches, goal - self.positions_mm, SMOOTHING_MM) / STEPS
+        start = self.positions_mm[self._used]
+        for step in range(1, STEPS + 1):
+            self._step(start + (goal[self._used] - start) * step / STEPS, strain, MAX_HALVINGS)
+        return self._move(np.linalg.inv(motion))
+
+    def draw(self, goals: Floats) -> Floats:
+        """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm."""
+        boundary = self.boundary
+        motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
+        self._step(transform_points(goals, motion), None, MAX_HALVINGS)
+        return self._move(np.linalg.inv(motion))
+
+    def _move(self, motion: NDArray) -> Floats:
+        self.positions_mm = transform_points(self.positions_mm, motion)
+        return self.positions_mm
+
+    def _step(self, goals: Floats, strain: Floats | None, halvings: int) -> None:
+        domain, problem = self._domain, self._problem
+        domain.place(self.positions_mm * M_PER_MM)
+        self._contact.begin_step()
+        self._springs.draw_to(goals, vertex_areas(self.boundary))
+        shape = len(domain.cells), len(problem.points.weights)
+        inverse = np.tile(np.eye(3), (*shape, 1, 1))
+        if strain is not None:
+            nodal = strain[self._elements.vertices][self._elements.cells]
+            inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
+        problem.set_step(np.full(shape, MODULUS_PA), inverse)
+        try:
+            solution = self._solver.solve()
+        except NotConvergedError as error:
+            if not halvings:
+                raise SolverError(
+                    "a shape cannot be reached without turning elements inside out or folds into each other",
+                    found=f"{error}; {worst_places(self._solver)}",
+                    remedy="Look at the labels or surfaces of this week and the one before at that place.",
+                ) from None
+            half = None if strain is None else strain / 2
+            self._step(0.5 * (goals + self.positions_mm[self._used]), half, halvings - 1)
+            self._step(goals, half, halvings - 1)
+            return
+        self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M

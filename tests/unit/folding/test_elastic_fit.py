@@ -1,0 +1,86 @@
+"""A body is drawn to shapes that it can have: without inverted elements, and without folds that cross."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from facts import Facts
+from shapes import box_mesh, ellipsoid_mesh, rigid
+
+from gyriflow.errors import SolverError
+from gyriflow.folding import elastic_fit
+from gyriflow.folding.elastic_fit import ElasticFit
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.matching import crossing_faces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
+from gyriflow.geometry.triangles import TriangleMesh
+
+BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+PIECES = linear_pieces(BODY)
+USED = boundary_surface(BODY)[1]
+
+
+def ratios(positions):
+    return volumes_between(positions, PIECES) / volumes_between(BODY.vertices, PIECES)
+
+
+def waves(height_mm, length_mm):
+    x, y, z = BODY.vertices.T
+    radius = np.sqrt((x / 20) ** 2 + (y / 24) ** 2 + (z / 18) ** 2)
+    outward = BODY.vertices / np.maximum(np.linalg.norm(BODY.vertices, axis=1), 1e-6)[:, None]
+    shell = np.exp(-(((1 - radius) / 0.25) ** 2))
+    return BODY.vertices * 1.05 + height_mm * (np.cos(2 * np.pi * y / length_mm) * shell)[:, None] * outward
+
+
+def test_a_shape_with_inverted_elements_is_followed_by_one_without():
+    shape = waves(1.5, 10.0)
+    assert (ratios(shape) < 0).sum() > 50
+    found = ElasticFit(BODY).follow(shape)
+    assert ratios(found).min() > 0.05
+    misfits = np.linalg.norm(found - shape, axis=1)[USED]
+    start = np.linalg.norm(1.05 * BODY.vertices - shape, axis=1)[USED]
+    assert misfits.mean() < 0.7 * start.mean()
+
+
+def test_a_shape_that_a_body_can_have_is_reached_where_it_lies():
+    shape = transform_points(waves(0.5, 30.0), rigid(30, -20, 10, shift=(50.0, 0.0, -9.0)))
+    body = ElasticFit(BODY)
+    before = np.linalg.norm(body.follow(shape) - shape, axis=1)
+    after = np.linalg.norm(body.draw(shape[USED]) - shape, axis=1)[USED]
+    assert before.max() < 0.3
+    assert after.mean() < 0.7 * before[USED].mean()
+    assert body.boundary.vertices == pytest.approx(body.positions_mm[USED])
+
+
+def test_folds_that_would_cross_stay_apart():
+    # a slit from above, whose walls move through each other
+    low, high = np.array([-10.0, -5.0, 0.0]), np.array([10.0, 5.0, 12.0])
+    mesh = slit_block(low, high)
+    pieces, (surface, used) = linear_pieces(mesh), boundary_surface(mesh)
+    shape = mesh.vertices.copy()
+    depth = np.clip((shape[:, 2] - 4) / 8, 0, 1)
+    shape[:, 0] -= 1.5 * np.sign(shape[:, 0]) * depth
+    assert crossing_faces(TriangleMesh(shape[used], surface.faces)) > 0
+    found = ElasticFit(mesh).follow(shape)
+    assert crossing_faces(TriangleMesh(found[used], surface.faces)) == 0
+    assert (volumes_between(found, pieces) > 0).all()
+    closed = np.linalg.norm(found - shape, axis=1)[used].mean()
+    assert closed < np.linalg.norm(mesh.vertices - shape, axis=1)[used].mean()
+
+
+def slit_block(low, high):
+    """Return a block with a slit 1 mm wide in the plane x = 0, open above z = 4."""
+    box = box_mesh((11, 6, 7), tuple(high - low))
+    places = box.vertices - box.vertices.min(axis=0) + low
+    centres = places[box.tets].mean(axis=1)
+    inside = (np.abs(centres[:, 0]) < 1.0) & (centres[:, 2] > 4.0)
+    kept, numbers = np.unique(box.tets[~inside], return_inverse=True)
+    return TetrahedralMesh(places[kept], numbers.reshape(-1, 4))
+
+
+def test_a_shape_that_cannot_be_reached_is_refused_with_its_place(monkeypatch):
+    settings = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12)
+    monkeypatch.setattr(elastic_fit, "SETTINGS", settings)
+    monkeypatch.setattr(elastic_fit, "MAX_HALVINGS", 1)
+    with pytest.raises(SolverError, check=Facts("det F", "element", "mm")):
+        ElasticFit(BODY).follow(BODY.vertices * [1.6, 0.6, 1.0])
