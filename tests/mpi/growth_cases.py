@@ -16,6 +16,7 @@ from boxes import (
     solved,
     zones_of,
 )
+from scipy.optimize import minimize_scalar
 from shapes import box_mesh
 
 from gyriflow.folding.checkpoint import State
@@ -23,6 +24,7 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.stress import packed, unpacked
+from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
 from gyriflow.settings.folding import parameters_from
@@ -133,6 +135,39 @@ def test_growth_that_is_held_back_all_around_loads_up_and_relaxes_as_known(mesh,
     strain = np.log(np.linalg.eigvalsh(unpacked(state.stretch)))
     assert strain.shape == (len(mesh.tets), points, 3)
     np.testing.assert_allclose(strain, -np.log(1.01) * sum(kept**n for n in range(5)), rtol=1e-9)
+
+
+def stretch_up(growth, volume):
+    """Return the stretch λ of tissue held at its sides that grows evenly, and its elastic volume ratio after that."""
+    bulk_to_shear = 2 * 1.45 / (3 * 0.1)
+
+    def elastic(up):
+        return np.array([1.0, 1.0, up]) / (1 + growth) * np.cbrt(volume)
+
+    def energy(up):
+        J = elastic(up).prod()
+        return 0.5 * ((elastic(up) ** 2).sum() * J ** (-2 / 3) - 3) + bulk_to_shear / 2 * (J - 1) ** 2
+
+    up = minimize_scalar(energy, (1.0, 1.1), tol=1e-12).x
+    return up, elastic(up).prod()
+
+
+@pytest.mark.parametrize("relaxation", ["all", "shape"])
+@pytest.mark.parametrize("mesh", [box_mesh((3, 3, 3), (6.0, 6.0, 6.0)), curved_box((2, 2, 2))], ids=ORDERS)
+def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_relaxes(mesh, relaxation):
+    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "support": "box", "no_growth": {"kind": "none"}})
+    zones = zones_of_run(mesh, parameters)
+    folding, state = folding_of(mesh, zones, relaxation=relaxation, **EVEN)
+    folding.model = EvenGrowth(folding.parameters, None, 0.02).growth
+    height, volume = 1.0, 1.0
+    for _ in range(4):
+        state = folding.step(state, 43200.0)
+        up, after = stretch_up(0.02, volume)
+        height, volume = height * up, after if relaxation == "shape" else 1.0
+    found = np.ptp(state.positions[:, 2]) / np.ptp(folding.start[:, 2])
+    assert found == pytest.approx(height, rel=1e-6)
+    kept = np.log(height) / (12 * np.log(1.02))
+    assert (kept > 0.94) if relaxation == "shape" else (kept < 0.9)
 
 
 def test_an_elastic_state_stays_where_it_is_in_equilibrium():

@@ -22,7 +22,7 @@ from ..settings.varying import Maps
 
 SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
 """Subpackages and modules with the code that determines the results of a run."""
-ARRAYS = ("positions", "last", "before_last", "stretch", "log_growth")
+ARRAYS = ("positions", "last", "before_last", "stretch", "volume", "log_growth")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,8 @@ class State:
         Accepted steps since the last halving.
     stretch
         Elastic stretch (m, q, 6) at the end of the last step, if stress is remembered.
+    volume
+        Elastic volume ratio (m, q) at the end of the last step, if this alone is kept.
     correction
         Feedback of the last step to growth by sizes (`StepGrowth.correction`).
     log_growth, log_growth_s
@@ -59,6 +61,7 @@ class State:
     before_last_s: float = 0.0
     successes: int = 0
     stretch: Floats | None = None
+    volume: Floats | None = None
     correction: Sequence[float] | None = None
     log_growth: Floats | None = None
     log_growth_s: float = 0.0
@@ -89,6 +92,7 @@ class State:
         step_s: float,
         row: dict,
         stretch: Floats | None = None,
+        volume: Floats | None = None,
         correction: Sequence[float] | None = None,
         log_growth: Floats | None = None,
     ) -> "State":
@@ -106,6 +110,7 @@ class State:
             before_last_s=self.last_s,
             successes=self.successes + 1,
             stretch=stretch,
+            volume=volume,
             correction=correction,
             log_growth=log_growth,
             log_growth_s=self.log_growth_s + step_s,

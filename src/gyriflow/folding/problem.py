@@ -49,7 +49,8 @@ class NonlinearProblem:
     that differs between steps is set by `set_step`.
 
     Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. With `remembers_stress`
-    the mesh may be stretched elastically at the start of the step. `quadrature_degree` is that of the polynomials that
+    the mesh may be stretched elastically at the start of the step, with `keeps_volume` only in its volume.
+    `quadrature_degree` is that of the polynomials that
     are integrated exactly; None takes what the elements' order needs.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
@@ -65,6 +66,7 @@ class NonlinearProblem:
         penalty_pa_per_m: float = 0.0,
         quadrature_degree: int | None = None,
         remembers_stress: bool = False,
+        keeps_volume: bool = False,
     ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
@@ -76,6 +78,7 @@ class NonlinearProblem:
         self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
         self._mu, self._G_inverse = self._field_at_points(()), self._field_at_points((3, 3))
         self._V = self._field_at_points((3, 3)) if remembers_stress else None
+        self._volume = self._field_at_points(()) if keeps_volume else None
         self._undeformed = np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1))
         # finite growth (Rodriguez et al. 1994) on the updated reference
         F = ufl.Identity(3) + ufl.grad(self._u)
@@ -91,6 +94,8 @@ class NonlinearProblem:
             self._linear, energy = LinearElements(domain, material), 0
         elif self._V is None:
             energy = material.energy_density(Fe, *moduli) * dx
+            if self._volume is not None:
+                energy = material.energy_density(Fe, *moduli) / self._volume * dx
         else:
             # per volume of the state without stress
             energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
@@ -142,21 +147,33 @@ class NonlinearProblem:
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
     def set_step(
-        self, mu: Floats, G_inverse: Floats, V: Floats | None = None, part: NDArray[np.int64] | None = None
+        self,
+        mu: Floats,
+        G_inverse: Floats,
+        V: Floats | None = None,
+        part: NDArray[np.int64] | None = None,
+        volume: Floats | None = None,
     ) -> None:
         """Set the coefficients of a step, on the mesh as it is placed now.
 
         At the integration points of the local elements: the shear modulus (c, q) in Pa, the inverse (c, q, 3, 3) of the
-        growth tensor and, with stress memory, the elastic left stretch V (c, q, 3, 3) of the mesh, by default none.
+        growth tensor and, with stress memory, the elastic left stretch V (c, q, 3, 3) of the mesh, by default none; if
+        volume is kept, the elastic `volume` ratio (c, q) of the mesh instead, by default 1.
         `part` (n,) are numbers of the vertices' parts, by default the connected parts; in a free body the rigid motions
         of each part are removed.
         """
+        weights = mu
+        if self._volume is not None:
+            volume = np.ones_like(mu) if volume is None else volume
+            set_at_points(self._volume, volume)
+            # V = J^(1/3) I, as a part of the inverse growth; energies are per volume of the state without stress
+            G_inverse, weights = np.cbrt(volume)[..., None, None] * G_inverse, mu / volume
         set_at_points(self._mu, mu)
         set_at_points(self._G_inverse, G_inverse)
         if self._V is not None:
             set_at_points(self._V, self._undeformed if V is None else V)
         if self._linear:
-            self._linear.mu, self._linear.G_inverse = mu, G_inverse
+            self._linear.mu, self._linear.G_inverse = weights, G_inverse
         self._tangent.elastic.forget()
         if self.free:
             self._tangent.motions = RigidMotions(self.domain, self.domain.part if part is None else part)

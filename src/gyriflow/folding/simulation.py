@@ -62,6 +62,7 @@ class Folding:
             MATERIALS[p.material](p.poisson_ratio),
             penalty_pa_per_m=p.contact.penalty_pa_per_m if p.contact.kind == "planes" else 0.0,
             remembers_stress=p.stress_memory_gw > 0,
+            keeps_volume=p.keeps_volume_only,
         )
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
         self.contact: SelfContact | None = None
@@ -94,9 +95,11 @@ class Folding:
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
         thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
-        stretch = None
+        stretch = volume = None
         if self.parameters.stress_memory_gw > 0:
             stretch = self.domain.gather_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
+        elif self.parameters.keeps_volume_only:
+            volume = self.domain.gather_cells(np.linalg.det(self.problem.evaluate("elastic", u)))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
@@ -111,7 +114,7 @@ class Folding:
         }
         self.solved = SolvedStep(u, step_s, growth)
         log_growth = growth.added_to(state.log_growth, displacement * MM_PER_M)
-        after = state.after(displacement, step_s, row, stretch, growth.correction(size), log_growth)
+        after = state.after(displacement, step_s, row, stretch, volume, growth.correction(size), log_growth)
         row["seconds"] = time.monotonic() - began
         return after
 
@@ -129,14 +132,16 @@ class Folding:
                 part = self.contact.join_touching(part)
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
-        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part)
+        volume = None if state.volume is None else state.volume[domain.tet_of_cell]
+        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part, volume)
         return tissue, growth
 
     def _stretch(self, state: State, step_s: float) -> Floats | None:
         if state.stretch is None:
             return None
         before = unpacked(state.stretch[self.domain.tet_of_cell])
-        return relaxed(before, step_s / SECONDS_PER_GW, self.parameters.stress_memory_gw)
+        p = self.parameters
+        return relaxed(before, step_s / SECONDS_PER_GW, p.stress_memory_gw, keeps_volume=p.relaxation == "shape")
 
     def _solution_row(self, solution: Solution, displacement: Floats) -> dict[str, float]:
         u, length = solution.displacement, np.linalg.norm(displacement, axis=1) * MM_PER_M

@@ -34,7 +34,7 @@ class StepFields:
 
     Fields are computed with the problem of the step, whose mesh stays at the start of the step until the next one
     begins. Without stress memory, stress, strain and contact pressure of a step are proportional to its length, so they
-    are given per week.
+    are given per week; but a pressure and an elastic change of volume that tissue keeps are given as they are.
     """
 
     def __init__(
@@ -42,6 +42,7 @@ class StepFields:
     ) -> None:
         self.problem, self.contact, domain = problem, contact, problem.domain
         self._remembers = parameters.stress_memory_gw > 0
+        self._kept = {"pressure_pa", "elastic_volume_strain"} if parameters.keeps_volume_only else set()
         self._start = domain.local(domain.positions)
         if "strain" in parameters.fields:
             centres = self._start[domain.corners].mean(axis=1)
@@ -82,7 +83,9 @@ class StepFields:
     def _per_gw(self, fields: dict[str, Floats], step_s: float) -> dict[str, Floats]:
         if self._remembers:
             return fields
-        return {f"{name}_per_gw": values * (SECONDS_PER_GW / step_s) for name, values in fields.items()}
+        kept = {name: values for name, values in fields.items() if name in self._kept}
+        rates = {name: values for name, values in fields.items() if name not in self._kept}
+        return kept | {f"{name}_per_gw": values * (SECONDS_PER_GW / step_s) for name, values in rates.items()}
 
 
 def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:

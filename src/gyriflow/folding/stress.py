@@ -27,8 +27,15 @@ def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
     return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
 
 
-def relaxed(V: Floats, step_gw: float, memory_gw: float) -> Floats:
-    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as exp(−t/τ), with τ = `memory_gw`."""
+def relaxed(V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool = False) -> Floats:
+    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as exp(−t/τ), with τ = `memory_gw`.
+
+    With `keeps_volume` only the deviator of ln V decays.
+    """
     if np.isinf(memory_gw):
         return V
-    return left_stretch(V, float(np.exp(-step_gw / memory_gw)))
+    left = float(np.exp(-step_gw / memory_gw))
+    stretches = left_stretch(V, left)
+    if keeps_volume:
+        stretches = stretches * (np.linalg.det(V) ** ((1 - left) / 3))[..., None, None]
+    return stretches

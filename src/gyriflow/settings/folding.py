@@ -125,6 +125,9 @@ class FoldingSettings(Settings):
     stress_memory_gw: Memory = 0.0
     """Relaxation time of elastic stress: after each step 0 forgets it (the paper), `infinite` keeps all of it.
     [GW]"""
+    relaxation: Literal["all", "shape"] = "all"
+    """What relaxes: `all` of the elastic strain (the paper), or its `shape` only, so that tissue keeps its change of
+    volume and the pressure that goes with it."""
     support: Literal["ellipsoid", "box", "free"] = "ellipsoid"
     """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `box` clamps a flat
     base and lets upright sides slide; `free` removes rigid motions only."""
@@ -141,6 +144,11 @@ class FoldingSettings(Settings):
     """Solvers."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
+
+    @property
+    def keeps_volume_only(self) -> bool:
+        """Whether of elastic strain the change of volume is kept, and the change of shape forgotten in each step."""
+        return self.relaxation == "shape" and self.stress_memory_gw == 0
 
     def problems(self) -> Iterator[KeyProblem]:
         for key in GROWTH_RATES:
