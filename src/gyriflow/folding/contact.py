@@ -32,15 +32,17 @@ modulus, then keeps them at about half of the contact distance; a stiffer barrie
 nothing else."""
 EDGES_PER_SPACING = {1: 1, 2: 2}
 """Number of edges of the contact surface between neighbouring nodes, by the order of the elements."""
-STIFFEN_BELOW, SOFTEN_ABOVE = 0.1, 0.75
-"""If the smallest gap is below the first fraction of the contact distance, the next step's barrier is twice as stiff;
-if it is above the second, half as stiff. With stress memory folds press on each other ever harder, and a barrier that
-is too soft lets them come so near that Newton's method stagnates. A change of stiffness moves folds in contact, so it
-is made only if needed."""
-MAX_STIFFENING = 1024.0
+STIFFEN_BELOW = 0.1
+"""Fraction of the contact distance. Where the smallest gap at a step's start is smaller, the barrier is stiffer, by the
+square root of the ratio. With stress memory folds press on each other ever harder, and a barrier that is too soft lets
+them come so near that Newton's method stagnates."""
+MAX_STIFFENING = 32.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_GAP_FRACTION = 0.999
 """Largest contact distance as a fraction of the smallest gap at the start of a run."""
+NEIGHBOUR_EDGES = 3
+"""Vertices that so few edges connect are neighbours. Neighbours on small faces are nearer to each other than the
+contact distance, but no gap is between them."""
 MAX_DISPLACEMENT_MM = 8.0
 """Longest displacement of a vertex in one iteration; a solve with a longer one diverges."""
 BARRIER = ipctk.TwoStageBarrier()
@@ -79,8 +81,8 @@ class SelfContact:
     Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
     distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
-    below the smallest gap at the start of the run: a body that does not grow must not move. MeshError where the surface
-    crosses itself at the start.
+    below the smallest gap at the start of the run, neighbours aside: a body that does not grow must not move. MeshError
+    where the surface crosses itself at the start.
     """
 
     def __init__(
@@ -102,21 +104,42 @@ class SelfContact:
                 remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
         if distance_mm is None:
-            gap = domain.comm.allreduce(self._search.near(start).gap_mm, op=MPI.MIN)
+            gap = domain.comm.allreduce(self._smallest_gap_mm(self._search.near(start)), op=MPI.MIN)
             # round-off must not make a pair of surface elements exactly at the limit
             self._max_mm = MAX_GAP_FRACTION * gap
             self.begin_step()
 
-    def begin_step(self, last_row: dict | None = None) -> None:
-        """Start from the current positions; set the barrier by edge lengths and the last row of the step table."""
+    def _smallest_gap_mm(self, near: NearPairs) -> float:
+        """Return the smallest distance of a rank's pairs that are no neighbours, infinite without any."""
+        corners = near.vertices_of_pairs()
+        rows = near.part.vertices[np.unique(np.concatenate([[], *corners])).astype(int)]
+        count = len(self._rest)
+        ends = np.concatenate([self._edges, self._edges[:, ::-1]]).T
+        links = sparse.coo_array((np.ones(ends.shape[1]), ends), shape=(count, count)).tocsr() + sparse.eye_array(count)
+        around = links[rows]
+        for _ in range(NEIGHBOUR_EDGES * EDGES_PER_SPACING[self.domain.order] - 1):
+            around = around @ links
+        smallest = np.inf
+        for i, vertices in enumerate(corners):
+            numbers = near.part.vertices[vertices]
+            if (around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0).any():
+                pair = near.pairs[i]
+                at = pair.dof(near.part_positions, near.mesh.edges, near.mesh.faces)
+                smallest = min(smallest, float(np.sqrt(pair.compute_distance(at))))
+        return smallest
+
+    def begin_step(self) -> None:
+        """Start from the current positions; set the barrier by edge lengths and the smallest gap there."""
         self._rest = self.surface.reference_mm()
         # from rank 0, as above
         spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._rest, self._edges)
         edge_based = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
         distance_mm = self._given_mm or min(edge_based, self._max_mm)
-        self.barrier = Barrier(distance_mm, adapted_stiffness(self._initial_pa, last_row))
         self._search = ContactSearch(self.surface.faces, self._owned, self._rest, distance_mm, self._search)
-        self._near: NearPairs | None = None
+        # the first residual of the step needs them again
+        self._near: NearPairs | None = self._search.near(self._rest)
+        gap_mm = self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN)
+        self.barrier = Barrier(distance_mm, self._initial_pa * stiffening(gap_mm / distance_mm))
 
     def near_pairs(self, u: Floats) -> NearPairs:
         """Return this rank's pairs. Those of the last displacement are cached."""
@@ -129,13 +152,10 @@ class SelfContact:
         """Return new part numbers (n,) of the mesh's vertices: parts in contact at the start of the step become one."""
         if part.max() == 0:
             return part
-        # the first residual of the step needs them again
-        near = self._near = self._search.near(self._rest)
-        corners = [near.pairs[i].vertex_ids(near.mesh.edges, near.mesh.faces) for i in range(len(near.pairs))]
+        near = self.near_pairs(np.zeros((len(self.domain.vertex_of_node), 3)))
         nearest_node = np.asarray(self.surface.weights.argmax(axis=1)).ravel()
         part_of_vertex = part[self.surface.nodes][nearest_node][near.part.vertices]
-        # negative numbers stand for missing vertices
-        sides = [part_of_vertex[[vertex for vertex in pair if vertex >= 0]] for pair in corners]
+        sides = [part_of_vertex[pair] for pair in near.vertices_of_pairs()]
         own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
         links = np.array(sorted(set().union(*self.domain.comm.allgather(own_links)))).reshape(-1, 2)
         count = int(part.max()) + 1
@@ -192,12 +212,9 @@ class SelfContact:
         return values
 
 
-def adapted_stiffness(initial_pa: float, last_row: dict | None) -> float:
-    """Return a step's stiffness κ in Pa, from the smallest gap and the stiffness of the last row of the step table."""
-    if last_row is None:
-        return initial_pa
-    gap, last_pa = last_row["min_distance_mm"] / last_row["contact_distance_mm"], last_row["contact_stiffness_pa"]
-    if gap < STIFFEN_BELOW:
-        return min(2 * last_pa, MAX_STIFFENING * initial_pa)
-    # NaN where nothing is near
-    return last_pa if gap <= SOFTEN_ABOVE else max(last_pa / 2, initial_pa)
+def stiffening(gap: float) -> float:
+    """Return the stiffness of a step's barrier, as a multiple of the initial one.
+
+    `gap` is the smallest gap at the step's start as a fraction of the contact distance, infinite where nothing is near.
+    """
+    return 1.0 if gap >= STIFFEN_BELOW else min((STIFFEN_BELOW / max(gap, 1e-9)) ** 0.5, MAX_STIFFENING)

@@ -57,6 +57,12 @@ class NearPairs:
             return np.inf
         return float(np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions)))
 
+    def vertices_of_pairs(self) -> list[list[int]]:
+        """Return the vertices of each pair, as numbers of the part's vertices."""
+        corners = [self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces) for i in range(len(self.pairs))]
+        # negative numbers stand for missing vertices
+        return [[vertex for vertex in pair if vertex >= 0] for pair in corners]
+
 
 class ContactSearch:
     """A rank's search for pairs within a distance, in one step that begins with the surface at `rest_mm` (s, 3).

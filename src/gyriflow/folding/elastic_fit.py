@@ -39,6 +39,7 @@ MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
 SPRING_LENGTH_MM = 3.3
 """Shear modulus over the springs' stiffness: a spring holds as strongly as this depth of tissue. Springs a third as
 long halve the misfit, and take twice the iterations and the worst elements to a hundredth of their volume."""
+CLOSE_SPRING_LENGTH_MM = 0.5
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STEPS = 2
@@ -55,16 +56,16 @@ class Springs:
     `vertices` (b,) are the ascending vertices of the mesh that have a spring, `stiffness_pa_per_m` is per area.
     """
 
-    def __init__(self, domain: Domain, vertices: Ints, stiffness_pa_per_m: float) -> None:
-        self._domain, self._stiffness = domain, stiffness_pa_per_m
+    def __init__(self, domain: Domain, vertices: Ints) -> None:
+        self._domain = domain
         owned = domain.vertex_of_node[: domain.n_owned]
         place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
         self._local = np.flatnonzero(vertices[place] == owned)
         self._rows, self._vertices = place[self._local], vertices
 
-    def draw_to(self, goals_mm: Floats, areas_mm2: Floats) -> None:
+    def draw_to(self, goals_mm: Floats, areas_mm2: Floats, stiffness_pa_per_m: float) -> None:
         """Set the (b, 3) goals in mm and the (b,) areas of the vertices, for a step from the present positions."""
-        weights = self._stiffness * areas_mm2 * M_PER_MM**2
+        weights = stiffness_pa_per_m * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
         self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[self._rows]
 
@@ -108,7 +109,7 @@ class ElasticFit:
         domain = self._domain = Domain(MPI.COMM_SELF, mesh)
         self._problem = NonlinearProblem(domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO))
         self._contact = SelfContact(domain, facets, STIFFNESS_PER_MODULUS * MODULUS_PA)
-        self._springs = Springs(domain, self._used, MODULUS_PA / (SPRING_LENGTH_MM * M_PER_MM))
+        self._springs = Springs(domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
         floor = 1e-11 * MODULUS_PA * edge**2 * math.sqrt(len(mesh.vertices))
@@ -149,7 +150,8 @@ class ElasticFit:
         domain, problem = self._domain, self._problem
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
-        self._springs.draw_to(goals, vertex_areas(self.boundary))
+        length = SPRING_LENGTH_MM if strain is not None else CLOSE_SPRING_LENGTH_MM
+        self._springs.draw_to(goals, vertex_areas(self.boundary), MODULUS_PA / (length * M_PER_MM))
         shape = len(domain.cells), len(problem.points.weights)
         inverse = np.tile(np.eye(3), (*shape, 1, 1))
         if strain is not None:

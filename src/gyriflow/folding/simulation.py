@@ -127,7 +127,7 @@ class Folding:
         tissue = Tissue.of(self.elements, state.positions, self.zones, self.maps, p, week)
         part = domain.part
         if self.contact is not None:
-            self.contact.begin_step(state.rows[-1] if state.rows else None)
+            self.contact.begin_step()
             if self.problem.free:
                 part = self.contact.join_touching(part)
         growth = self.model(start)

@@ -12,7 +12,7 @@ from gyriflow.errors import SolverError
 from gyriflow.folding import simulation
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.checks import stiffness_warning
-from gyriflow.folding.contact import MAX_STIFFENING, adapted_stiffness
+from gyriflow.folding.contact import MAX_STIFFENING, stiffening
 from gyriflow.folding.diagnosis import elements_through, resolution_warning, unconverged_warning
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
@@ -145,30 +145,8 @@ def test_predicted_memory_is_what_runs_have_taken(order, tets, ranks, contact, m
     assert predicted_memory_mib(tets, ranks, contact, order) == pytest.approx(measured, rel=0.155)
 
 
-START_PA = 1000.0
-
-
-def after(part, stiffness_pa):
-    """Return the table's row of a step whose smallest gap was a part of the distance."""
-    return {"min_distance_mm": part * 0.2, "contact_distance_mm": 0.2, "contact_stiffness_pa": stiffness_pa}
-
-
 @pytest.mark.parametrize(
-    ("part", "before", "then"),
-    [
-        (0.09, 4.0, 8.0),
-        (0.11, 4.0, 4.0),
-        (0.74, 4.0, 4.0),
-        (0.76, 4.0, 2.0),
-        # nothing is near
-        (np.nan, 4.0, 2.0),
-        # no stiffer than the limit, and no softer than at the start
-        (0.09, MAX_STIFFENING, MAX_STIFFENING),
-        (0.09, 0.75 * MAX_STIFFENING, MAX_STIFFENING),
-        (0.76, 1.0, 1.0),
-        (np.nan, 1.5, 1.0),
-    ],
+    ("gap", "stiffness"), [(np.inf, 1.0), (0.5, 1.0), (0.1, 1.0), (0.025, 2.0), (1e-9, MAX_STIFFENING)]
 )
-def test_the_barrier_becomes_stiffer_where_folds_come_close_and_softer_where_they_part(part, before, then):
-    assert adapted_stiffness(START_PA, None) == START_PA
-    assert adapted_stiffness(START_PA, after(part, before * START_PA)) == then * START_PA
+def test_the_barrier_is_stiffer_where_folds_are_close(gap, stiffness):
+    assert stiffening(gap) == pytest.approx(stiffness)
