@@ -65,7 +65,7 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
         assert rows.loc["atlas", "volume_error"] == pytest.approx(rows.loc["target", "volume_error"])
         assert rows.loc["atlas", "distance_mm"] < 1.5
     steps = pd.read_csv(workflow.directory / "results/runs/expected/b21.5/folding/steps.csv")
-    assert steps["to_target_mm"].iloc[-1] < 0.3
+    assert steps["to_path_mm"].iloc[-1] < 0.3
     # the real brain deviates as it is larger or smaller
     deviation = pd.read_csv(workflow.directory / further[0]).query("hemisphere == 'whole'")
     areas = deviation[deviation["metric"] == "log_area"].set_index("week")["value"]

@@ -25,14 +25,15 @@ with step(snakemake.log[0]):
         )
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
+    ages = None
     if snakemake.wildcards.origin == "self":
-        weeks, positions, further = (
-            [params.start_week, *params.weeks],
-            carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh)),
-            {},
-        )
+        weeks, further = [params.start_week, *params.weeks], {}
+        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
     else:
         inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, further = predict_shapes(mesh, *inputs, body_of=ElasticFit)
-    targets = WeeklyShapes(np.array(weeks), positions, sizes_of(mesh, positions), further)
+        options = {"body_of": ElasticFit, "by_size": params.by_size}
+        weeks, positions, further, ages = predict_shapes(mesh, *inputs, **options)
+    targets = WeeklyShapes(
+        np.array(weeks), positions, sizes_of(mesh, positions), further, ages.table() if ages else None
+    )
     write_weekly_shapes(snakemake.output[0], targets)

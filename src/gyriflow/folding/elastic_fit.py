@@ -37,9 +37,9 @@ from .zones import Zones
 MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
 """Of the body that is fitted. The modulus only sets the unit of forces; a compressible body yields more evenly."""
 SPRING_LENGTH_MM = 3.3
-"""Shear modulus over the springs' stiffness: a spring holds as strongly as this depth of tissue. Springs a third as
-long halve the misfit, and take twice the iterations and the worst elements to a hundredth of their volume."""
-CLOSE_SPRING_LENGTH_MM = 0.5
+CLOSE_SPRING_LENGTH_MM = 0.2
+"""Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
+depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STEPS = 2

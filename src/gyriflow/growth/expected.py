@@ -1,5 +1,6 @@
 """Predict a brain's later shapes: carry its mesh through an atlas and keep its individual differences."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Protocol
@@ -10,21 +11,26 @@ from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, transform_points
 from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, vertex_sizes
-from ..geometry.matching import match_points, values_at
+from ..geometry.matching import match_points, nearest_on, surface_distance, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..settings.growth import BEFORE_GW
+from .atlas_ages import AtlasAges, ages_by_size
 from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
+
+log = logging.getLogger(__name__)
 
 PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
-AGAIN_MM = (1.0, 1.0)
+AGAIN_MM = (0.5,)
 """The same for the fit of a body that is close to the surface."""
 REACH_MM = 4.0
 """Largest distance over which a surface pulls."""
+MAX_MISFIT_MM = 0.25
+"""Mean distance of a body from the surface it is fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
 """Relative tolerance of the harmonic continuation that a body follows."""
 DIFFERENCE_SMOOTHING_MM = 8.0
@@ -120,11 +126,26 @@ def carry_sharply(
                 shape = body.follow(shape)
                 if surfaces is not None and surface is not None:
                     shape = body.draw(fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM))
+                    _warn_of_misfit(body.boundary, surfaces[surface], surface + 1)
             positions.append(shape)
     return np.stack(positions)
 
 
-def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floats) -> Floats:
+def _warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, number: int) -> None:
+    ways = ((boundary, surface), (surface, boundary))
+    mean, far = surface_distance((nearest_on(one.vertices, two)[0], vertex_areas(one)) for one, two in ways)
+    log.info("shape %d: %.3f mm from the observed surface on average, 95 %% below %.2f mm", number, mean, far)
+    if mean > MAX_MISFIT_MM:
+        log.warning(
+            "shape %d stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body cannot reach "
+            "all of it without inverted elements or crossing folds",
+            number,
+            mean,
+            far,
+        )
+
+
+def positions_at(week: float, atlas: Floats, weeks: Sequence[float] | Floats, sizes: Floats) -> Floats:
     """Interpolate the (k, n, 3) positions of an atlas in k weeks linearly to a week; return (n, 3) positions.
 
     The later week is first aligned rigidly to the earlier one, with points weighted by their (n,) sizes.
@@ -133,6 +154,21 @@ def positions_at(week: float, atlas: Floats, weeks: Sequence[float], sizes: Floa
     part = (week - weeks[first]) / (weeks[first + 1] - weeks[first])
     motion = rigid_fit(atlas[first + 1], atlas[first], sizes)
     return np.asarray((1 - part) * atlas[first] + part * transform_points(atlas[first + 1], motion))
+
+
+def at_ages_by_size(mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float]) -> tuple[Floats, AtlasAges]:
+    """Return the (k, n, 3) positions of an atlas at its k weeks as its smooth growth has them, and the ages it used.
+
+    At each week the shape is that between the brains whose ages by size are around it, and the volume that of the
+    curve through all brains.
+    """
+    sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
+    ages = ages_by_size(weeks, list(sizes_of(mesh, atlas)["volume_ml"]))
+    shapes = np.stack([positions_at(week, atlas, ages.ages, sizes) for week in np.clip(weeks, *ages.ages[[0, -1]])])
+    volumes = sizes_of(mesh, shapes)["volume_ml"]
+    scales = [(ages.volume(week) / volume) ** (1 / 3) for week, volume in zip(weeks, volumes, strict=True)]
+    centres = np.average(shapes, axis=1, weights=sizes)[:, None]
+    return centres + np.array(scales)[:, None, None] * (shapes - centres), ages
 
 
 def expected_positions(
@@ -188,12 +224,16 @@ def predict_shapes(
     surfaces: Sequence[TriangleMesh],
     weeks: Sequence[float],
     also: Sequence[float] = (),
+    *,
     body_of: Callable[[TetrahedralMesh], FittedBody] | None = None,
-) -> tuple[list[float], Floats, dict[str, list[Floats]]]:
+    by_size: bool = True,
+) -> tuple[list[float], Floats, dict[str, list[Floats]], AtlasAges | None]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
-    The baselines are simpler predictions of the boundary's vertices: `atlas`, the atlas' own brain; `atlas_deformed`,
-    that brain with the whole individual difference; and `displaced`, the start moved by registration alone.
+    With `by_size` the brain moves as the atlas `at_ages_by_size`, whose ages are returned as well; else as its brains
+    at their stated weeks. The baselines are simpler predictions of the boundary's vertices: `atlas`, the atlas' own
+    brain; `atlas_deformed`, that brain with the whole individual difference; and `displaced`, the start moved by
+    registration alone.
 
     `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
     `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
@@ -202,18 +242,19 @@ def predict_shapes(
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces, body_of(mesh) if body_of else None)[1:]
-    shape_weeks, positions = expected_positions(mesh, start_week, carried, weeks, also=also)
+    grown, ages = at_ages_by_size(mesh, carried, weeks) if by_size else (carried, None)
+    shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also)
     if body_of:
         body = body_of(mesh)
         positions = np.stack([positions[0], *(body.follow(shape) for shape in positions[1:])])
     baselines = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
-    for name, path in (("atlas_deformed", carried), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
+    for name, path in (("atlas_deformed", grown), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
         _, places = expected_positions(mesh, start_week, path, weeks, also=also, smoothing_mm=0)
         baselines[name] = [at[used] for at in places]
-    return shape_weeks, positions, baselines
+    return shape_weeks, positions, baselines, ages
 
 
-def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats]) -> dict[str, Floats]:
+def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats] | Floats) -> dict[str, Floats]:
     """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
     boundary, used = boundary_surface(mesh)
     surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]

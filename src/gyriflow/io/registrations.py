@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import InputError
@@ -48,13 +49,15 @@ class WeeklyShapes:
     """The shapes that a mesh has, or is to have, at (w,) ascending gestational weeks, its own first.
 
     `positions` (w, n, 3) of its vertices are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of its
-    boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm.
+    boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm. `ages`
+    is the table of an atlas' ages by size, if they were used.
     """
 
     weeks: Floats
     positions: Floats
     sizes: Mapping[str, Floats] = field(default_factory=dict)
     surfaces: Mapping[str, Sequence[Floats]] = field(default_factory=dict)
+    ages: pd.DataFrame | None = None
 
     def index(self, week: float) -> int:
         """Return the number of a week among those of the shapes; InputError where it is missing."""
@@ -68,7 +71,7 @@ class WeeklyShapes:
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
-    """Write the data sets weeks, positions, sizes/{area_cm2, volume_ml} and surfaces/{name}."""
+    """Write the data sets weeks, positions, sizes/{area_cm2, volume_ml}, surfaces/{name} and ages/{column}."""
     with new_hdf5(path) as file:
         file["weeks"] = np.asarray(shapes.weeks, dtype=np.float64)
         places = {"positions": shapes.positions} | {f"surfaces/{name}": at for name, at in shapes.surfaces.items()}
@@ -76,6 +79,9 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
             file.create_dataset(name, data=np.asarray(values, dtype=np.float32), compression="gzip", shuffle=True)
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
+        if shapes.ages is not None:
+            for column in shapes.ages:
+                file[f"ages/{column}"] = shapes.ages[column].to_numpy(dtype=np.float64)
 
 
 def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
@@ -84,4 +90,5 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
     with reading_hdf5(path, "shapes of a mesh by week", expected, "Make them again.") as file:
         sizes = {name: values[:] for name, values in file.get("sizes", {}).items()}
         surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
-        return WeeklyShapes(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces)
+        ages = pd.DataFrame({name: values[:] for name, values in file["ages"].items()}) if "ages" in file else None
+        return WeeklyShapes(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces, ages)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
@@ -107,6 +107,9 @@ class GrowthSettings(Settings):
     may combine several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
     """The series, if there are several, that gives measured curves or an atlas' growth. `null`: the start brain's."""
+    atlas_ages: Literal["size", "stated"] = "size"
+    """With `growth: {model: shapes, of: atlas}`, the ages of the atlas' brains: `size`, the week at which the smooth
+    curve of the atlas' volume has a brain's volume, with the size of the curve at each week; `stated`, those given."""
     matched_surfaces: bool = True
     """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
     needed."""

@@ -105,7 +105,7 @@ def test_a_start_outside_an_atlas_of_matched_surfaces_follows_them_from_where_it
     later = [sphere(20.0).vertices @ turn.T * factor for factor in ([1.2, 1.1, 1.0], [1.5, 1.2, 1.1])]
     surfaces = [first, *(TriangleMesh(places, first.faces) for places in later)]
     pairs = [shift_map(1.0, (9.0, 0.0, 0.0)), *(MatchedSurfaces(one, two.vertices) for one, two in pairwise(surfaces))]
-    weeks, positions, others = predict_shapes(BALL, 22.0, pairs, surfaces, WEEKS)
+    weeks, positions, others, _ = predict_shapes(BALL, 22.0, pairs, surfaces, WEEKS)
     assert weeks == WEEKS
     boundary, used = boundary_surface(BALL)
     ends = BALL.vertices[used] @ turn.T * [1.5, 1.2, 1.1]
@@ -261,7 +261,7 @@ def test_simpler_ways_start_where_the_brain_is_and_sizes_are_those_of_the_bounda
     pairs = [shift_map(1.0), shift_map(1.1)]
     surface = sphere(20.0)
     surfaces = [surface, TriangleMesh(1.1 * surface.vertices, surface.faces)]
-    weeks, positions, others = predict_shapes(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
+    weeks, positions, others, _ = predict_shapes(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
     assert weeks == [22.0, 23.0]
     used = boundary_surface(BALL)[1]
     assert set(others) == {"atlas", "atlas_deformed", "displaced"}

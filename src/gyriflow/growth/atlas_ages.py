@@ -1,0 +1,58 @@
+"""Sizes and ages of an atlas: a smooth curve of its volume, and the week at which the curve has the size of each brain.
+
+The brains of an atlas are not as old as stated: a week may jump in size and the next hardly grow. Shape goes with size
+more than with the stated week, so a brain is used at the age of its size.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import isotonic_regression
+
+from ..geometry.triangles import Floats
+from .curves import Curve, fitted, rate, value
+
+MIN_SPACING_GW = 0.1
+"""Smallest time between two brains of successive weeks."""
+
+
+@dataclass(frozen=True, eq=False)
+class AtlasAges:
+    """The stated weeks (k,) of an atlas' brains, their volumes, the curve of volume, and their ages by size (k,)."""
+
+    weeks: Floats
+    volumes: Floats
+    curve: Curve
+    ages: Floats
+
+    def volume(self, week: float) -> float:
+        """Return the volume of the atlas at a week, in the unit of its brains' volumes."""
+        return float(value(self.curve, week))
+
+    def table(self) -> pd.DataFrame:
+        """Return a row per brain: stated_week, age_by_size, volume_ml and curve_ml, the curve at the stated week."""
+        curve = value(self.curve, self.weeks)
+        return pd.DataFrame(
+            {"stated_week": self.weeks, "age_by_size": self.ages, "volume_ml": self.volumes, "curve_ml": curve}
+        )
+
+
+def ages_by_size(weeks: Sequence[float], volumes_ml: Sequence[float]) -> AtlasAges:
+    """Return the ages by size of an atlas' brains with volumes in mL at two or more ascending weeks.
+
+    The curve of volume is monotone and robust against single weeks (`curves.fitted`). Each brain gets the week at which
+    the curve has its volume; ages that do not ascend are replaced by their nearest ascending ones (isotonic
+    regression). InputError if the atlas shrinks.
+    """
+    stated, volumes = np.asarray(weeks, dtype=float), np.asarray(volumes_ml, dtype=float)
+    curve = fitted(weeks, volumes_ml, name="volume of the atlas").curve
+    logs, sizes = np.log(curve.values), np.log(volumes)
+    # the curve is flat where brains do not grow; rates of growth at its ends lead beyond it
+    inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
+    beyond = [np.maximum(rate(curve, curve.weeks[end]), 1e-3) for end in (0, -1)]
+    ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / beyond[0], inside)
+    ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / beyond[1], ages)
+    spacing = MIN_SPACING_GW * np.arange(len(ages))
+    return AtlasAges(stated, volumes, curve, isotonic_regression(ages - spacing).x + spacing)

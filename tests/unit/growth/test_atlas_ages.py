@@ -1,0 +1,52 @@
+"""Ages of an atlas' brains by their sizes."""
+
+import numpy as np
+import pytest
+from shapes import ellipsoid_mesh
+
+from gyriflow.growth.atlas_ages import MIN_SPACING_GW, ages_by_size
+from gyriflow.growth.expected import at_ages_by_size, sizes_of
+
+WEEKS = np.arange(21.0, 33.0)
+SMOOTH = 60 * np.exp(0.1 * (WEEKS - 21) - 0.002 * (WEEKS - 21) ** 2)
+
+
+def test_an_atlas_that_grows_smoothly_keeps_its_weeks():
+    ages = ages_by_size(WEEKS, SMOOTH)
+    assert ages.ages == pytest.approx(WEEKS, abs=0.05)
+    assert ages.volume(25.5) == pytest.approx(60 * np.exp(0.45 - 0.0405), rel=0.005)
+
+
+def test_a_week_that_jumps_in_size_is_taken_for_the_age_of_its_size():
+    volumes = SMOOTH.copy()
+    volumes[4] *= 1.12
+    ages = ages_by_size(WEEKS, volumes)
+    table = ages.table().set_index("stated_week")
+    rate = 0.1 - 0.004 * 4
+    assert table.loc[25.0, "age_by_size"] == pytest.approx(25 + np.log(1.12) / rate, abs=0.25)
+    assert table.loc[25.0, "curve_ml"] == pytest.approx(SMOOTH[4], rel=0.02)
+    assert table.loc[25.0, "volume_ml"] == pytest.approx(volumes[4])
+    others = table.drop(index=[25.0, 26.0])
+    assert others["age_by_size"].to_numpy() == pytest.approx(others.index.to_numpy(), abs=0.2)
+    assert (np.diff(ages.ages) >= MIN_SPACING_GW - 1e-9).all()
+
+
+def test_shape_follows_the_ages_and_size_the_curve():
+    mesh = ellipsoid_mesh(4, (20.0, 24.0, 18.0))
+    # longer every week, and one week is too large
+    shapes = [mesh.vertices * [1.0, 1 + 0.02 * k, 1.0] for k in range(len(WEEKS))]
+    volumes = [sizes_of(mesh, [shape])["volume_ml"][0] for shape in shapes]
+    atlas = np.stack(
+        [shape * np.cbrt(volume / size) for shape, size, volume in zip(shapes, volumes, SMOOTH, strict=True)]
+    )
+    atlas[4] *= 1.04
+    found, ages = at_ages_by_size(mesh, atlas, WEEKS.tolist())
+    assert sizes_of(mesh, found)["volume_ml"] == pytest.approx(SMOOTH, rel=0.02)
+
+    def length(places):
+        return np.ptp(places[:, 1]) / np.ptp(places[:, 0])
+
+    # the brain called 25 weeks is that of a later one
+    assert ages.ages[4] > 26
+    assert length(found[4]) < length(atlas[4]) - 0.01
+    assert length(found[8]) == pytest.approx(length(atlas[8]), abs=0.01)
