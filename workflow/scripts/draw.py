@@ -11,6 +11,7 @@ from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.figures import write_figure, write_html
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.frames import read_pial_frames, read_positions, read_tets, read_weeks
+from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
 from gyriflow.io.tetmeshes import read_regions
 from gyriflow.io.yaml_files import read_yaml
@@ -45,6 +46,7 @@ READERS = {
     "frames.h5": read_pial_frames,
     "frames.xdmf": read_elements,
     "regions.h5": read_boundary,
+    "targets.atlas.h5": lambda path: read_weekly_shapes(path).ages,
 }
 """Functions that read files, by the end of the file name."""
 

@@ -205,6 +205,16 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     return table.assign(co2e_g=costs.carbon_g_per_kwh / 1000 * table["energy_Wh"])
 
 
+def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:
+    """Return the ages by size of an atlas' brains, a row per stated week.
+
+    Parameters
+    ----------
+    ages : columns stated_week, age_by_size, volume_ml and curve_ml
+    """
+    return ages.set_index("stated_week").rename(columns=plain).rename_axis("stated week (GW)").round(2)
+
+
 def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     """Return the accuracy of predicted brains and of simpler predictions: a row per start, week and model.
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
 from .comparison_figures import comparison_figures
-from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY
+from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY, TARGETS
 from .records import Brain, Simulation
 from .registry import (
     RUN_FIGURES,
@@ -130,8 +130,25 @@ def _growth_figures(study: Study) -> Iterator[Figure]:
     # for many subjects without simulations, charts of metrics and change.csv show growth; here each would need a panel
     if study.growth_brains and (len(study.series.brains) <= MAX_SERIES or study.run_simulations):
         yield growth_figure(study)
+    if study.config.growth.atlas_ages == "size":
+        for start in dict.fromkeys(run.start for run in study.run_simulations if run.shapes == "atlas"):
+            yield Figure(
+                ATLAS_AGES, {"ages": TARGETS.format(brain=start.id, origin="atlas")}, names={"brain": start.id}
+            )
 
 
+ATLAS_AGES = Kind(
+    "atlas_ages",
+    f"{BRAIN}/atlas_ages.html",
+    "tables:atlas_ages_table",
+    section="Growth",
+    title="Ages of the atlas' brains by size",
+    caption=(
+        "The atlas whose growth *{brain}* follows, by stated week: volume of its brain, the smooth curve through all "
+        "its brains, and the week at which the curve has the brain's volume. The prediction uses each brain's shape at "
+        "its age by size, and the curve's volume."
+    ),
+)
 GROWTH_RATES = Kind(
     "growth_figure",
     f"{STUDY}/growth/growth.png",
