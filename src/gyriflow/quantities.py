@@ -200,9 +200,24 @@ _SIMULATION_MAPS = (
         is_averaged=False,
         colours=POSITIVE_COLOURS,
     ),
+    VertexMap(
+        name="thickness_growth_percent_per_gw",
+        unit="% per week",
+        label="growth across the surface",
+        bids_suffix="thicknessGrowth",
+        description="Growth along the normal of the surface",
+        is_averaged=False,
+    ),
 )
 VERTEX_MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
 """The maps, by name."""
+
+
+def name_in_interval(name: str, before: float, week: float) -> str:
+    """Return the name of a map between two weeks, in a file with maps of several intervals."""
+    return f"{name} {before:g}-{week:g} GW"
+
+
 COMPARED_MAPS = ("shape_index", "mean_curvature")
 """The maps by which a simulated brain is correlated with a real one."""
 

@@ -155,6 +155,22 @@ def reaches(run, brain, week):
     return week in read_json(summary)["weeks"]
 
 
+rule growth_maps:
+    input:
+        frames=FOLDING["frames"],
+        params=PARAMETERS,
+    output:
+        GROWTH_MAPS,
+    log:
+        f"{RUN}/logs/growth_maps.log",
+    benchmark:
+        f"{RUN}/benchmarks/growth_maps.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/growth_maps.py"
+
+
 rule folding:
     input:
         study.files(*FOLDING.values()),

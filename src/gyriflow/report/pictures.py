@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
-from ..quantities import SIGNED_COLOURS, VERTEX_MAPS
-from ..settings.folding import FoldingParameters
+from ..quantities import SIGNED_COLOURS, VERTEX_MAPS, name_in_interval
+from ..settings.folding import AXES, FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
-from ..units import CM2_PER_MM2, SECONDS_PER_GW
+from ..units import CM2_PER_MM2
 from .labels import column_label, map_title, plain, value_labels
 from .panels import MAX_COLUMNS, Panel, Row, panel_grid
 from .scene import (
@@ -250,29 +250,31 @@ def scalar_maps(
     return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, map_title(quantity)), legend=legend)
 
 
-def growth_of_area(frames: Mapping[float, SurfaceMaps], step_s: float) -> dict[tuple[float, float], SurfaceMap]:
-    """Return the growth of area in % per week between output weeks, on the surface at the later one."""
-    return {
-        (a, b): (mesh, 100 * np.expm1(2 * SECONDS_PER_GW / step_s * fields["tangential_growth_per_step"]))
-        for a, b in pairwise(sorted(frames))
-        for mesh, fields in [frames[b]]
-    }
-
-
 def growth_maps(
-    frames: Mapping[float, SurfaceMaps], params: FoldingParameters, *, views: Sequence[str] = SIDE_VIEWS
+    frames: Mapping[float, SurfaceMaps],
+    growth: Mapping[str, Floats],
+    *,
+    quantity: str = "area_growth_percent_per_gw",
+    views: Sequence[str] = SIDE_VIEWS,
 ) -> Figure:
-    """Draw the growth of area found by a run towards target shapes, with lines along the largest growth.
+    """Draw the growth found by a run towards target shapes, with lines along the largest growth in the surface.
 
     Parameters
     ----------
     frames
-        {week: (surface in RAS+ mm, fields)} with `tangential_growth_per_step` (the logarithm of the stretch in a step)
-        and `growth_direction_per_step` (n, 3).
+        {week: (surface in RAS+ mm, fields)}
+    growth
+        The maps of `growth.maps.growth_per_week`, with their intervals in the names.
+    quantity
+        That of area, or that across the surface (`thickness_growth_percent_per_gw`).
     """
-    growth = growth_of_area(frames, params.step_s)
-    directions = {(a, b): frames[b][1]["growth_direction_per_step"] for a, b in growth}
-    return scalar_maps({"growth": growth}, quantity="area_growth_percent_per_gw", directions=directions, views=views)
+    intervals = list(pairwise(sorted(frames)))
+    maps = {(a, b): (frames[b][0], growth[name_in_interval(quantity, a, b)]) for a, b in intervals}
+    directions = {
+        interval: np.stack([growth[name_in_interval(f"growth_direction_{axis}", *interval)] for axis in AXES], axis=1)
+        for interval in intervals
+    }
+    return scalar_maps({"growth": maps}, quantity=quantity, directions=directions, views=views)
 
 
 def _map_panel(

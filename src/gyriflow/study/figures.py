@@ -5,7 +5,7 @@ from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
 from .comparison_figures import comparison_figures
-from .paths import BRAIN, FOLDING, GROWTH, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY, TARGETS
+from .paths import BRAIN, FOLDING, GROWTH, GROWTH_MAPS, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY, TARGETS
 from .records import Brain, Simulation
 from .registry import (
     RUN_FIGURES,
@@ -194,8 +194,9 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
         yield shape_maps(start, simulations)
     zones = set()
     for simulation in study.run_simulations:
-        if simulation.shapes and "growth" in simulation.settings.fields:
+        if simulation.has_growth_maps:
             yield growth_found_figure(simulation)
+            yield growth_found_figure(simulation, GROWTH_ACROSS, quantity="thickness_growth_percent_per_gw")
         if (zoned := repr((simulation.start.id, simulation.settings.model_dump(include=ZONES)))) not in zones:
             zones.add(zoned)
             inputs = {"regions": simulation.file(REGIONS["data"]), "params": simulation.file(PARAMETERS)}
@@ -332,14 +333,27 @@ GROWTH_FOUND = Kind(
     caption=(
         "Growth in area along the pial surface by which run *{run}* approaches its target shapes from week to week, on "
         "the surface at the end of the interval. Lines: direction of largest growth along the surface, longer where it "
-        "exceeds the growth across it by more."
+        "exceeds the growth across it by more. The maps are in ``surfaces/growth.shape.gii`` of the run."
     ),
+    job="growth_found_figures",
+)
+GROWTH_ACROSS = Kind(
+    "growth_across_figure",
+    f"{RUN_FIGURES}/growth_across.png",
+    "pictures:growth_maps",
+    section="Folding",
+    title="Growth across the surface",
+    caption=(
+        "As above, but growth along the normal of the pial surface, of run *{run}*: positive where the cortex becomes "
+        "thicker by growth."
+    ),
+    job="growth_found_figures",
 )
 
 
-def growth_found_figure(simulation: Simulation) -> Figure:
-    inputs = {"frames": simulation.file(FOLDING["frames"]), "params": simulation.file(PARAMETERS)}
-    return Figure(GROWTH_FOUND, inputs, {"views": THREE_SIDES}, simulation.names)
+def growth_found_figure(simulation: Simulation, kind: Kind = GROWTH_FOUND, **options: str) -> Figure:
+    inputs = {"frames": simulation.file(FOLDING["frames"]), "growth": simulation.file(GROWTH_MAPS)}
+    return Figure(kind, inputs, {"views": THREE_SIDES, **options}, simulation.names)
 
 
 ZONES_OF_RUN = Kind("zones_figure", f"{RUN_FIGURES}/zones.png", "pictures:zones_picture", target="", paper=True)

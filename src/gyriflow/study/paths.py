@@ -89,6 +89,7 @@ CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/cur
 
 PARAMETERS = f"{RUN}/params.yaml"
 MAPS = f"{RUN}/folding/maps.h5"
+GROWTH_MAPS = f"{RUN}/surfaces/growth.shape.gii"
 REGIONS = {"mesh": f"{RUN}/folding/regions.xdmf", "data": f"{RUN}/folding/regions.h5"}
 FOLDING = {
     "steps": f"{RUN}/folding/steps.csv",

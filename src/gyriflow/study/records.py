@@ -231,6 +231,11 @@ class Simulation:
         return paths.TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
 
     @property
+    def has_growth_maps(self) -> bool:
+        """Whether maps of the growth that it found can be written."""
+        return self.shapes is not None and "growth" in self.settings.fields
+
+    @property
     def mapped(self) -> dict[str, Varying]:
         """Its parameters that have a map."""
         values = {name: getattr(self.settings, name) for name in VARYING}

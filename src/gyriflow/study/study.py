@@ -201,7 +201,7 @@ class Study:
             for simulation in self.run_simulations
             for file in paths.folded_of(*simulation.start.sides).values()
             for week in simulation.weeks
-        ]
+        ] + [simulation.file(paths.GROWTH_MAPS) for simulation in self.run_simulations if simulation.has_growth_maps]
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:

@@ -11,10 +11,11 @@ import yaml
 from matplotlib.figure import Figure as Drawing
 from scripts import run_script
 
+from gyriflow.growth.maps import growth_per_week
 from gyriflow.io.files import write_json, write_table
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.report.page import caption_html
-from gyriflow.report.pictures import displacements, growth_of_area
+from gyriflow.report.pictures import displacements
 from gyriflow.shipped import DEMO, SHIPPED
 from gyriflow.study import comparison_figures, figures, resolve
 from gyriflow.study.figures import figures_of
@@ -166,6 +167,7 @@ def frames(tmp_path):
             group = file.create_group(f"week_{week}.00")
             group["positions"] = size * np.concatenate([CORNERS, INSIDE])
             group["tangential_growth_per_step"] = [0.01] * 4 + [9.0]
+            group["radial_growth_per_step"] = [0.02] * 4 + [9.0]
             group["growth_direction_per_step"] = np.eye(5, 3)
             group["cell_fields/J"] = np.ones(4)
     return str(path)
@@ -179,11 +181,13 @@ def test_displacement_is_between_the_weeks_on_the_later_surface(frames):
     assert surface.vertices.max() == pytest.approx(12)
 
 
-def test_growth_of_area_is_shown_on_the_later_surface(frames):
-    ((interval, (surface, values)),) = growth_of_area(read_pial_frames(frames), SECONDS_PER_GW / 4).items()
-    assert (interval, surface.vertices.max()) == ((21.0, 22.0), pytest.approx(12))
+def test_growth_is_that_of_a_week_up_to_the_later_frame(frames):
+    ((interval, maps),) = growth_per_week(read_pial_frames(frames), SECONDS_PER_GW / 4).items()
+    assert interval == (21.0, 22.0)
     # four steps a week, in both directions of the surface
-    assert values == pytest.approx(np.full(4, 100 * np.expm1(2 * 4 * 0.01)))
+    assert maps["area_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(2 * 4 * 0.01)))
+    assert maps["thickness_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(4 * 0.02)))
+    assert maps["growth_direction_y"] == pytest.approx([0, 4, 0, 0])
 
 
 def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path, frames):
