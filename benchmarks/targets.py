@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from gyriflow.folding.targets import path_through
-from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces, volumes_between
 from gyriflow.geometry.triangles import TriangleMesh
@@ -39,7 +38,7 @@ def main() -> None:
     shapes = {start_week: mesh.vertices}
     shapes |= {week: np.stack([maps[f"{targets[week]}_{axis}"] for axis in AXES], axis=1) for week in sorted(targets)}
     weeks = list(shapes)
-    path = path_through(weeks, list(shapes.values()), vertex_sizes(mesh.vertices, pieces))
+    path = path_through(weeks, list(shapes.values()), pieces)
     volumes = volumes_between(mesh.vertices, pieces)
     rows: list[dict[str, Any]] = []
     for part in np.arange(1, (len(weeks) - 1) * arguments.parts + 1) / arguments.parts:

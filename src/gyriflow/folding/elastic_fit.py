@@ -7,22 +7,25 @@ solver as that of a simulation; stress is forgotten after each step.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.spatial import cKDTree
 
 from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import vertex_sizes
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, signed_volumes
+from ..geometry.matching import faces_that_cross
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, signed_volumes, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
 from ..units import M_PER_MM, MM_PER_M
-from .contact import STIFFNESS_PER_MODULUS, SelfContact
+from .contact import SelfContact
 from .diagnosis import worst_places
 from .domain import Domain
 from .linear_solver import NotConvergedError
@@ -30,16 +33,22 @@ from .newton import NewtonSettings, NewtonSolver
 from .problem import NonlinearProblem
 from .stress import unpacked
 from .stretches import Stretches
-from .targets import inverse_exponential, log_growth
+from .targets import PARTS_OF_PATH, inverse_exponential, log_growth, path_through
 from .tissue import Elements
 from .zones import Zones
 
 MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
 """Of the body that is fitted. The modulus only sets the unit of forces; a compressible body yields more evenly."""
+BARRIER_PA = 1000.0
+"""Stiffness of the contact barrier: stiffer than in a simulation, since springs press folds together harder."""
 SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTH_MM = 0.2
 """Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
 depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
+SOFT_MM = 4.0
+"""Distance from a fault on the way to a shape within which springs stay as long as on the way."""
+MAX_DRAWS = 3
+"""Attempts to draw the boundary to its goals without a fault on the way."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STEPS = 2
@@ -53,7 +62,7 @@ SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newt
 class Springs:
     """Springs from the nodes on the boundary to their goals, a contribution to the energy of a step.
 
-    `vertices` (b,) are the ascending vertices of the mesh that have a spring, `stiffness_pa_per_m` is per area.
+    `vertices` (b,) are the ascending vertices of the mesh that have a spring.
     """
 
     def __init__(self, domain: Domain, vertices: Ints) -> None:
@@ -63,9 +72,9 @@ class Springs:
         self._local = np.flatnonzero(vertices[place] == owned)
         self._rows, self._vertices = place[self._local], vertices
 
-    def draw_to(self, goals_mm: Floats, areas_mm2: Floats, stiffness_pa_per_m: float) -> None:
-        """Set the (b, 3) goals in mm and the (b,) areas of the vertices, for a step from the present positions."""
-        weights = stiffness_pa_per_m * areas_mm2 * M_PER_MM**2
+    def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
+        """Set the (b, 3) goals in mm, for a step from the present positions, and (b,) areas and lengths of springs."""
+        weights = MODULUS_PA / (lengths_mm * M_PER_MM) * areas_mm2 * M_PER_MM**2
         self._weights = weights[self._rows, None]
         self._gaps = (self._domain.positions[self._vertices] - goals_mm * M_PER_MM)[self._rows]
 
@@ -108,7 +117,7 @@ class ElasticFit:
         zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
         domain = self._domain = Domain(MPI.COMM_SELF, mesh)
         self._problem = NonlinearProblem(domain, zones, MATERIALS["neo-hookean"](POISSON_RATIO))
-        self._contact = SelfContact(domain, facets, STIFFNESS_PER_MODULUS * MODULUS_PA)
+        self._contact = SelfContact(domain, facets, BARRIER_PA)
         self._springs = Springs(domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
@@ -131,27 +140,50 @@ class ElasticFit:
         goal = transform_points(shape, motion)
         strain = log_growth(self.positions_mm, self._stretches, goal - self.positions_mm, SMOOTHING_MM) / STEPS
         start = self.positions_mm[self._used]
+        lengths = np.full(len(start), SPRING_LENGTH_MM)
         for step in range(1, STEPS + 1):
-            self._step(start + (goal[self._used] - start) * step / STEPS, strain, MAX_HALVINGS)
+            self._step(start + (goal[self._used] - start) * step / STEPS, lengths, strain, MAX_HALVINGS)
         return self._move(np.linalg.inv(motion))
 
-    def draw(self, goals: Floats) -> Floats:
-        """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm."""
-        boundary = self.boundary
+    def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats:
+        """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
+
+        `before` are the last two shapes (n, 3) at most, if any. The path from them must have no inverted elements and
+        no crossing faces: where it has, the boundary is drawn less.
+        """
+        boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
-        self._step(transform_points(goals, motion), None, MAX_HALVINGS)
+        lengths = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
+        for attempt in range(1, MAX_DRAWS + 1):
+            self.positions_mm = start
+            self._step(transform_points(goals, motion), lengths, None, MAX_HALVINGS)
+            faults = self._faults_since(before) if before else np.empty((0, 3))
+            if not len(faults):
+                break
+            distance, _ = cKDTree(faults).query(self.boundary.vertices)
+            lengths[distance < attempt * SOFT_MM] = SPRING_LENGTH_MM
         return self._move(np.linalg.inv(motion))
+
+    def _faults_since(self, before: Sequence[Floats]) -> Floats:
+        """Return the (k, 3) places of inverted elements and crossing faces on the path from the last shapes."""
+        now, places = self.positions_mm, [np.empty((0, 3))]
+        path = path_through(range(len(before) + 1), [*before, now], self._pieces)
+        for part in PARTS_OF_PATH:
+            on_way = path(len(before) - 1 + part)
+            inverted = self._pieces[volumes_between(on_way, self._pieces) <= 0]
+            crossing = faces_that_cross(TriangleMesh(on_way[self._used], self._surface.faces))
+            places += [now[inverted].mean(axis=1), self.boundary.vertices[self._surface.faces[crossing]].mean(axis=1)]
+        return np.concatenate(places)
 
     def _move(self, motion: NDArray) -> Floats:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
-    def _step(self, goals: Floats, strain: Floats | None, halvings: int) -> None:
+    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None, halvings: int) -> None:
         domain, problem = self._domain, self._problem
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
-        length = SPRING_LENGTH_MM if strain is not None else CLOSE_SPRING_LENGTH_MM
-        self._springs.draw_to(goals, vertex_areas(self.boundary), MODULUS_PA / (length * M_PER_MM))
+        self._springs.draw_to(goals, vertex_areas(self.boundary), lengths)
         shape = len(domain.cells), len(problem.points.weights)
         inverse = np.tile(np.eye(3), (*shape, 1, 1))
         if strain is not None:
@@ -168,7 +200,7 @@ class ElasticFit:
                     remedy="Look at the labels or surfaces of this week and the one before at that place.",
                 ) from None
             half = None if strain is None else strain / 2
-            self._step(0.5 * (goals + self.positions_mm[self._used]), half, halvings - 1)
-            self._step(goals, half, halvings - 1)
+            self._step(0.5 * (goals + self.positions_mm[self._used]), lengths, half, halvings - 1)
+            self._step(goals, lengths, half, halvings - 1)
             return
         self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M

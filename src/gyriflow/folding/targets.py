@@ -8,17 +8,21 @@ constant, so that growth and stress have limits as the time step tends to zero.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import Share, conjugate_gradients, vertex_sizes
 from ..geometry.jacobians import chunks
+from ..geometry.tetrahedra import volumes_between
+from ..geometry.triangles import Ints
 from ..settings.folding import AXES, FoldingParameters
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
 from .stress import packed, unpacked
@@ -31,6 +35,10 @@ SMOOTHING_TOL = 1e-3
 """Relative tolerance of smoothing; feedback makes up for the error."""
 FEEDBACK_GW = 0.5
 """Time constant with which growth takes the brain back to its path."""
+PARTS_OF_PATH = (0.25, 0.5, 0.75)
+"""Fractions of the path between two shapes at which it is checked."""
+STRAIGHT_MM = 5.0
+"""Distance from an element that would be inverted within which the path is straight (Gaussian)."""
 WEEK_TOL_GW = 1e-6
 """Time before a target at which it counts as reached."""
 
@@ -92,7 +100,7 @@ class GrowthToTargets:
         shapes = {p.start_week: positions_mm}
         for week in sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW):
             shapes[week] = np.stack([inputs.maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1)
-        path = path_through(list(shapes), list(shapes.values()), vertex_sizes(positions_mm, inputs.pieces))
+        path = path_through(list(shapes), list(shapes.values()), inputs.pieces)
         return cls(p, inputs, path, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> StepGrowth:
@@ -110,17 +118,27 @@ class GrowthToTargets:
         return TargetGrowth(p, start, (strain * growing).T, misfit_mm, self.stretches)
 
 
-def path_through(weeks: Sequence[float], shapes: Sequence[Floats], sizes: Floats) -> CubicHermiteSpline:
-    """Return a path through (n, 3) shapes in mm at ascending weeks, as a function of the week.
+def path_through(weeks: Sequence[float], shapes: Sequence[Floats], pieces: Ints) -> CubicHermiteSpline:
+    """Return a path through (n, 3) shapes of tetrahedra `pieces` (p, 4) in mm at ascending weeks, by the week.
 
-    Each shape is first aligned rigidly to the one before, its points weighted by their (n,) sizes. The velocity is
-    continuous: at each week that of the parabola through this shape and its neighbours, at the ends the mean velocity
-    to the neighbour.
+    Each shape is first aligned rigidly to the one before. The velocity is continuous: at each week that of the parabola
+    through this shape and its neighbours, at the ends the mean velocity to the neighbour. Around an element that would
+    be inverted on the way, the path is straight from shape to shape instead, at rest in both weeks.
     """
+    sizes = vertex_sizes(shapes[0], pieces)
     aligned = [shapes[0]]
     for shape in shapes[1:]:
         aligned.append(transform_points(shape, rigid_fit(shape, aligned[-1], sizes)))
-    return CubicHermiteSpline(weeks, np.stack(aligned), np.gradient(np.stack(aligned), weeks, axis=0))
+    places = np.stack(aligned)
+    velocities = np.gradient(places, weeks, axis=0)
+    path = CubicHermiteSpline(weeks, places, velocities)
+    for number, (week, later) in enumerate(pairwise(weeks)):
+        on_way = (path((1 - part) * week + part * later) for part in PARTS_OF_PATH)
+        inverted = np.concatenate([pieces[volumes_between(at, pieces) <= 0] for at in on_way])
+        if len(inverted):
+            distance, _ = cKDTree(places[number][inverted].mean(axis=1)).query(places[number])
+            velocities[number : number + 2] *= 1 - np.exp(-((distance / STRAIGHT_MM) ** 2))[:, None]
+    return CubicHermiteSpline(weeks, places, velocities)
 
 
 def log_growth(positions: Floats, stretches: Stretches, displacement: Floats, smoothing_mm: float) -> Floats:

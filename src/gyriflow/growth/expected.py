@@ -46,7 +46,7 @@ class FittedBody(Protocol):
     @property
     def boundary(self) -> TriangleMesh: ...
     def follow(self, shape: Floats) -> Floats: ...
-    def draw(self, goals: Floats) -> Floats: ...
+    def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats: ...
 
 
 def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh, pull_mm: Sequence[float] = PULL_MM) -> Floats:
@@ -125,7 +125,8 @@ def carry_sharply(
             if body is not None:
                 shape = body.follow(shape)
                 if surfaces is not None and surface is not None:
-                    shape = body.draw(fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM))
+                    goals = fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM)
+                    shape = body.draw(goals, before=positions[-2:])
                     _warn_of_misfit(body.boundary, surfaces[surface], surface + 1)
             positions.append(shape)
     return np.stack(positions)
@@ -246,7 +247,11 @@ def predict_shapes(
     shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also)
     if body_of:
         body = body_of(mesh)
-        positions = np.stack([positions[0], *(body.follow(shape) for shape in positions[1:])])
+        found = [positions[0]]
+        for shape in positions[1:]:
+            body.follow(shape)
+            found.append(body.draw(shape[used], before=found[-2:]))
+        positions = np.stack(found)
     baselines = {"atlas": [positions_at(week, carried, weeks, sizes)[used] for week in shape_weeks]}
     for name, path in (("atlas_deformed", grown), ("displaced", carry_sharply(mesh, pairs, None)[1:])):
         _, places = expected_positions(mesh, start_week, path, weeks, also=also, smoothing_mm=0)
