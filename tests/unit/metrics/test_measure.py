@@ -140,7 +140,7 @@ def test_each_map_and_metric_has_a_record_and_each_record_is_written(apart: Brai
     )
     deviations = {**deviation_maps(ball, ball), "thickness_difference_mm": np.zeros(len(ball.vertices))}
     at_template = maps_on_template({}, ball, ball, [])
-    drawn_in_report = {"displacement_mm", "area_growth_percent_per_gw"}
+    drawn_in_report = {"displacement_mm", "area_growth_percent_per_gw", "thickness_growth_percent_per_gw"}
     assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report} == set(VERTEX_MAPS)
     white, white_maps = measure_white({"left": ball})
     assert set(white_maps["left"]) <= set(thick.maps["left"])
