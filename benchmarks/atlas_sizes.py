@@ -62,6 +62,7 @@ def main() -> None:
     rows = [
         {"growth": name, "brains": other} | errors({"stated": stated[name], "by_size": by_size[name]}, stated[other])
         for name, other in permutations(stated, 2)
+        if len(set(stated[name]) & set(stated[other])) > 1
     ]
     for row in rows:
         print(row)

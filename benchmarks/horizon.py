@@ -84,7 +84,9 @@ def main() -> None:
         elements.append(int(summary["tets"]))
     # tests of other starts, made once, are kept
     kept = (
-        [row for row in read_keys(arguments.write)["rows"] if row["start"] not in GROWN_BY] if arguments.write else []
+        [row for row in read_keys(arguments.write)["rows"] if row["start"] not in GROWN_BY]
+        if arguments.write and arguments.write.exists()
+        else []
     )
     references = [read_keys(ATLASES / name / "atlas.yaml")["reference"] for name in GROWN_BY]
     result = {

@@ -100,6 +100,6 @@ rule targets:
         weeks=lambda w: chain_of(w).later_weeks,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
-        by_size=CONFIG.growth.atlas_ages == "size",
+        by_size=lambda w: w.origin == "atlas" and CONFIG.growth.atlas_ages == "size",
     script:
         "../scripts/targets.py"

@@ -34,8 +34,8 @@ EDGES_PER_SPACING = {1: 1, 2: 2}
 """Number of edges of the contact surface between neighbouring nodes, by the order of the elements."""
 STIFFEN_BELOW = 0.1
 """Fraction of the contact distance. Where the smallest gap at a step's start is smaller, the barrier is stiffer, by the
-square root of the ratio. With stress memory folds press on each other ever harder, and a barrier that is too soft lets
-them come so near that Newton's method stagnates."""
+square root of the ratio, if it may stiffen: with stress memory folds press on each other ever harder, and a barrier
+that is too soft lets them come so near that Newton's method stagnates."""
 MAX_STIFFENING = 32.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_GAP_FRACTION = 0.999
@@ -81,15 +81,23 @@ class SelfContact:
     Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
     distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
-    below the smallest gap at the start of the run, neighbours aside: a body that does not grow must not move. MeshError
+    below the smallest gap at the start of the run, neighbours aside: a body that does not grow must not move, except
+    where neighbours on thin triangles are nearer to each other. `stiffens` is for runs with stress memory. MeshError
     where the surface crosses itself at the start.
     """
 
     def __init__(
-        self, domain: Domain, facets: NDArray[np.int64], stiffness_pa: float, distance_mm: float | None = None
+        self,
+        domain: Domain,
+        facets: NDArray[np.int64],
+        stiffness_pa: float,
+        distance_mm: float | None = None,
+        *,
+        stiffens: bool = False,
     ) -> None:
         ipctk.set_num_threads(1)  # more threads would compete with other ranks
         self.domain, self.surface = domain, ContactSurface(domain, facets)
+        self._stiffens = stiffens
         self._initial_pa, self._given_mm, self._max_mm = stiffness_pa, distance_mm, np.inf
         start = self.surface.reference_mm()
         self._edges = edges(TriangleMesh(start, self.surface.faces))[0]
@@ -110,7 +118,7 @@ class SelfContact:
             self.begin_step()
 
     def _smallest_gap_mm(self, near: NearPairs) -> float:
-        """Return the smallest distance of a rank's pairs that are no neighbours, infinite without any."""
+        """Return the smallest distance between a rank's pairs that are not neighbours, infinite without any."""
         corners = near.vertices_of_pairs()
         rows = near.part.vertices[np.unique(np.concatenate([[], *corners])).astype(int)]
         count = len(self._rest)
@@ -139,7 +147,8 @@ class SelfContact:
         # the first residual of the step needs them again
         self._near: NearPairs | None = self._search.near(self._rest)
         gap_mm = self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN)
-        self.barrier = Barrier(distance_mm, self._initial_pa * stiffening(gap_mm / distance_mm))
+        factor = stiffening(gap_mm / distance_mm) if self._stiffens else 1.0
+        self.barrier = Barrier(distance_mm, factor * self._initial_pa)
 
     def near_pairs(self, u: Floats) -> NearPairs:
         """Return this rank's pairs. Those of the last displacement are cached."""

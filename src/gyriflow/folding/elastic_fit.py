@@ -6,6 +6,7 @@ draw its boundary there, and elasticity and the contact barrier keep elements po
 solver as that of a simulation; stress is forgotten after each step.
 """
 
+import logging
 import math
 from collections.abc import Sequence
 
@@ -18,10 +19,9 @@ from scipy.spatial import cKDTree
 from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
-from ..geometry.diffusion import vertex_sizes
 from ..geometry.matching import faces_that_cross
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, signed_volumes, volumes_between
-from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas
+from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
 from ..units import M_PER_MM, MM_PER_M
@@ -37,6 +37,8 @@ from .targets import PARTS_OF_PATH, inverse_exponential, log_growth, path_throug
 from .tissue import Elements
 from .zones import Zones
 
+log = logging.getLogger(__name__)
+
 MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
 """Of the body that is fitted. The modulus only sets the unit of forces; a compressible body yields more evenly."""
 BARRIER_PA = 1000.0
@@ -46,13 +48,14 @@ CLOSE_SPRING_LENGTH_MM = 0.2
 """Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
 depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
 SOFT_MM = 4.0
-"""Distance from a fault on the way to a shape within which springs stay as long as on the way."""
+"""Radius around an inverted element or crossing face on the path within which springs stay soft; it grows with each
+attempt."""
 MAX_DRAWS = 3
-"""Attempts to draw the boundary to its goals without a fault on the way."""
+"""Attempts to draw the boundary to its goals with no such element or face on the path."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
-STEPS = 2
-"""Steps in which the body moves to a shape."""
+MIN_STEPS, STRAIN_PER_STEP = 2, 0.1
+"""Smallest number of steps in which the body moves to a shape, and mean growth of length of a step."""
 MAX_HALVINGS = 5
 """Largest number of times that a step which fails is halved."""
 SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=30)
@@ -136,32 +139,46 @@ class ElasticFit:
         The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. SolverError
         with the place where it cannot go on.
         """
-        motion = rigid_fit(shape, self.positions_mm, vertex_sizes(self.positions_mm, self._pieces))
+        boundary = self.boundary
+        motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
-        strain = log_growth(self.positions_mm, self._stretches, goal - self.positions_mm, SMOOTHING_MM) / STEPS
-        start = self.positions_mm[self._used]
-        lengths = np.full(len(start), SPRING_LENGTH_MM)
-        for step in range(1, STEPS + 1):
-            self._step(start + (goal[self._used] - start) * step / STEPS, lengths, strain, MAX_HALVINGS)
+        ratio = signed_volume(TriangleMesh(goal[self._used], boundary.faces)) / signed_volume(boundary)
+        steps = max(MIN_STEPS, math.ceil(abs(math.log(max(ratio, 1e-3))) / 3 / STRAIN_PER_STEP))
+        lengths = np.full(len(self._used), SPRING_LENGTH_MM)
+        for left in range(steps, 0, -1):
+            displacement = (goal - self.positions_mm) / left
+            strain = log_growth(self.positions_mm, self._stretches, displacement, SMOOTHING_MM)
+            self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats:
         """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
         `before` are the last two shapes (n, 3) at most, if any. The path from them must have no inverted elements and
-        no crossing faces: where it has, the boundary is drawn less.
+        no crossing faces: where it has, the boundary is drawn less. A body that cannot be drawn stays as it is.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         lengths = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
         for attempt in range(1, MAX_DRAWS + 1):
             self.positions_mm = start
-            self._step(transform_points(goals, motion), lengths, None, MAX_HALVINGS)
+            try:
+                self._step(transform_points(goals, motion), lengths, None, MAX_HALVINGS)
+            except SolverError as error:
+                self.positions_mm = start
+                log.warning("the body is not drawn to a surface: %s", error)
+                break
             faults = self._faults_since(before) if before else np.empty((0, 3))
             if not len(faults):
                 break
             distance, _ = cKDTree(faults).query(self.boundary.vertices)
             lengths[distance < attempt * SOFT_MM] = SPRING_LENGTH_MM
+        else:
+            log.warning(
+                "%d elements or faces are inverted or cross on the way to a shape, near %s mm",
+                len(faults),
+                np.round(faults[0], 1).tolist(),
+            )
         return self._move(np.linalg.inv(motion))
 
     def _faults_since(self, before: Sequence[Floats]) -> Floats:
@@ -189,7 +206,8 @@ class ElasticFit:
         if strain is not None:
             nodal = strain[self._elements.vertices][self._elements.cells]
             inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
-        problem.set_step(np.full(shape, MODULUS_PA), inverse)
+        # as one body, also if its parts are not connected
+        problem.set_step(np.full(shape, MODULUS_PA), inverse, part=np.zeros_like(domain.part))
         try:
             solution = self._solver.solve()
         except NotConvergedError as error:

@@ -68,7 +68,7 @@ class Folding:
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
             barrier = STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm
-            self.contact = SelfContact(self.domain, zones.facets, *barrier)
+            self.contact = SelfContact(self.domain, zones.facets, *barrier, stiffens=p.stress_memory_gw > 0)
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
         edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM

@@ -14,7 +14,7 @@ from .compilation import compiled
 from .stress import packed
 
 MAX_STRAIN = 0.3
-"""Largest principal Hencky strain of growth in a step: elements with more are inverted in the target."""
+"""Largest principal Hencky strain of a displacement; larger ones are clipped."""
 MAX_SERIES_NORM = 0.12
 """Largest row sum of |FᵀF − I|, a bound of its eigenvalues, for which the logarithm is computed by its series."""
 PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))

@@ -37,6 +37,7 @@ FEEDBACK_GW = 0.5
 """Time constant with which growth takes the brain back to its path."""
 PARTS_OF_PATH = (0.25, 0.5, 0.75)
 """Fractions of the path between two shapes at which it is checked."""
+STRAIGHTENING_ROUNDS = 2
 STRAIGHT_MM = 5.0
 """Distance from an element that would be inverted within which the path is straight (Gaussian)."""
 WEEK_TOL_GW = 1e-6
@@ -131,8 +132,9 @@ def path_through(weeks: Sequence[float], shapes: Sequence[Floats], pieces: Ints)
         aligned.append(transform_points(shape, rigid_fit(shape, aligned[-1], sizes)))
     places = np.stack(aligned)
     velocities = np.gradient(places, weeks, axis=0)
-    path = CubicHermiteSpline(weeks, places, velocities)
-    for number, (week, later) in enumerate(pairwise(weeks)):
+    # a change at one week affects the intervals on both sides of it
+    for number, (week, later) in [*enumerate(pairwise(weeks))] * STRAIGHTENING_ROUNDS:
+        path = CubicHermiteSpline([week, later], places[number : number + 2], velocities[number : number + 2])
         on_way = (path((1 - part) * week + part * later) for part in PARTS_OF_PATH)
         inverted = np.concatenate([pieces[volumes_between(at, pieces) <= 0] for at in on_way])
         if len(inverted):

@@ -49,9 +49,10 @@ def ages_by_size(weeks: Sequence[float], volumes_ml: Sequence[float]) -> AtlasAg
     stated, volumes = np.asarray(weeks, dtype=float), np.asarray(volumes_ml, dtype=float)
     curve = fitted(weeks, volumes_ml, name="volume of the atlas").curve
     logs, sizes = np.log(curve.values), np.log(volumes)
-    # the curve is flat where brains do not grow; rates of growth at its ends lead beyond it
+    # the curve is flat where brains do not grow; beyond its ends ages follow its rate there, or its mean rate if higher
     inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
-    beyond = [np.maximum(rate(curve, curve.weeks[end]), 1e-3) for end in (0, -1)]
+    mean_rate = (logs[-1] - logs[0]) / (curve.weeks[-1] - curve.weeks[0])
+    beyond = [max(float(rate(curve, curve.weeks[end])), mean_rate) for end in (0, -1)]
     ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / beyond[0], inside)
     ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / beyond[1], ages)
     spacing = MIN_SPACING_GW * np.arange(len(ages))

@@ -26,7 +26,7 @@ PULL_MM = (4.0, 2.5, 1.5, 1.0)
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
 AGAIN_MM = (0.5,)
-"""The same for the fit of a body that is close to the surface."""
+"""Smoothing (SD, mm) of the pull on a body that is close to the surface."""
 REACH_MM = 4.0
 """Largest distance over which a surface pulls."""
 MAX_MISFIT_MM = 0.25
@@ -91,7 +91,7 @@ def carry_sharply(
     Matched surfaces need no fit: the boundary keeps its place relative to them.
 
     Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
-    week to a shape that has not, and is fitted to the surface once more from there; the next week starts from it.
+    week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
 
     The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
     of the later brains, all in the spaces of these correspondences. Without surfaces nothing is fitted.
@@ -124,9 +124,12 @@ def carry_sharply(
             shape = places + extend(moved - places[used])
             if body is not None:
                 shape = body.follow(shape)
+                # a surface that is matched by its vertices is the goal itself
+                goals = moved
                 if surfaces is not None and surface is not None:
                     goals = fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM)
-                    shape = body.draw(goals, before=positions[-2:])
+                shape = body.draw(goals, before=positions[-2:])
+                if surfaces is not None and surface is not None:
                     _warn_of_misfit(body.boundary, surfaces[surface], surface + 1)
             positions.append(shape)
     return np.stack(positions)
@@ -158,7 +161,7 @@ def positions_at(week: float, atlas: Floats, weeks: Sequence[float] | Floats, si
 
 
 def at_ages_by_size(mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float]) -> tuple[Floats, AtlasAges]:
-    """Return the (k, n, 3) positions of an atlas at its k weeks as its smooth growth has them, and the ages it used.
+    """Return the (k, n, 3) positions of an atlas at its k weeks, resampled along its curve of volume, and the ages.
 
     At each week the shape is that between the brains whose ages by size are around it, and the volume that of the
     curve through all brains.

@@ -147,7 +147,7 @@ class FoldingSettings(Settings):
 
     @property
     def keeps_volume_only(self) -> bool:
-        """Whether of elastic strain the change of volume is kept, and the change of shape forgotten in each step."""
+        """Whether only the elastic change of volume is kept between steps."""
         return self.relaxation == "shape" and self.stress_memory_gw == 0
 
     def problems(self) -> Iterator[KeyProblem]:

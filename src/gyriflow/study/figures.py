@@ -344,8 +344,8 @@ GROWTH_ACROSS = Kind(
     section="Folding",
     title="Growth across the surface",
     caption=(
-        "As above, but growth along the normal of the pial surface, of run *{run}*: positive where the cortex becomes "
-        "thicker by growth."
+        "Growth along the normal of the pial surface, by which run *{run}* approaches its target shapes from week to "
+        "week: positive where tissue becomes thicker by growth."
     ),
     job="growth_found_figures",
 )
