@@ -215,9 +215,9 @@ def test_a_prediction_beyond_those_that_were_tried_says_so():
     assert accuracy_sentence(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
 
 
-def test_the_shipped_worth_of_predictions_is_of_two_starts_at_each_horizon_beside_simpler_ways():
+def test_the_shipped_worth_of_predictions_is_of_two_starts_or_more_at_each_horizon_beside_simpler_ways():
     rows = pd.DataFrame(ACCURACY["rows"])
-    assert (rows.groupby("horizon")["start"].nunique() == 2).all()
+    assert (rows.groupby("horizon")["start"].nunique() >= 2).all()
     assert not rows.duplicated(["start", "horizon", "model"]).any()
     by_way = rows.pivot_table("distance_mm", ["start", "horizon"], "model")
     assert set(by_way) == {"run", "target", "atlas", "atlas_deformed", "scaled"}
