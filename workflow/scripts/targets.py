@@ -31,7 +31,7 @@ with step(snakemake.log[0]):
         positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
     else:
         inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        options = {"body_of": ElasticFit, "by_size": params.by_size}
+        options = {"make_body": ElasticFit, "by_size": params.by_size}
         weeks, positions, further, ages = predict_shapes(mesh, *inputs, **options)
     targets = WeeklyShapes(
         np.array(weeks), positions, sizes_of(mesh, positions), further, ages.table() if ages else None

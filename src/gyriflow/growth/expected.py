@@ -25,7 +25,7 @@ PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
-AGAIN_MM = (0.5,)
+FINAL_PULL_MM = (0.5,)
 """Smoothing (SD, mm) of the pull on a body that is close to the surface."""
 REACH_MM = 4.0
 """Largest distance over which a surface pulls."""
@@ -127,7 +127,7 @@ def carry_sharply(
                 # a surface that is matched by its vertices is the goal itself
                 goals = moved
                 if surfaces is not None and surface is not None:
-                    goals = fit_onto_surface(body.boundary, surfaces[surface], AGAIN_MM)
+                    goals = fit_onto_surface(body.boundary, surfaces[surface], FINAL_PULL_MM)
                 shape = body.draw(goals, before=positions[-2:])
                 if surfaces is not None and surface is not None:
                     _warn_of_misfit(body.boundary, surfaces[surface], surface + 1)
@@ -137,7 +137,7 @@ def carry_sharply(
 
 def _warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, number: int) -> None:
     ways = ((boundary, surface), (surface, boundary))
-    mean, far = surface_distance((nearest_on(one.vertices, two)[0], vertex_areas(one)) for one, two in ways)
+    mean, far = surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
     log.info("shape %d: %.3f mm from the observed surface on average, 95 %% below %.2f mm", number, mean, far)
     if mean > MAX_MISFIT_MM:
         log.warning(
@@ -160,7 +160,7 @@ def positions_at(week: float, atlas: Floats, weeks: Sequence[float] | Floats, si
     return np.asarray((1 - part) * atlas[first] + part * transform_points(atlas[first + 1], motion))
 
 
-def at_ages_by_size(mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float]) -> tuple[Floats, AtlasAges]:
+def resample_by_size(mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float]) -> tuple[Floats, AtlasAges]:
     """Return the (k, n, 3) positions of an atlas at its k weeks, resampled along its curve of volume, and the ages.
 
     At each week the shape is that between the brains whose ages by size are around it, and the volume that of the
@@ -229,27 +229,27 @@ def predict_shapes(
     weeks: Sequence[float],
     also: Sequence[float] = (),
     *,
-    body_of: Callable[[TetrahedralMesh], FittedBody] | None = None,
+    make_body: Callable[[TetrahedralMesh], FittedBody] | None = None,
     by_size: bool = True,
 ) -> tuple[list[float], Floats, dict[str, list[Floats]], AtlasAges | None]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
-    With `by_size` the brain moves as the atlas `at_ages_by_size`, whose ages are returned as well; else as its brains
-    at their stated weeks. The baselines are simpler predictions of the boundary's vertices: `atlas`, the atlas' own
-    brain; `atlas_deformed`, that brain with the whole individual difference; and `displaced`, the start moved by
-    registration alone.
+    With `by_size` the brain moves as the atlas resampled by size (`resample_by_size`), whose ages are returned as well;
+    else as its brains at their stated weeks. The baselines are simpler predictions of the boundary's vertices: `atlas`,
+    the atlas' own brain; `atlas_deformed`, that brain with the whole individual difference; and `displaced`, the start
+    moved by registration alone.
 
     `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
     `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
-    further weeks. `body_of` makes bodies of the mesh, which follow the atlas' shapes and the predicted ones; without
+    further weeks. `make_body` makes bodies of the mesh, which follow the atlas' shapes and the predicted ones; without
     it, elements of these may be inverted.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    carried = carry_sharply(mesh, pairs, surfaces, body_of(mesh) if body_of else None)[1:]
-    grown, ages = at_ages_by_size(mesh, carried, weeks) if by_size else (carried, None)
+    carried = carry_sharply(mesh, pairs, surfaces, make_body(mesh) if make_body else None)[1:]
+    grown, ages = resample_by_size(mesh, carried, weeks) if by_size else (carried, None)
     shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also)
-    if body_of:
-        body = body_of(mesh)
+    if make_body:
+        body = make_body(mesh)
         found = [positions[0]]
         for shape in positions[1:]:
             body.follow(shape)
