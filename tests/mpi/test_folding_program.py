@@ -93,7 +93,8 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_p
     # what remains to the end is shorter than a step, and is halved
     assert done.stdout == Facts("69120 s", "34560 s")
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
-    assert steps["dt_s"].min() == 34560
+    assert steps["dt_s"].min() <= 34560
+    assert steps["week"].iloc[-1] == pytest.approx(21.4)
     assert (steps["min_J"] > 0).all()
 
 
