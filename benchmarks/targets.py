@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from gyriflow.folding.targets import path_through
+from gyriflow.folding.targets import path_through, shapes_of_run
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces, volumes_between
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.tetmeshes import read_maps, read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.settings.folding import AXES, parameters_from
+from gyriflow.settings.folding import parameters_from
 
 
 def main() -> None:
@@ -32,13 +32,10 @@ def main() -> None:
     parser.add_argument("--parts", type=int, default=4, help="parts of an interval between two targets")
     arguments = parser.parse_args()
     mesh, maps = read_tetrahedral_mesh(arguments.mesh), read_maps(arguments.maps)
-    targets = parameters_from(read_yaml(arguments.params)).targets
-    start_week = parameters_from(read_yaml(arguments.params)).start_week
+    parameters = parameters_from(read_yaml(arguments.params))
     pieces, (boundary, used) = linear_pieces(mesh), boundary_surface(mesh)
-    shapes = {start_week: mesh.vertices}
-    shapes |= {week: np.stack([maps[f"{targets[week]}_{axis}"] for axis in AXES], axis=1) for week in sorted(targets)}
-    weeks = list(shapes)
-    path = path_through(weeks, list(shapes.values()), pieces)
+    weeks, shapes = shapes_of_run(parameters, maps, mesh.vertices)
+    path = path_through(weeks, shapes, pieces)
     volumes = volumes_between(mesh.vertices, pieces)
     rows: list[dict[str, Any]] = []
     for part in np.arange(1, (len(weeks) - 1) * arguments.parts + 1) / arguments.parts:

@@ -144,10 +144,12 @@ class SelfContact:
         edge_based = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
         distance_mm = self._given_mm or min(edge_based, self._max_mm)
         self._search = ContactSearch(self.surface.faces, self._owned, self._rest, distance_mm, self._search)
-        # the first residual of the step needs them again
-        self._near: NearPairs | None = self._search.near(self._rest)
-        gap_mm = self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN)
-        factor = stiffening(gap_mm / distance_mm) if self._stiffens else 1.0
+        self._near: NearPairs | None = None
+        factor = 1.0
+        if self._stiffens:
+            # the first residual of the step needs them again
+            self._near = self._search.near(self._rest)
+            factor = stiffening(self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN) / distance_mm)
         self.barrier = Barrier(distance_mm, factor * self._initial_pa)
 
     def near_pairs(self, u: Floats) -> NearPairs:

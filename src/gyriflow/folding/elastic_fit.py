@@ -20,7 +20,7 @@ from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.matching import faces_that_cross
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, signed_volumes, volumes_between
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
@@ -29,7 +29,7 @@ from .contact import SelfContact
 from .diagnosis import worst_places
 from .domain import Domain
 from .linear_solver import NotConvergedError
-from .newton import NewtonSettings, NewtonSolver
+from .newton import NewtonSettings, NewtonSolver, residual_floor
 from .problem import NonlinearProblem
 from .stress import unpacked
 from .stretches import Stretches
@@ -123,9 +123,7 @@ class ElasticFit:
         self._contact = SelfContact(domain, facets, BARRIER_PA)
         self._springs = Springs(domain, self._used)
         self._problem.contributions += [self._contact, self._springs]
-        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
-        floor = 1e-11 * MODULUS_PA * edge**2 * math.sqrt(len(mesh.vertices))
-        self._solver = NewtonSolver(self._problem, SETTINGS, floor)
+        self._solver = NewtonSolver(self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA))
         self._elements = Elements(domain.cells, domain.vertex_of_node, self._problem.points)
 
     @property

@@ -1,11 +1,14 @@
 """Newton's method for the displacement of one step: inexact linear solves, each followed by a line search."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
+from ..units import M_PER_MM
 from .linear_solver import PLAIN, Direction, LinearSolver, NotConvergedError
 from .problem import NonlinearProblem
 from .tangent import Residual, Tangent
@@ -71,6 +74,12 @@ class Iterate:
     energy: float | None = None
     progress: float = 0.0
     exhausted: bool = False
+
+
+def residual_floor(mesh: TetrahedralMesh, modulus_pa: float) -> float:
+    """Return the residual in N that counts as solved in a mesh in mm, whatever that at zero displacement."""
+    edge_m = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
+    return 1e-11 * modulus_pa * edge_m**2 * math.sqrt(len(mesh.vertices))
 
 
 def forcing_term(final: float, left: float, tightest: float) -> float:

@@ -50,8 +50,8 @@ class NonlinearProblem:
 
     Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. With `remembers_stress`
     the mesh may be stretched elastically at the start of the step, with `keeps_volume` only in its volume.
-    `quadrature_degree` is that of the polynomials that
-    are integrated exactly; None takes what the elements' order needs.
+    `quadrature_degree` is that of the polynomials that are integrated exactly; None takes what the elements' order
+    needs.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.

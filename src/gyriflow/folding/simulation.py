@@ -1,6 +1,5 @@
 """Time stepping: in each step growth, layers and a Newton solve; steps whose solve fails are halved."""
 
-import math
 import time
 from dataclasses import replace
 
@@ -9,7 +8,7 @@ from mpi4py import MPI
 
 from ..errors import SolverError
 from ..geometry.diffusion import Share
-from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
+from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
@@ -23,7 +22,7 @@ from .growth import GrowthInputs, StepGrowth, StepStart
 from .growth_models import growth_model
 from .layers import shear_modulus
 from .linear_solver import RUNGS, NotConvergedError
-from .newton import NewtonSettings, NewtonSolver, Solution
+from .newton import NewtonSettings, NewtonSolver, Solution, residual_floor
 from .output import print_line, warn
 from .problem import NonlinearProblem
 from .step_fields import SolvedStep, StepFields
@@ -71,9 +70,7 @@ class Folding:
             self.contact = SelfContact(self.domain, zones.facets, *barrier, stiffens=p.stress_memory_gw > 0)
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
-        edge = float(np.cbrt(signed_volumes(mesh).mean())) * M_PER_MM
-        floor = 1e-11 * stiffest * edge**2 * math.sqrt(len(mesh.vertices))
-        self.solver = NewtonSolver(self.problem, newton, floor)
+        self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
         share = Share(comm.rank, comm.size, self.domain.sum_over_ranks)
         self.model = growth_model(p, self.inputs, mesh.vertices, share)

@@ -24,6 +24,7 @@ from ..geometry.jacobians import chunks
 from ..geometry.tetrahedra import volumes_between
 from ..geometry.triangles import Ints
 from ..settings.folding import AXES, FoldingParameters
+from ..settings.varying import Maps
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
 from .stress import packed, unpacked
 from .stretches import Stretches
@@ -98,10 +99,7 @@ class GrowthToTargets:
                 found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
                 remedy="End the run earlier, or add brains of later weeks.",
             )
-        shapes = {p.start_week: positions_mm}
-        for week in sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW):
-            shapes[week] = np.stack([inputs.maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1)
-        path = path_through(list(shapes), list(shapes.values()), inputs.pieces)
+        path = path_through(*shapes_of_run(p, inputs.maps, positions_mm), inputs.pieces)
         return cls(p, inputs, path, Stretches(inputs.pieces, len(inputs.zones.growth), share))
 
     def growth(self, start: StepStart) -> StepGrowth:
@@ -117,6 +115,13 @@ class GrowthToTargets:
         misfit_mm = float(np.sqrt(np.average((misfit**2).sum(axis=1), weights=sizes)))
         growing = self.inputs.zones.growth[:, None]
         return TargetGrowth(p, start, (strain * growing).T, misfit_mm, self.stretches)
+
+
+def shapes_of_run(p: FoldingParameters, maps: Maps, positions_mm: Floats) -> tuple[list[float], list[Floats]]:
+    """Return the ascending weeks and (n, 3) shapes in mm of a run: that at its start, and the targets in its maps."""
+    weeks = sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW)
+    targets = [np.stack([maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1) for week in weeks]
+    return [p.start_week, *weeks], [positions_mm, *targets]
 
 
 def path_through(weeks: Sequence[float], shapes: Sequence[Floats], pieces: Ints) -> CubicHermiteSpline:
