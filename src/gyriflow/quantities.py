@@ -208,6 +208,35 @@ _SIMULATION_MAPS = (
         description="Growth along the normal of the surface",
         is_averaged=False,
     ),
+    VertexMap(
+        name="position_sd_mm",
+        unit="mm",
+        label="SD of position",
+        bids_suffix="positionSd",
+        description="Standard deviation of the position over the members of an ensemble",
+        is_averaged=False,
+        colours=POSITIVE_COLOURS,
+    ),
+    VertexMap(
+        name="sulcus_probability",
+        unit="1",
+        label="probability of a sulcus",
+        bids_suffix="sulcusProbability",
+        description="Share of the members of an ensemble in which the place is a valley",
+        is_averaged=False,
+        colours=POSITIVE_COLOURS,
+        limits=(0.0, 1.0),
+    ),
+    VertexMap(
+        name="gyrus_probability",
+        unit="1",
+        label="probability of a gyrus",
+        bids_suffix="gyrusProbability",
+        description="Share of the members of an ensemble in which the place is a ridge",
+        is_averaged=False,
+        colours=POSITIVE_COLOURS,
+        limits=(0.0, 1.0),
+    ),
 )
 VERTEX_MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
 """The maps, by name."""

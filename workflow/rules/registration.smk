@@ -29,24 +29,37 @@ def pair_of(wildcards):
     return study.brains[wildcards.earlier], study.brains[wildcards.later]
 
 
-rule register:
-    input:
-        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
-    output:
-        REGISTERED,
-    log:
-        f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.tsv"
-    priority: 1
-    conda:
-        ENVIRONMENT
-    params:
-        brains=lambda w: [brain.registered for brain in pair_of(w)],
-        images=lambda w: [brain.config.image for brain in pair_of(w)],
-    script:
-        "../scripts/register.py"
+for rule_name, registered in (
+    ("register", REGISTERED),
+    ("register_varied", VARIED_REGISTRATION),
+):
+    pair = registered.removeprefix(f"{STUDY}/registration/").removesuffix(".h5").replace("/", ".")
+
+    rule:
+        name:
+            rule_name
+        input:
+            brains=lambda w: [brain.registered.path for brain in pair_of(w)],
+            images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
+        output:
+            registered,
+        log:
+            f"{STUDY}/logs/register.{pair}.log",
+        benchmark:
+            f"{STUDY}/benchmarks/register.{pair}.tsv"
+        wildcard_constraints:
+            smoothing=r"\d\.\d+",
+            seed=r"\d+",
+        priority: 1
+        conda:
+            ENVIRONMENT
+        params:
+            brains=lambda w: [brain.registered for brain in pair_of(w)],
+            images=lambda w: [brain.config.image for brain in pair_of(w)],
+            smoothing=lambda w: float(dict(w).get("smoothing", 1)),
+            seed=lambda w: int(dict(w).get("seed", 0)),
+        script:
+            "../scripts/register.py"
 
 
 # the original surfaces with all their vertices, in the pose of the mesh
@@ -73,6 +86,11 @@ def chain_of(wildcards):
     return study.chains[wildcards.brain, wildcards.origin]
 
 
+def is_own_growth(wildcards):
+    """Return whether targets are those of the start's own later brains."""
+    return wildcards.origin.partition(".")[0] == "self"
+
+
 # shapes of a start brain's mesh in later weeks, for runs that grow towards them
 rule targets:
     input:
@@ -89,7 +107,7 @@ rule targets:
     benchmark:
         f"{BRAIN}/benchmarks/targets.{{origin}}.tsv"
     wildcard_constraints:
-        origin="self|atlas",
+        origin=one_of(dict.fromkeys(name for _, name in study.chains)),
     priority: 1
     conda:
         ENVIRONMENT
@@ -100,6 +118,8 @@ rule targets:
         weeks=lambda w: chain_of(w).later_weeks,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
-        by_size=lambda w: w.origin == "atlas" and CONFIG.growth.atlas_ages == "size",
+        is_own_growth=is_own_growth,
+        by_size=CONFIG.growth.atlas_ages == "size",
+        variation=lambda w: chain_of(w).variation,
     script:
         "../scripts/targets.py"

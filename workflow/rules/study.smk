@@ -113,3 +113,4 @@ rule metrics:
         rules.metrics_tables.output,
         rules.run_tables.output if study.run_simulations else [],
         rules.validate.input,
+        [simulation.file(ENSEMBLE) for simulation in study.with_ensemble],

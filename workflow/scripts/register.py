@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 
-from gyriflow.growth.channels import channels
+from gyriflow.growth.channels import channels, perturb_labels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.registration_quality import measure_quality, require_good
 from gyriflow.io.registrations import write_correspondence
@@ -14,11 +14,10 @@ with step(snakemake.log[0], *files.brains):
     brains, with_images = [], all(params.images)
     for labels, image in zip(params.brains, params.images, strict=True):
         volume, scheme = labels.read(), labels.scheme
+        found = perturb_labels(volume.labels, params.seed) if params.seed else volume.labels
         intensity = read_values(image, labels.affine_from, "grey values") if with_images else None
-        brains.append(
-            channels(volume.labels, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity)
-        )
-    found = register(*brains, threads=snakemake.threads)
+        brains.append(channels(found, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity))
+    found = register(*brains, smoothing=params.smoothing, threads=snakemake.threads)
     quality = measure_quality(*brains, found.deformation)
     require_good(quality, pair=f"{names.earlier} to {names.later}")
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import affine_transform, gaussian_filter
+from scipy.ndimage import affine_transform, gaussian_filter, map_coordinates
 
 from ..errors import InputError
 from ..geometry.deformations import transform_points
@@ -18,6 +18,9 @@ MARGIN_MM = 6.0
 """Margin around the cerebrum."""
 
 CEREBRUM_BIT, CORTEX_BIT = 1, 2
+
+PERTURBATION_VOXELS, PERTURBATION_SCALE = 0.5, 2.0
+"""Root mean square shift of perturbed boundaries along each axis, and the SD of the Gaussian that makes it smooth."""
 
 BRIGHT = 0.99
 """Quantile of the intensity inside the cerebrum that counts as 1."""
@@ -89,6 +92,15 @@ def channels(
         smoothed[bit] = _resample(gaussian_filter(solid, SMOOTHING_MM / sizes), affine, grid, shape)
     intensity = _intensity(image, grid, shape, tissue & CEREBRUM_BIT > 0) if image else None
     return Channels(grid, tissue, smoothed[CEREBRUM_BIT], smoothed.get(CORTEX_BIT), intensity)
+
+
+def perturb_labels(labels: NDArray[np.integer], seed: int) -> NDArray[np.integer]:
+    """Return labels (i, j, k) with their boundaries shifted by a random smooth displacement of half a voxel."""
+    random, index = np.random.default_rng(seed), np.indices(labels.shape, dtype=np.float32)
+    for axis in index:
+        shift = gaussian_filter(random.normal(size=labels.shape).astype(np.float32), PERTURBATION_SCALE)
+        axis += PERTURBATION_VOXELS / shift.std() * shift
+    return np.asarray(map_coordinates(labels, index, order=0, mode="nearest"), dtype=labels.dtype)
 
 
 def _require_whole(inside: NDArray[np.bool_]) -> None:

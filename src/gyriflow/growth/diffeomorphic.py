@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
 
 AFFINE = "-a -dof 12 -m SSD -n 60x30"
-DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -s 2.5vox 0.8vox -wp 0"
+DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -wp 0"
+SMOOTHING_VOXELS = (2.5, 0.8)
+"""SD of the smoothing of updates and of the deformation."""
 
 MAX_ROTATED_SHARE = 0.7
 """A rotated start is taken if its difference is below this share of that without rotation."""
@@ -50,13 +52,14 @@ class Registration:
     channels: tuple[str, ...]
 
 
-def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registration:
+def register(earlier: Channels, later: Channels, *, smoothing: float = 1.0, threads: int = 1) -> Registration:
     """Register an earlier brain to a later one.
 
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
     cross-correlation for the deformation. It starts with centroids and volumes of the cerebra matched, rotated by one
     of the cube's rotations if this fits clearly better. The result is deterministic. InputError if greedy fails;
-    `registration_quality.measure_quality` measures how good the result is.
+    `registration_quality.measure_quality` measures how good the result is. `smoothing` is a factor of
+    `SMOOTHING_VOXELS`.
     """
     began = time.perf_counter()
     names = tuple(name for name in WEIGHTS if getattr(earlier, name) is not None and getattr(later, name) is not None)
@@ -74,7 +77,9 @@ def register(earlier: Channels, later: Channels, *, threads: int = 1) -> Registr
     output = io.StringIO()
     try:
         greedy.execute(f"{AFFINE} {common} {pairs} -ia-identity -o found", out=output, err=output, found=None, **images)
-        greedy.execute(f"{DEFORMABLE} {common} {pairs} -gm where -it found -o warp", out=output, err=output, warp=None)
+        smooth = "-s " + " ".join(f"{smoothing * voxels:g}vox" for voxels in SMOOTHING_VOXELS)
+        options = f"{DEFORMABLE} {smooth} {common} {pairs} -gm where -it found"
+        greedy.execute(f"{options} -o warp", out=output, err=output, warp=None)
     except RuntimeError as error:
         raise InputError(
             f"greedy cannot register the brains: {error}",

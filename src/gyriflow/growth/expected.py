@@ -183,12 +183,13 @@ def expected_positions(
     *,
     also: Sequence[float] = (),
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
+    fading_gw: float = FADING_GW,
 ) -> tuple[list[float], Floats]:
     """Return the weeks from the start on, and the (w, n, 3) positions in mm that are predicted for a mesh.
 
     The brain moves as the atlas does from the atlas' shape at the start week. Its individual difference from the atlas
     grows in proportion to the size as far as it is smooth (SD `smoothing_mm`; all of it with 0); finer differences fade
-    (`FADING_GW`).
+    with the time constant `fading_gw`.
 
     `mesh` is that of the start brain in mm, `atlas` (k, n, 3) the positions of its vertices in the atlas' k ascending
     `weeks`; `also` are further weeks.
@@ -216,7 +217,7 @@ def expected_positions(
         if week > start_week + 1e-6:
             places = positions_at(week, atlas, weeks, sizes)
             scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)
-            fading = np.exp((start_week - week) / FADING_GW)
+            fading = np.exp((start_week - week) / fading_gw)
             by_week[float(week)] = aligned(places, start) + scale * (smooth + fading * (difference - smooth))
     return list(by_week), np.stack(list(by_week.values()))
 
@@ -231,6 +232,8 @@ def predict_shapes(
     *,
     make_body: Callable[[TetrahedralMesh], FittedBody] | None = None,
     by_size: bool = True,
+    smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
+    fading_gw: float = FADING_GW,
 ) -> tuple[list[float], Floats, dict[str, list[Floats]], AtlasAges | None]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
@@ -241,13 +244,14 @@ def predict_shapes(
 
     `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
     `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
-    further weeks. `make_body` makes bodies of the mesh, which follow the atlas' shapes and the predicted ones; without
-    it, elements of these may be inverted.
+    further weeks; `smoothing_mm` and `fading_gw` are those of `expected_positions`. `make_body` makes bodies of the
+    mesh, which follow the atlas' shapes and the predicted ones; without it, elements of these may be inverted.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces, make_body(mesh) if make_body else None)[1:]
     grown, ages = resample_by_size(mesh, carried, weeks) if by_size else (carried, None)
-    shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also)
+    individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
+    shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also, **individual)
     if make_body:
         body = make_body(mesh)
         found = [positions[0]]

@@ -145,6 +145,30 @@ def metrics_chart(
     return figure
 
 
+@styled
+def intervals_chart(ensemble: pd.DataFrame) -> Figure:
+    """Draw the intervals of an ensemble over the weeks, a panel per metric, with its run and the observed brains.
+
+    `ensemble` has columns week, metric, run, low, high, observed.
+    """
+    names = list(dict.fromkeys(ensemble["metric"]))
+    figure, panels = panel_figure(len(names), per_row=2)
+    for axes, name in zip(panels, names, strict=True):
+        rows = ensemble[ensemble["metric"] == name].sort_values("week")
+        axes.fill_between(rows["week"], rows["low"], rows["high"], color=NEUTRAL_COLOUR, linewidth=0)
+        axes.plot(rows["week"], rows["run"], "o-", color=RUN_COLOURS[0], markersize=2.5)
+        axes.plot(rows["week"], rows["observed"], "*", color=OBSERVED_COLOUR, markersize=7)
+        _title(axes, rows)
+        week_axis(axes, ensemble["week"])
+    extra: list[Artist] = [
+        Line2D([], [], color=RUN_COLOURS[0], marker="o", markersize=2.5, label="run"),
+        Patch(color=NEUTRAL_COLOUR, label="90 % interval"),
+    ]
+    extra += [star(OBSERVED_BRAIN)] if ensemble["observed"].notna().any() else []
+    run_legend(figure, {}, extra=extra)
+    return figure
+
+
 MANY_BRAINS = 30
 """Number of reference brains above which their marks are small."""
 

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, fi
 
 from ..errors import InputError
 from .base import KeyProblem, Settings, line, validated
+from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
@@ -142,6 +143,8 @@ class FoldingSettings(Settings):
     """Fields for ParaView at each output week."""
     solver: Solver = Solver()
     """Solvers."""
+    ensemble: Ensemble | None = None
+    """With growth by `shapes`, members of an ensemble that give intervals."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from .base import KeyProblem, Settings
 from .brains import BrainConfig
+from .ensemble import Variation
 from .folding import FoldingSettings
 from .growth import SIZES
 from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
@@ -77,6 +78,14 @@ class Run(FoldingSettings):
     def problems(self) -> Iterator[KeyProblem]:
         for problem in self.growth.unused_keys(self.growth.definition.keys):
             yield KeyProblem(problem.text, ("growth", *problem.key))
+        if self.ensemble is not None and self.growth.definition.measured != "shapes":
+            yield KeyProblem(f"is not used by the growth model {self.growth.model}, only by shapes", ("ensemble",))
+
+
+def members_of(name: str, run: Run) -> dict[str, Variation]:
+    """Return the variations of a run's ensemble by the name of the member; empty if it has none."""
+    variations = run.ensemble.variations if run.ensemble else []
+    return {f"{name}-member-{variation.number + 1}": variation for variation in variations}
 
 
 def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[str]:
@@ -161,7 +170,7 @@ Value = Annotated[
     Discriminator(lambda value: "(text)" if isinstance(value, str) else "(number)"),
 ]
 """A value of a parameter that a sweep varies."""
-NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields")
+NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields", "ensemble")
 """Keys that do not belong to the model of a run, or that the sweep sets."""
 CURVE_KEYS = tuple(f"growth.{size}" for size in SIZES)
 """Curves that may vary besides those of parameters."""

@@ -23,6 +23,7 @@ from ..settings.runs import (
     SweepSettings,
     changed,
     growth_series,
+    members_of,
     starts_of,
     variants,
 )
@@ -118,6 +119,9 @@ def runs(config: Config) -> Iterator[KeyProblem]:
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
                 yield KeyProblem(problem.text, _place(name, problem.key, config))
+        for member in members_of(name, run):
+            if member in config.runs or any(member in dict(variants(*sweep)) for sweep in config.studies.items()):
+                yield KeyProblem(f"is the name of a member of the ensemble of {name}; rename it", ("runs", member))
         for key in VARYING if len(brains) > 1 else ():
             value = getattr(run, key)
             if isinstance(value, Varying) and value.surface is not None:

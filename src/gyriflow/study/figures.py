@@ -5,7 +5,20 @@ from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
 from .comparison_figures import comparison_figures
-from .paths import BRAIN, FOLDING, GROWTH, GROWTH_MAPS, MESH, PARAMETERS, PUBLISHED, REGIONS, STUDY, TARGETS
+from .paths import (
+    BRAIN,
+    ENSEMBLE,
+    FOLDING,
+    GROWTH,
+    GROWTH_MAPS,
+    MESH,
+    PARAMETERS,
+    PUBLISHED,
+    REGIONS,
+    STUDY,
+    TARGETS,
+    ensemble_maps,
+)
 from .records import Brain, Simulation
 from .registry import (
     RUN_FIGURES,
@@ -193,6 +206,10 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
         yield displacement_maps(start, simulations)
         yield shape_maps(start, simulations)
     zones = set()
+    for simulation in study.with_ensemble:
+        yield Figure(INTERVALS, {"ensemble": simulation.file(ENSEMBLE)}, names=simulation.names)
+        yield spread_figure(simulation, POSITION_SPREAD, "position_sd_mm")
+        yield spread_figure(simulation, SULCUS_PROBABILITY, "sulcus_probability")
     for simulation in study.run_simulations:
         if simulation.has_growth_maps:
             yield growth_found_figure(simulation)
@@ -354,6 +371,47 @@ GROWTH_ACROSS = Kind(
 def growth_found_figure(simulation: Simulation, kind: Kind = GROWTH_FOUND, **options: str) -> Figure:
     inputs = {"frames": simulation.file(FOLDING["frames"]), "growth": simulation.file(GROWTH_MAPS)}
     return Figure(kind, inputs, {"views": THREE_SIDES, **options}, simulation.names)
+
+
+INTERVALS = Kind(
+    "intervals_figure",
+    f"{RUN_FIGURES}/intervals.png",
+    "charts:intervals_chart",
+    section="Folding",
+    title="Intervals of the ensemble",
+    caption=(
+        "Run *{run}* (line) and the interval that contains a further member of its ensemble with a probability of "
+        "90 % (band). Members differ in registrations, in labels and, for predictions, in age, atlas and persistence "
+        "of individual differences. Stars: observed brains. The ensemble does not vary how individuals grow, so fewer "
+        "than 90 % of later scans lie in the band (docs/science.md)."
+    ),
+)
+POSITION_SPREAD = Kind(
+    "position_spread_figure",
+    f"{RUN_FIGURES}/position_sd.png",
+    "pictures:shape_maps",
+    section="Folding",
+    title="Spread of positions in the ensemble",
+    caption="Standard deviation of the position of each place over the members of the ensemble of run *{run}*.",
+    job="ensemble_figures",
+)
+SULCUS_PROBABILITY = Kind(
+    "sulcus_probability_figure",
+    f"{RUN_FIGURES}/sulcus_probability.png",
+    "pictures:shape_maps",
+    section="Folding",
+    title="Probability of a sulcus",
+    caption="Share of the members of the ensemble of run *{run}* in which a place is a valley (shape index ≤ −¼).",
+    job="ensemble_figures",
+)
+
+
+def spread_figure(simulation: Simulation, kind: Kind, quantity: str) -> Figure:
+    weeks = {}
+    for row in simulation.measurements[1:]:
+        maps = [simulation.file(file, week=row.week) for file in ensemble_maps(*row.sides).values()]
+        weeks[row.week] = [list(pair) for pair in zip(row.hemispheres, maps, strict=True)]
+    return Figure(kind, {"brains": {simulation.run: weeks}}, {"quantity": quantity}, simulation.names)
 
 
 ZONES_OF_RUN = Kind("zones_figure", f"{RUN_FIGURES}/zones.png", "pictures:zones_picture", target="", paper=True)

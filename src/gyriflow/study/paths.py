@@ -64,6 +64,11 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
+def ensemble_maps(*sides: Side) -> dict[str, str]:
+    """Return the files with maps of an ensemble's spread at a week, by hemisphere."""
+    return {side: f"{RUN}/metrics/{WEEK}/{side}.ensemble.shape.gii" for side in sides}
+
+
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
@@ -75,6 +80,8 @@ THICKNESS = {
 MASK = f"{BRAIN}/surface/mask.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
+VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.h5"
+"""A registration with a factor of its smoothing, and labels perturbed with a seed (0: as they are)."""
 MESH = {
     "mesh": f"{BRAIN}/mesh/brain.xdmf",
     "data": f"{BRAIN}/mesh/brain.h5",
@@ -106,6 +113,8 @@ PREPARED = {
 }
 """Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
+ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
+"""Intervals of a run with an ensemble."""
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
 ONSET = f"{RUN}/metrics/onset.csv"

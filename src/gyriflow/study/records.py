@@ -8,6 +8,7 @@ from typing import Any, Literal
 from ..io.volumes import LabelSource
 from ..io.yaml_files import SCHEMES
 from ..settings.brains import BrainConfig
+from ..settings.ensemble import Variation
 from ..settings.folding import VARYING
 from ..settings.runs import Run
 from ..settings.terms import MEASURED, Side
@@ -154,12 +155,14 @@ class Chain:
 
     `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
     refers to its posed surface (True) or to the coordinates of its files. Shapes are also computed for `further_weeks`.
+    `variation` is that of a member of an ensemble.
     """
 
     brains: tuple[Brain, ...]
     correspondences: tuple[str, ...]
     posed: tuple[list[bool], ...]
     further_weeks: tuple[float, ...]
+    variation: Variation | None = None
 
     @property
     def weeks(self) -> list[float]:
@@ -174,6 +177,11 @@ class Chain:
         return self.weeks[1:]
 
 
+def chain_name(origin: Origin, run: str = "", member_of: str | None = None) -> str:
+    """Return the name of a start brain's chain for its runs, or for one run that is a member of an ensemble."""
+    return f"{origin}.{run}" if member_of else origin
+
+
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """A run from one start brain.
@@ -185,6 +193,7 @@ class Simulation:
     `observed_brains` are the observed brains of its later weeks, by week, scans of the start's own subject first.
     `observed`: the brain each week is compared with. `kind` is `explained` if that brain's growth was an input, else
     `predicted`. `is_atlas_prediction`: growth came from another population only, without later brains of the start's.
+    `ensemble` has the names of its members; a member is a simulation itself, with `member_of` the name of its run.
     """
 
     run: str
@@ -200,6 +209,8 @@ class Simulation:
     kind: Literal["explained", "predicted"]
     is_atlas_prediction: bool
     has_regions: bool
+    ensemble: tuple[str, ...] = ()
+    member_of: str | None = None
 
     @property
     def names(self) -> dict[str, str]:
@@ -228,7 +239,9 @@ class Simulation:
     @property
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards; empty if there are none."""
-        return paths.TARGETS.format(brain=self.start.id, origin=self.shapes) if self.shapes else []
+        if self.shapes is None:
+            return []
+        return paths.TARGETS.format(brain=self.start.id, origin=chain_name(self.shapes, self.run, self.member_of))
 
     @property
     def has_growth_maps(self) -> bool:
@@ -252,7 +265,7 @@ class Simulation:
 
         The number of ranks is left out, since results do not depend on it.
         """
-        settings = self.settings.model_dump(mode="json", exclude={"ranks", "start"})
+        settings = self.settings.model_dump(mode="json", exclude={"ranks", "start", "ensemble"})
         settings["growth"] = self.settings.growth.own_keys()
         for name in VARYING:
             if isinstance(value := getattr(self.settings, name), Varying):

@@ -1,7 +1,7 @@
 """Resolve a configuration into a study: the brains, weeks and files of each run and sweep."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -9,19 +9,20 @@ from ..errors import InputError
 from ..io.volumes import LabelSource
 from ..io.yaml_files import SCHEMES
 from ..settings.brains import BrainConfig
+from ..settings.ensemble import SMOOTHING_RANGE, Variation
 from ..settings.folding import output_weeks
 from ..settings.growth import BEFORE_GW, SIZES
 from ..settings.root import Config
-from ..settings.runs import ComparisonSettings, Run, changed, starts_of, variants
+from ..settings.runs import ComparisonSettings, Run, changed, members_of, starts_of, variants
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
 from .atlases import known_checksums, used_atlases
 from .paths import CURVES
-from .records import Brain, CalibrationRuns, Chain, Origin, Simulation, Sweep
+from .records import Brain, CalibrationRuns, Chain, Origin, Simulation, Sweep, chain_name
 from .series import Series, series_of, several_subjects
 from .study import Study
 
-Chains = Mapping[tuple[str, Origin], Chain]
+Chains = Mapping[tuple[str, str], Chain]
 
 
 def resolve(config: Config, refused: Collection[str] = ()) -> Study:
@@ -117,6 +118,17 @@ class _Planned:
     start: Brain
     settings: Run
     weeks: list[float]
+    variation: Variation | None = None
+    member_of: str | None = None
+
+    @property
+    def shapes(self) -> Origin | None:
+        return _shapes(self.settings)
+
+    @property
+    def chain(self) -> tuple[str, str] | None:
+        """The key of its chain; None if it does not grow towards shapes."""
+        return (self.start.id, chain_name(self.shapes, self.run, self.member_of)) if self.shapes else None
 
 
 @dataclass(frozen=True)
@@ -145,7 +157,13 @@ def _plan(
     for name, run in config.runs.items():
         for start in starts[name]:
             settings = _up_to_last_scan(run, start, series)
-            plan.append(_Planned(name, start, settings, _weeks(settings, start, further.get(start, []))))
+            planned = _Planned(name, start, settings, _weeks(settings, start, further.get(start, [])))
+            plan.append(planned)
+            without = settings.model_copy(update={"ensemble": None})
+            plan += [
+                replace(planned, run=member, settings=without, variation=variation, member_of=name)
+                for member, variation in members_of(name, run).items()
+            ]
     members = _members(config, plan) if config.studies else {}
     varied: dict[str, tuple[Run, list[Brain], set[float]]] = {}
     for name, study in config.studies.items():
@@ -198,7 +216,7 @@ def _members(config: Config, plan: Sequence[_Planned]) -> dict[str, list[Member]
 
 def _equality_key(run: Run) -> str:
     """Return a text that is the same for runs whose shapes are the same at each week."""
-    return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields"})
+    return run.model_dump_json(exclude={"end_week", "preset", "ranks", "fields", "ensemble"})
 
 
 def _weeks(settings: Run, start: Brain, further: Iterable[float]) -> list[float]:
@@ -222,26 +240,60 @@ def _shapes(settings: Run) -> Origin | None:
 # brains of a run's growth
 
 
-def _chains(plan: Sequence[_Planned], series: Series, brains: Iterable[Brain]) -> dict[tuple[str, Origin], Chain]:
+def _chains(plan: Sequence[_Planned], series: Series, brains: Sequence[Brain]) -> dict[tuple[str, str], Chain]:
     ends: dict[Brain, float] = {}
     for planned in plan:
         ends[planned.start] = max(planned.settings.end_week, ends.get(planned.start, 0.0))
-    chains: dict[tuple[str, Origin], Chain] = {}
+    chains: dict[tuple[str, str], Chain] = {}
     for start, end in ends.items():
-        by_origin: dict[Origin, list[Brain]] = {
-            "self": _own_chain(start, end, series),
-            "atlas": _atlas_chain(start, end, series),
-        }
-        for origin, members in by_origin.items():
-            chain_weeks = {brain.week for brain in members[1:]}
-            observed_weeks = _later_observed_weeks(start, brains) if origin == "atlas" else []
-            chains[start.id, origin] = Chain(
-                brains=tuple(members),
-                correspondences=tuple(series.correspondence(*pair) for pair in pairwise(members)),
-                posed=tuple(series.posed(*pair) for pair in pairwise(members)),
-                further_weeks=tuple(week for week in observed_weeks if week <= end and week not in chain_weeks),
-            )
+        chains[start.id, "self"] = _chain(_own_chain(start, end, series), series)
+        further = [week for week in _later_observed_weeks(start, brains) if week <= end]
+        atlases = series.from_other_populations(start)
+        names = atlases if len(atlases) == 1 else []
+        chains[start.id, "atlas"] = _chain(_atlas_chain(start, start.week, end, names, series), series, further)
+    for planned in plan:
+        if (variation := planned.variation) is None or planned.chain is None:
+            continue
+        start, end = planned.start, planned.settings.end_week
+        if planned.shapes == "self":
+            members, further = _own_chain(start, end, series), []
+        else:
+            # the whole age axis of the run is shifted, also its end, which may lie beyond the atlas
+            week, end_week = start.week + variation.age_shift_gw, end + variation.age_shift_gw
+            further = sorted({*(w for w in _later_observed_weeks(start, brains) if w <= end), end})
+            names = series.from_other_populations(start, all_atlases=True)
+            names = [name for name in names if _covers(series.brains[name], start.week, end)]
+            members = _atlas_chain(start, week, end_week, names[variation.number % max(len(names), 1) :][:1], series)
+        chains[planned.chain] = _chain(members, series, further, variation)
     return chains
+
+
+def _chain(
+    brains: Sequence[Brain], series: Series, further_weeks: Iterable[float] = (), variation: Variation | None = None
+) -> Chain:
+    """Return a chain with its correspondences; those of a member of an ensemble have its variation.
+
+    Registrations between the brains of an atlas have one of two smoothings, so that members share them.
+    """
+    of_start = (variation.registration_smoothing, variation.seed) if variation else (1.0, 0)
+    of_atlas = (SMOOTHING_RANGE[1], 0) if variation and variation.number % 2 else (1.0, 0)
+    correspondences = []
+    for pair in pairwise(brains):
+        is_of_atlas = brains[0] not in pair and brains[0].config.population != pair[0].config.population
+        correspondences.append(series.correspondence(*pair, *(of_atlas if is_of_atlas else of_start)))
+    chain_weeks = {brain.week for brain in brains[1:]} if variation is None else set()
+    return Chain(
+        brains=tuple(brains),
+        correspondences=tuple(correspondences),
+        posed=tuple(series.posed(*pair) for pair in pairwise(brains)),
+        further_weeks=tuple(week for week in further_weeks if week not in chain_weeks),
+        variation=variation,
+    )
+
+
+def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
+    weeks = {brain.week for brain in brains}
+    return len(weeks) > 1 and min(weeks) <= week + BEFORE_GW and max(weeks) >= end
 
 
 def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
@@ -261,18 +313,17 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     return sorted(by_week.values(), key=lambda brain: brain.week)
 
 
-def _atlas_chain(start: Brain, end: float, series: Series) -> list[Brain]:
-    """Return a start brain and the brains of the only series of another population, one for each week.
+def _atlas_chain(start: Brain, week: float, end: float, names: Iterable[str], series: Series) -> list[Brain]:
+    """Return a start brain of a week and the brains of a series of another population, one for each week.
 
     They begin with the last week up to that of the start (else with the first week), and end with the first week at or
     past an end week. There are at least two weeks, if available.
     """
-    names = series.from_other_populations(start)
-    members = series.brains[names[0]] if len(names) == 1 else ()
+    members = [brain for name in names for brain in series.brains[name]]
     weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
     if not weekly:
         return [start]
-    first = max((brain.week for brain in weekly if brain.week <= start.week), default=weekly[0].week)
+    first = max((brain.week for brain in weekly if brain.week <= week), default=weekly[0].week)
     last = min((brain.week for brain in weekly if brain.week >= end and brain.week > first), default=end)
     return [start, *(brain for brain in weekly if first <= brain.week <= last)]
 
@@ -282,7 +333,7 @@ def _unreachable(plan: Iterable[_Planned], series: Series, chains: Chains) -> di
     errors: dict[str, InputError] = {}
     for planned in plan:
         start, end, origin = planned.start, planned.settings.end_week, _shapes(planned.settings)
-        if origin is None:
+        if origin is None or planned.member_of:
             continue
         chain = chains[start.id, origin]
         available = ", ".join(f"{brain.id} ({brain.week:g} GW)" for brain in chain.brains)
@@ -343,6 +394,8 @@ def _simulation(
         series=series.for_sizes(start),
         curves=CURVES["curves"] if sizes or growth.thickness_mm == "measured" else [],
         base=config.calibrate.base if config.calibrate and run in config.calibrate.runs else run,
+        ensemble=() if planned.member_of else tuple(members_of(run, planned.settings)),
+        member_of=planned.member_of,
         observed_brains=observed_brains,
         observed={} if start.config.synthetic else observed,
         kind="explained" if not is_atlas_prediction and (shapes or sizes) else "predicted",

@@ -9,7 +9,7 @@ from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.runs import growth_series
 from .atlases import UsedAtlas
-from .paths import MATCHED, REGISTERED
+from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
 
 
@@ -42,10 +42,11 @@ class Series:
         populations = [name for name in self.brains if not self._is_single_subject(name)]
         return next(iter(own or (populations if len(populations) == 1 else [])), None)
 
-    def from_other_populations(self, start: Brain) -> list[str]:
+    def from_other_populations(self, start: Brain, *, all_atlases: bool = False) -> list[str]:
         """Return the series of other populations with a brain's hemispheres; only the preferred one, if among them.
 
-        A series of scans of another subject is returned only if it is preferred.
+        A series of scans of another subject is returned only if it is preferred. With `all_atlases`, all others are
+        returned as well, the preferred one first.
         """
         population = start.config.population
         names = [
@@ -56,7 +57,8 @@ class Series:
             and all(brain.sides == start.sides for brain in brains)
             and all(population is None or brain.config.population != population for brain in brains)
         ]
-        return [self.preferred] if self.preferred in names else names
+        names.sort(key=lambda name: name != self.preferred)
+        return names[:1] if self.preferred in names and not all_atlases else names
 
     def _is_single_subject(self, name: str) -> bool:
         brains = self.brains[name]
@@ -66,10 +68,14 @@ class Series:
         """Return whether brains have surfaces with the same vertices."""
         return any({brain.id for brain in brains} <= ids for ids in self.matched.values())
 
-    def correspondence(self, earlier: Brain, later: Brain) -> str:
-        """Return the file with the correspondence of two brains, by matched vertices or by registration."""
-        file = MATCHED if self.are_matched(earlier, later) else REGISTERED
-        return file.format(earlier=earlier.id, later=later.id)
+    def correspondence(self, earlier: Brain, later: Brain, smoothing: float = 1.0, seed: int = 0) -> str:
+        """Return the file with the correspondence of two brains, by matched vertices or by registration.
+
+        A registration may have a factor of its smoothing, and a seed for perturbed labels.
+        """
+        file = REGISTERED if (smoothing, seed) == (1.0, 0) else VARIED_REGISTRATION
+        file = MATCHED if self.are_matched(earlier, later) else file
+        return file.format(earlier=earlier.id, later=later.id, smoothing=smoothing, seed=seed)
 
     def posed(self, *pair: Brain) -> list[bool]:
         """Return for each of two brains whether their correspondence refers to the pose of its surface.

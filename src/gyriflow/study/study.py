@@ -13,7 +13,7 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import UsedAtlas
-from .records import Brain, CalibrationRuns, Chain, Measurement, Origin, Simulation, Sweep
+from .records import Brain, CalibrationRuns, Chain, Measurement, Simulation, Sweep
 from .series import Series, several_subjects
 
 
@@ -22,8 +22,9 @@ class Study:
     """Everything a configuration asks for. Refused brains are in `config`, not in `brains`.
 
     `checksums` are those of atlas files (see `known_checksums`). `simulations` are those of runs, sweeps and
-    calibration, by run and start brain. `chains` are the brains on which growth for a start brain is measured, by its
-    id and the origin of growth. `unreachable` has the reasons why start brains are not folded.
+    calibration, and of members of ensembles, by run and start brain. `chains` are the brains on which growth for a
+    start brain is measured, by its id and their `chain_name`. `unreachable` has the reasons why start brains are not
+    folded.
     """
 
     config: Config
@@ -32,19 +33,19 @@ class Study:
     brains: Mapping[str, Brain]
     series: Series
     simulations: Mapping[tuple[str, str], Simulation]
-    chains: Mapping[tuple[str, Origin], Chain]
+    chains: Mapping[tuple[str, str], Chain]
     sweeps: Mapping[str, Sweep]
     calibration: CalibrationRuns | None
     unreachable: Mapping[str, InputError]
 
     @cached_property
     def run_simulations(self) -> list[Simulation]:
-        """The simulations of `runs`, without those of sweeps and calibration."""
+        """The simulations of `runs`, without those of sweeps, calibration and ensembles."""
         return [simulation for simulation in self.simulations.values() if simulation.run in self.config.runs]
 
     @cached_property
     def may_diverge(self) -> list[str]:
-        """The runs of sweeps and of the calibration, which may diverge without stopping the study."""
+        """The runs of sweeps, calibration and ensembles, which may diverge without stopping the study."""
         return list(dict.fromkeys(run for run, _ in self.simulations if run not in self.config.runs))
 
     @property
@@ -107,6 +108,15 @@ class Study:
         if several_subjects(brains):
             return f"population {name}"
         return "own" if simulation.start in brains else f"series {name}" if brains else ""
+
+    @cached_property
+    def with_ensemble(self) -> list[Simulation]:
+        """The simulations of runs that have an ensemble."""
+        return [simulation for simulation in self.run_simulations if simulation.ensemble]
+
+    def members(self, simulation: Simulation) -> list[Simulation]:
+        """Return the members of a simulation's ensemble."""
+        return [self.simulations[name, simulation.start.id] for name in simulation.ensemble]
 
     # comparison with observed brains
 

@@ -1,0 +1,89 @@
+"""Intervals and spread of an ensemble: the members of a run, with uncertain inputs varied."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t
+
+from ..geometry.alignment import rigid_fit
+from ..geometry.deformations import transform_points
+from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+
+QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
+"""The metrics of whole brains that have intervals."""
+LEVEL = 0.9
+"""Probability with which an interval is to contain the value of a brain that differs as the members do."""
+VALLEY, RIDGE = -0.25, 0.25
+"""Shape index up to which a place is a sulcus, and from which on a gyrus (Koenderink & van Doorn 1992: the saddle's
+range is between them)."""
+
+
+def prediction_interval(values: Sequence[float] | Floats, level: float = LEVEL) -> tuple[float, float]:
+    """Return the interval in which a further value lies with a probability, if the values are normally distributed.
+
+    It is mean ± t s √(1 + 1/n) with Student's t of n − 1 degrees of freedom; NaN for fewer than two values.
+    """
+    n = len(values)
+    if n < 2:
+        return np.nan, np.nan
+    half = t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n)
+    return float(np.mean(values) - half), float(np.mean(values) + half)
+
+
+def interval_table(run: pd.DataFrame, members: pd.DataFrame, observed: pd.DataFrame) -> pd.DataFrame:
+    """Return the intervals of whole brains by week and metric.
+
+    Parameters
+    ----------
+    run, members, observed
+        Metrics with columns week, hemisphere, metric, value, unit; of the run, of all its members, and of the observed
+        brains of its weeks. `observed` may be empty.
+
+    Returns
+    -------
+    DataFrame
+        Columns week, metric, unit, run (its value), members (number of values), mean, sd, low, high, observed (NaN
+        without a brain) and contains_observed. A member that did not reach a week has no value there.
+    """
+    keys = ["week", "metric"]
+    own, others, brains = (
+        table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
+    )
+    values = others.groupby(keys)["value"]
+    found = pd.DataFrame({"members": values.count(), "mean": values.mean(), "sd": values.std()})
+    # groups are in the order of the index
+    ends = np.array([prediction_interval(group.to_numpy()) for _, group in values]).reshape(-1, 2)
+    found["low"], found["high"] = ends.T
+    table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(found.reset_index(), "left", keys)
+    table = table.merge(brains.groupby(keys)["value"].first().rename("observed").reset_index(), "left", keys)
+    inside = table["observed"].between(table["low"], table["high"]).astype("boolean")
+    return table.assign(
+        members=table["members"].fillna(0).astype(int),
+        contains_observed=inside.mask(table["observed"].isna() | table["low"].isna()),
+    )
+
+
+def ensemble_maps(
+    run: TriangleMesh, members: Sequence[TriangleMesh], shape_indices: Sequence[Floats]
+) -> dict[str, Floats]:
+    """Return maps (n,) of the spread of an ensemble at the vertices of a run's hemisphere.
+
+    Vertices of `members` correspond to those of the run. Positions are compared after a rigid alignment with the run.
+    `shape_indices` (n,) are those of the run and of the members.
+
+    Returns
+    -------
+    dict
+        position_sd_mm, the root mean square distance of the members from their mean position, with n − 1; and
+        sulcus_probability and gyrus_probability, the shares of run and members in which the place is a valley or a
+        ridge.
+    """
+    areas = vertex_areas(run)
+    aligned = [transform_points(member.vertices, rigid_fit(member.vertices, run.vertices, areas)) for member in members]
+    values = np.stack(shape_indices)
+    return {
+        "position_sd_mm": np.sqrt(np.stack(aligned).var(axis=0, ddof=1).sum(axis=1)),
+        "sulcus_probability": (values <= VALLEY).mean(axis=0),
+        "gyrus_probability": (values >= RIDGE).mean(axis=0),
+    }

@@ -1,0 +1,75 @@
+"""The key `ensemble`: further runs with uncertain inputs varied, and how each of them differs."""
+
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+
+from .base import Settings
+
+SMOOTHING_RANGE = (0.7, 1.5)
+"""Factors of the smoothing in registrations."""
+DIFFERENCE_RANGE_MM = (4.0, 16.0)
+"""Smoothing (SD) of the individual difference."""
+FADING_RANGE_GW = (1.0, 16.0)
+"""Time constants with which finer individual differences fade."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The inputs of a member of an ensemble that differ from those of its run.
+
+    `number` counts the members from 0, `seed` is that of its perturbed labels. `registration_smoothing` is a factor of
+    the registration's smoothing. The others are of predictions: `age_shift_gw` is added to the age of the start brain;
+    for `difference_smoothing_mm` and `fading_gw` see `growth.expected`.
+    """
+
+    number: int
+    seed: int
+    registration_smoothing: float
+    age_shift_gw: float
+    difference_smoothing_mm: float
+    fading_gw: float
+
+
+class Ensemble(Settings):
+    """Further runs with uncertain inputs varied, which give intervals; their number alone will do, as in `ensemble: 8`.
+
+    Varied are the registrations (smoothing; labels at their boundaries), and of predictions also the age of the start
+    brain, the atlas, if growth series of several can be used, and which individual differences persist.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "integer", "null"]})
+
+    members: int = Field(8, ge=3, le=64)
+    """Number of members."""
+    age_sd_gw: float = Field(0.3, ge=0, le=2)
+    """Standard deviation of the error of the start brain's age. [GW]"""
+    seed: int = Field(0, ge=0)
+    """Seed of the variations."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _number_alone(cls, raw: Any) -> Any:
+        return {"members": raw} if isinstance(raw, int) else raw
+
+    @property
+    def variations(self) -> list[Variation]:
+        """The variation of each member, by a Latin hypercube: each quantity has one value in each of n strata."""
+        random, n = np.random.default_rng(self.seed), self.members
+        shares = [(random.permutation(n) + random.uniform(size=n)) / n for _ in range(4)]
+        log_ranges = [np.log(ends) for ends in (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW)]
+        scaled = [np.exp(low + share * (high - low)) for share, (low, high) in zip(shares[1:], log_ranges, strict=True)]
+        return [
+            Variation(
+                number=number,
+                seed=self.seed * n + number + 1,
+                registration_smoothing=round(float(smoothing), 2),
+                age_shift_gw=round(self.age_sd_gw * NormalDist().inv_cdf(float(age)), 2),
+                difference_smoothing_mm=float(difference),
+                fading_gw=float(fading),
+            )
+            for number, (age, smoothing, difference, fading) in enumerate(zip(shares[0], *scaled, strict=True))
+        ]

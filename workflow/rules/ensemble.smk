@@ -1,0 +1,68 @@
+# Ensembles: intervals and spread of a run from its members, runs with uncertain inputs varied.
+def ensemble_of(wildcards):
+    """Return a simulation and its members."""
+    run = simulation_of(wildcards)
+    return run, study.members(run)
+
+
+def reached(simulations, weeks):
+    """Return the measurements at weeks of simulations, of members as far as they got."""
+    return [
+        simulation.at(week)
+        for simulation in simulations
+        for week in weeks
+        if reaches(simulation.run, simulation.start.id, week)
+    ]
+
+
+def metrics_of(rows):
+    return [f"{row.folder}/metrics.csv" for row in rows]
+
+
+rule ensemble:
+    input:
+        run=lambda w: metrics_of(simulation_of(w).measurements),
+        members=lambda w: metrics_of(reached(ensemble_of(w)[1], simulation_of(w).weeks)),
+        observed=lambda w: metrics_of(
+            brains[0].measurement for brains in simulation_of(w).observed_brains.values()
+        ),
+    output:
+        ENSEMBLE,
+    log:
+        f"{RUN}/logs/ensemble.log",
+    benchmark:
+        f"{RUN}/benchmarks/ensemble.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/ensemble.py"
+
+
+def rows_of_ensemble(wildcards):
+    """Return the measurements of a run and of its members at a week."""
+    run, members = ensemble_of(wildcards)
+    return reached([run, *members], [float(wildcards.week)])
+
+
+for suffix, sides in PARTS_OF_BRAINS.items():
+
+    rule:
+        name:
+            f"ensemble_maps{suffix}"
+        input:
+            surfaces=lambda w: [file for row in rows_of_ensemble(w) for file in row.hemispheres],
+            maps=lambda w: [file for row in rows_of_ensemble(w) for file in row.maps],
+        output:
+            **ensemble_maps(*sides),
+        log:
+            f"{RUN}/logs/ensemble_maps{suffix}.{WEEK}.log",
+        benchmark:
+            f"{RUN}/benchmarks/ensemble_maps{suffix}.{WEEK}.tsv"
+        wildcard_constraints:
+            brain=brains_with(lambda brain: brain.sides == sides),
+        conda:
+            ENVIRONMENT
+        params:
+            sides=sides,
+        script:
+            "../scripts/ensemble_maps.py"
