@@ -6,7 +6,7 @@ CRL and CHINESE are the folders with the labels of these two atlases, which are 
 has its own study in FOLDER; the same command continues after an interruption. Growth is measured on all weeks of an
 atlas; the prediction is compared with every second week of the other atlas. The last line is one JSON object, which
 `--write` also writes as YAML: for each start, horizon (GW) and model, the columns of `results/study/prediction.csv`
-listed in `NUMBERS`.
+listed in `NUMBERS`. With `--ensemble N`, `coverage` is the share of later brains within the intervals of N members.
 """
 
 import argparse
@@ -19,6 +19,7 @@ import yaml
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.atlas import ATLASES
+from gyriflow.study.paths import ENSEMBLE
 from workflow import call
 
 WEEKS = range(22, 35)
@@ -33,7 +34,7 @@ HEAD = """\
 NOTE = "The Chinese brain of 26 GW is 14 % smaller than the weeks around it suggest; no way of predicting meets that."
 
 
-def study(start: str, folders: dict[str, Path], edge_mm: float) -> dict[str, Any]:
+def study(start: str, folders: dict[str, Path], edge_mm: float, ensemble: int | None) -> dict[str, Any]:
     """Return the configuration of a prediction from the first brain of an atlas."""
     weeks = {start: list(WEEKS[::2]), GROWN_BY[start]: list(WEEKS)}
     return {
@@ -50,7 +51,7 @@ def study(start: str, folders: dict[str, Path], edge_mm: float) -> dict[str, Any
             "min_radius_ratio": 0.005,
         },
         "folding": {"preset": "expected", "end_week": WEEKS[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
-        "runs": {RUN: {}},
+        "runs": {RUN: {"ensemble": ensemble}},
     }
 
 
@@ -71,15 +72,23 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=Path, required=True)
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--edge", type=float, default=0.9, help="edges of the mesh (mm)")
+    parser.add_argument("--ensemble", type=int, metavar="N", help="members of an ensemble, for coverage")
     parser.add_argument("--write", type=Path)
     arguments = parser.parse_args()
     folders = {name: getattr(arguments, name).resolve() for name in GROWN_BY}
-    found, elements = [], []
+    found, elements, covered = [], [], {}
     for start in GROWN_BY:
         folder = arguments.folder.resolve() / start
         folder.mkdir(parents=True, exist_ok=True)
-        call(folder, study(start, folders, arguments.edge), arguments.cores, "results/study/prediction.csv")
+        config, files = study(start, folders, arguments.edge, arguments.ensemble), ["results/study/prediction.csv"]
+        intervals = ENSEMBLE.format(run=RUN, brain=f"{start}-{WEEKS[0]}")
+        call(folder, config, arguments.cores, *files, *([intervals] if arguments.ensemble else []))
         found += rows(folder, start)
+        if arguments.ensemble:
+            table = read_table(folder / intervals).dropna(subset=["observed"])
+            later = table[table["week"] > WEEKS[0]]
+            print(start, later.to_string(), sep="\n")
+            covered[start] = later.groupby("metric")["contains_observed"].mean().to_dict()
         summary = read_json(folder / f"results/runs/{RUN}/{start}-{WEEKS[0]}/folding/summary.json")
         elements.append(int(summary["tets"]))
     # tests of other starts, made once, are kept
@@ -100,7 +109,7 @@ def main() -> None:
     if arguments.write:
         text = yaml.safe_dump(result, sort_keys=False, width=10_000, default_flow_style=None, allow_unicode=True)
         write_text(arguments.write, HEAD + text)
-    print(json.dumps(result))
+    print(json.dumps(result | {"coverage": covered}))
 
 
 if __name__ == "__main__":

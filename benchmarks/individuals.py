@@ -12,13 +12,16 @@ replaces it.
 The start brains are predicted with the growth of the atlas, without the synthetic later brains, and rigidly aligned
 with these. The last line is one JSON object: `scores`, rows with `persistence`, `individual`, `horizon` (GW), `model`,
 `distance_mm`, `r_shape_index`. Models are the `run`, the `atlas`' own brain of the week and, for values of
-DIFFERENCE_SMOOTHING_MM and FADING_GW, the run's target, e.g. `8 mm 1 GW`.
+DIFFERENCE_SMOOTHING_MM and FADING_GW, the run's target, e.g. `8 mm 1 GW`. With `--ensemble N`, `coverage` says how
+often the 90 % intervals of N members contain the later brain's area, volume, gyrification index and depth.
 """
 
 import argparse
 import json
+from collections.abc import Sequence
 from itertools import pairwise, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -31,12 +34,13 @@ from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
 from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, carry_sharply, expected_positions
+from gyriflow.io.files import read_table
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.study.paths import MESH, PIAL, REGISTERED, TARGETS
+from gyriflow.study.paths import ENSEMBLE, MESH, PIAL, REGISTERED, TARGETS
 from gyriflow.units import week_tag
 from workflow import call
 
@@ -45,6 +49,7 @@ MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
 FULL, DEFAULT = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
+METRICS = "results/brains/{brain}/metrics/metrics.csv"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # a coarse mesh of a detailed surface has flat elements
@@ -119,6 +124,27 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
     return result
 
 
+def coverage(folder: Path, individuals: Sequence[str], weeks: Sequence[int]) -> list[dict[str, Any]]:
+    """Return for each persistence and metric how often intervals of the ensembles contain the later brain's value."""
+    tables = []
+    for name, persistence in product(individuals, KEPT_GW):
+        intervals = read_table(folder / ENSEMBLE.format(run="expected", brain=f"{name}-kept-{weeks[0]}"))
+        for week in weeks[1:]:
+            metrics = read_table(folder / METRICS.format(brain=f"{name}-{persistence}-{week}"))
+            values = metrics[metrics["hemisphere"] == "whole"].set_index("metric")["value"]
+            rows = intervals[intervals["week"] == week].assign(persistence=persistence, individual=name)
+            rows["value"] = rows["metric"].map(values)
+            rows["is_inside"] = rows["value"].between(rows["low"], rows["high"])
+            rows["width_percent"] = 100 * (rows["high"] - rows["low"]) / rows["value"]
+            tables.append(rows)
+    found = pd.concat(tables)
+    print(found[["individual", "persistence", "week", "metric", "low", "high", "value", "is_inside"]].to_string())
+    shares = found.groupby(["persistence", "metric"]).agg(
+        brains=("is_inside", "size"), coverage=("is_inside", "mean"), width_percent=("width_percent", "median")
+    )
+    return shares.reset_index().to_dict("records")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
@@ -133,6 +159,7 @@ def main() -> None:
         "--weeks", type=int, nargs="+", default=[22, 26, 30], help="week of the start brains, and later weeks"
     )
     parser.add_argument("--no-folding", action="store_true", help="compare targets only, without runs")
+    parser.add_argument("--ensemble", type=int, metavar="N", help="members of an ensemble, for coverage")
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
     folder, scheme, weeks = arguments.folder.resolve(), arguments.scheme, sorted(arguments.weeks)
@@ -157,11 +184,14 @@ def main() -> None:
         "start": starts,
         "mesh": MESH_SETTINGS,
         "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 10, "step_s": 172800, "ranks": 1},
-        "runs": {"expected": {}},
+        "runs": {"expected": {"ensemble": arguments.ensemble}},
     }
     files = [PIAL["whole"].format(brain=brain["id"]) for brain in brains]
     files += [TARGETS.format(brain=brain, origin="atlas") for brain in starts]
     folded = [] if arguments.no_folding else product(starts, weeks[1:])
+    if arguments.ensemble:
+        files += [ENSEMBLE.format(run="expected", brain=brain) for brain in starts]
+        files += [METRICS.format(brain=brain["id"]) for brain in brains if brain["week"] > start]
     call(
         folder,
         config,
@@ -188,7 +218,8 @@ def main() -> None:
     for value in ("distance_mm", "r_shape_index"):
         table = pd.DataFrame(rows).pivot_table(value, ["persistence", "individual", "horizon"], "model")
         print(value, table.to_string(float_format="%.3f"), sep="\n")
-    print(json.dumps({"scores": rows}))
+    covered = coverage(folder, arguments.individuals, weeks) if arguments.ensemble else []
+    print(json.dumps({"scores": rows, "coverage": covered}))
 
 
 if __name__ == "__main__":

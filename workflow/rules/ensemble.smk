@@ -66,3 +66,22 @@ for suffix, sides in PARTS_OF_BRAINS.items():
             sides=sides,
         script:
             "../scripts/ensemble_maps.py"
+
+
+rule growth_sd:
+    input:
+        lambda w: [
+            member.file(GROWTH_MAPS)
+            for member in ensemble_of(w)[1]
+            if reaches(member.run, w.brain, member.weeks[-1])
+        ],
+    output:
+        GROWTH_SD,
+    log:
+        f"{RUN}/logs/growth_sd.log",
+    benchmark:
+        f"{RUN}/benchmarks/growth_sd.tsv"
+    conda:
+        ENVIRONMENT
+    script:
+        "../scripts/growth_sd.py"

@@ -101,14 +101,16 @@ def write_prediction(
     scheme: str | None,
     image: Path | None,
     accepted: bool,
+    ensemble: int | None,
     quick: bool,
     force: bool,
 ) -> Iterator[str]:
     """Write a configuration that folds a brain by the growth of an atlas; yield lines about it.
 
     `weeks` are the week of the brain and the week to predict; `folder` has the atlas' files; `accepted` is whether its
-    licence is accepted. Paths are relative to the working directory of this process. InputError if anything is missing,
-    or if the configuration at `shown_path` exists with different content and `force` is not set.
+    licence is accepted; `ensemble` is a number of members. Paths are relative to the working directory of this process.
+    InputError if anything is missing, or if the configuration at `shown_path` exists with different content and `force`
+    is not set.
     """
     if atlas is None:
         yield (
@@ -125,7 +127,7 @@ def write_prediction(
     more = QUICK if quick else {"folding": {}}
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
     config = {"brains": [entry], "atlas": section, "start": entry["id"], **more, "folding": folding}
-    config["runs"] = {"predicted": {}}
+    config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
     load(config)
     text = yaml.safe_dump(config, sort_keys=False)
     if shown_path.exists() and shown_path.read_text() != text and not force:

@@ -1,12 +1,18 @@
 """Maps of growth on the pial surface, from the growth that a simulation wrote to its frames."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from ..geometry.triangles import Floats, TriangleMesh
 from ..units import SECONDS_PER_GW
+
+
+def growth_sd(members: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
+    """Return the standard deviation (n − 1) of the growth of area and thickness in maps of `growth_per_week`."""
+    names = [name for name in members[0] if not name.startswith("growth_direction")]
+    return {name: np.std([maps[name] for maps in members], axis=0, ddof=1) for name in names}
 
 
 def growth_per_week(

@@ -259,6 +259,8 @@ def growth_maps(
 ) -> Figure:
     """Draw the growth found by a run towards target shapes, with lines along the largest growth in the surface.
 
+    Maps without directions, as of standard deviations, have no lines.
+
     Parameters
     ----------
     frames
@@ -273,6 +275,7 @@ def growth_maps(
     directions = {
         interval: np.stack([growth[name_in_interval(f"growth_direction_{axis}", *interval)] for axis in AXES], axis=1)
         for interval in intervals
+        if name_in_interval("growth_direction_x", *interval) in growth
     }
     return scalar_maps({"growth": maps}, quantity=quantity, directions=directions, views=views)
 

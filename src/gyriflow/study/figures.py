@@ -11,6 +11,7 @@ from .paths import (
     FOLDING,
     GROWTH,
     GROWTH_MAPS,
+    GROWTH_SD,
     MESH,
     PARAMETERS,
     PUBLISHED,
@@ -208,6 +209,8 @@ def _folding_figures(study: Study) -> Iterator[Figure]:
     zones = set()
     for simulation in study.with_ensemble:
         yield Figure(INTERVALS, {"ensemble": simulation.file(ENSEMBLE)}, names=simulation.names)
+        if simulation.has_growth_maps:
+            yield growth_found_figure(simulation, GROWTH_SPREAD, GROWTH_SD)
         yield spread_figure(simulation, POSITION_SPREAD, "position_sd_mm")
         yield spread_figure(simulation, SULCUS_PROBABILITY, "sulcus_probability")
     for simulation in study.run_simulations:
@@ -368,8 +371,23 @@ GROWTH_ACROSS = Kind(
 )
 
 
-def growth_found_figure(simulation: Simulation, kind: Kind = GROWTH_FOUND, **options: str) -> Figure:
-    inputs = {"frames": simulation.file(FOLDING["frames"]), "growth": simulation.file(GROWTH_MAPS)}
+GROWTH_SPREAD = Kind(
+    "growth_sd_figure",
+    f"{RUN_FIGURES}/growth_sd.png",
+    "pictures:growth_maps",
+    section="Folding",
+    title="Repeat error of growth",
+    caption=(
+        "Standard deviation of the growth in area over the members of the ensemble of run *{run}*, whose registrations "
+        "and labels vary. The maps are in ``surfaces/growth_sd.shape.gii`` of the run."
+    ),
+)
+
+
+def growth_found_figure(
+    simulation: Simulation, kind: Kind = GROWTH_FOUND, maps: str = GROWTH_MAPS, **options: str
+) -> Figure:
+    inputs = {"frames": simulation.file(FOLDING["frames"]), "growth": simulation.file(maps)}
     return Figure(kind, inputs, {"views": THREE_SIDES, **options}, simulation.names)
 
 

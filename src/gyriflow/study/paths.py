@@ -113,6 +113,8 @@ PREPARED = {
 }
 """Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
+GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"
+"""Standard deviation of the growth maps of an ensemble."""
 ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
 """Intervals of a run with an ensemble."""
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}

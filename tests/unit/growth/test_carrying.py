@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from facts import Facts
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import binary_dilation, gaussian_filter, morphological_gradient
 from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
@@ -21,7 +21,7 @@ from gyriflow.growth.carrying import (
     carry_to_pose,
     maps_on_template,
 )
-from gyriflow.growth.channels import Channels, channels
+from gyriflow.growth.channels import Channels, channels, perturb_labels
 from gyriflow.growth.diffeomorphic import register
 from gyriflow.growth.matched_surfaces import follow_surfaces, match_surfaces, outward
 from gyriflow.growth.registration_quality import measure_quality, require_good
@@ -288,6 +288,19 @@ def test_a_brain_in_another_pose_is_turned_first(pair):
     assert found.turned_deg == pytest.approx(180)
     turned_back = carry(found.deformation, rim_points(pair[0])) @ LPS[:3, :3]
     assert rim_errors(turned_back).mean() < 0.4 * VOXEL
+
+
+def test_perturbed_labels_differ_at_boundaries_only_and_by_their_seed():
+    labels = np.zeros((40, 40, 40), np.uint8)
+    labels[8:32, 8:32, 8:32] = 2
+    labels[14:26, 14:26, 14:26] = 7
+    one, two = perturb_labels(labels, 1), perturb_labels(labels, 2)
+    assert np.array_equal(one, perturb_labels(labels, 1))
+    assert not np.array_equal(one, two)
+    assert set(np.unique(one)) == {0, 2, 7}
+    near = binary_dilation(morphological_gradient(labels, 3) > 0, iterations=2)
+    assert np.array_equal(one[~near], labels[~near])
+    assert 0.02 < (one != labels)[near].mean() < 0.2
 
 
 def test_a_failed_registration_is_refused_with_numbers(pair):

@@ -292,6 +292,45 @@ def test_a_brain_is_expected_by_one_series_of_another_population_that_reaches_th
     assert ids(named.chains["own22", "atlas"].later) == ["third22", "third24"]
 
 
+def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, labels):
+    third = [labels(week, population="third", id=f"third{week}") for week in (21, 22, 23, 24, 25)]
+    brains, run = [*of_two(22, 24), *third], {"preset": "expected", "ensemble": {"members": 4, "seed": 1}}
+    found = study(brains, runs={"a": run}, growth={"series": "atlas"})
+    simulation, members = found.simulations["a", "own22"], found.members(found.simulations["a", "own22"])
+    assert [member.run for member in members] == [f"a-member-{number}" for number in (1, 2, 3, 4)]
+    assert [one.run for one in found.run_simulations] == ["a"]
+    assert {member.weeks for member in members} == {simulation.weeks}
+    chains = [found.chains["own22", f"atlas.{member.run}"] for member in members]
+    assert len({member.targets for member in (simulation, *members)}) == 5
+    # the atlases take turns, that of the run first
+    assert [chain.later[0].id[:2] for chain in chains] == ["b2", "th", "b2", "th"]
+    firsts, others = zip(*((chain.correspondences[0], chain.correspondences[1:]) for chain in chains), strict=True)
+    assert len({*firsts, found.chains["own22", "atlas"].correspondences[0]}) == 5
+    assert "results/study/registration/b22/b23.h5" in others[0]
+    assert "results/study/registration/third22/third23.smoothing-1.5.seed-0.h5" in others[1]
+    shifts = [chain.variation.age_shift_gw for chain in chains]
+    assert len(set(shifts)) == 4
+    assert all(abs(shift) < 1.2 for shift in shifts)
+    # a shifted age needs shapes up to its own end
+    assert all(24 in chain.further_weeks for chain in chains)
+    assert [chain.variation for chain in chains] == [
+        chain.variation
+        for chain in study(brains, runs={"a": run}, growth={"series": "atlas"}).chains.values()
+        if chain.variation
+    ]
+
+
+def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
+    found = study(real, runs={"a": {"growth": "shapes", "ensemble": 3}})
+    chain = found.chains["b21", "self.a-member-1"]
+    assert chain.weeks == found.chains["b21", "self"].weeks
+    assert all(".smoothing-" in file and ".seed-1" in file for file in chain.correspondences)
+    assert refusal(real, runs={"a": {"ensemble": 3}}) == Facts("runs.a.ensemble", "rates", "shapes")
+    taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
+    assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
+    assert refusal(real, runs={"a": {"growth": "shapes", "ensemble": 2}}) == Facts("runs.a.ensemble.members", 2, 3)
+
+
 def test_its_own_growth_is_that_of_the_series_with_the_start_whatever_is_named(of_two):
     named = {"growth": {"series": "atlas"}, "runs": {"a": {"preset": "measured"}}}
     assert ids(study(of_two(22, 23, 24), **named).chains["own22", "self"].later) == ["own23", "own24"]

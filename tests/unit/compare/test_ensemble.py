@@ -1,0 +1,89 @@
+"""Intervals of a run from the members of its ensemble, and maps of their spread."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scripts import run_script
+from shapes import rigid, sphere
+
+from gyriflow.compare.ensemble import ensemble_maps, interval_table, prediction_interval
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.io.files import read_table, write_table
+from gyriflow.io.surfaces import read_vertex_maps, write_surface, write_vertex_maps
+
+
+def test_an_interval_contains_a_further_value_as_often_as_it_says():
+    values = np.random.default_rng(0).normal(5, 2, size=(20_000, 7))
+    ends = np.array([prediction_interval(row[:6]) for row in values])
+    assert np.mean((ends[:, 0] <= values[:, 6]) & (values[:, 6] <= ends[:, 1])) == pytest.approx(0.9, abs=0.01)
+    # t of 5 degrees of freedom
+    assert prediction_interval([0.0, 0, 0, 1, 1, 1])[1] == pytest.approx(
+        0.5 + 2.0150 * np.sqrt(0.3) * np.sqrt(7 / 6), rel=1e-4
+    )
+    assert np.isnan(prediction_interval([1.0])).all()
+
+
+def metrics(week, area, hemisphere="whole"):
+    rows = {"area": area, "volume": 10.0, "thickness_sd": 1.0}
+    return pd.DataFrame(
+        [{"week": week, "hemisphere": hemisphere, "metric": m, "value": v, "unit": "u"} for m, v in rows.items()]
+    )
+
+
+def test_intervals_are_of_the_members_that_reached_a_week_and_say_whether_they_contain_the_observed():
+    run = pd.concat([metrics(24.0, 100), metrics(26.0, 120), metrics(28.0, 140)])
+    members = pd.concat(
+        [*(metrics(24.0, area) for area in (98, 100, 102)), *(metrics(26.0, area) for area in (119, 121))]
+        + [metrics(24.0, 1000, "left")]
+    )
+    observed = pd.concat([metrics(24.0, 101), metrics(26.0, 170)])
+    found = interval_table(run, members, observed).set_index(["metric", "week"]).sort_index()
+    assert set(found.index.get_level_values("metric")) == {"area", "volume"}
+    area = found.loc["area"]
+    assert area["members"].tolist() == [3, 2, 0]
+    assert area["mean"].tolist()[:2] == [100, 120]
+    assert area["sd"].tolist()[:2] == pytest.approx([2, np.sqrt(2)])
+    assert area["contains_observed"].tolist()[:2] == [True, False]
+    assert area[["contains_observed", "low"]].loc[28].isna().all()
+    # equal members have an interval of one value
+    assert found.loc[("volume", 24.0), ["low", "high"]].tolist() == [10, 10]
+
+
+def test_spread_is_that_of_places_after_rigid_alignment():
+    mesh = sphere(20.0, 3)
+    far = mesh.vertices[:, 2] > 15
+    ways = [1.0, -1.0, 0.0]
+    moved = [mesh.vertices + way * far[:, None] * mesh.vertices / 20 for way in ways]
+    members = [
+        TriangleMesh(transform_points(places, rigid(0, 0, 30 * number, shift=(5, 0, 0))), mesh.faces)
+        for number, places in enumerate(moved)
+    ]
+    values = [np.where(far, share, 0.5) for share in (-0.5, -0.5, 0.5, 0.0)]
+    found = ensemble_maps(mesh, members, values)
+    # ±1 mm along the radius
+    assert found["position_sd_mm"][far] == pytest.approx(1.0, abs=0.15)
+    assert found["position_sd_mm"][mesh.vertices[:, 2] < 0].max() < 0.15
+    assert set(found["sulcus_probability"][far]) == {0.5}
+    assert set(found["gyrus_probability"][far]) == {0.25}
+    assert set(found["gyrus_probability"][~far]) == {1.0}
+
+
+def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path):
+    for name, area in (("run", 100), ("one", 99), ("two", 101)):
+        write_table(tmp_path / f"{name}.csv", metrics(24.0, area))
+    inputs = {"run": ["run.csv"], "members": ["one.csv", "two.csv"], "observed": []}
+    run_script("ensemble.py", tmp_path, inputs, {0: "found.csv"})
+    assert read_table(tmp_path / "found.csv")["contains_observed"].isna().all()
+    surfaces = {"run": 20.0, "one": 21.0, "two": 19.0}
+    for name, radius in surfaces.items():
+        for side, more in (("left", 0.0), ("right", 10.0)):
+            mesh = sphere(radius * (1 + more), 2)
+            write_surface(tmp_path / f"{name}.{side}.surf.gii", mesh)
+            write_vertex_maps(tmp_path / f"{name}.{side}.shape.gii", {"shape_index": np.full(len(mesh.vertices), -0.5)})
+    files = [f"{name}.{side}" for name in surfaces for side in ("left", "right")]
+    inputs = {"surfaces": [f"{file}.surf.gii" for file in files], "maps": [f"{file}.shape.gii" for file in files]}
+    outputs = {side: f"{side}.ensemble.shape.gii" for side in ("left", "right")}
+    run_script("ensemble_maps.py", tmp_path, inputs, outputs, {"sides": ("left", "right")})
+    spreads = [read_vertex_maps(tmp_path / file)["position_sd_mm"].mean() for file in outputs.values()]
+    assert spreads == pytest.approx([np.sqrt(2), 11 * np.sqrt(2)], rel=1e-3)
