@@ -115,7 +115,7 @@ rule targets:
         mem_mb=8000,
     params:
         start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: chain_of(w).later_weeks,
+        weeks=lambda w: chain_of(w).growth_weeks,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
         is_own_growth=is_own_growth,

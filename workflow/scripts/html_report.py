@@ -10,7 +10,7 @@ from gyriflow.step import step
 
 PICTURE_BYTES = 9_000_000
 PARTS = ("style", "three", "notice", "controls", "viewer")
-TABLES = ("quality", "metrics", "centiles", "warnings", "runs", "validation")
+TABLES = ("quality", "metrics", "centiles", "warnings", "runs", "validation", "intervals")
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 
 

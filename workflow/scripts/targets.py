@@ -31,13 +31,9 @@ with step(snakemake.log[0]):
         positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
     else:
         options = {"make_body": ElasticFit, "by_size": params.by_size}
-        shift = 0.0
         if variation:
-            shift = variation.age_shift_gw
             options |= {"smoothing_mm": variation.difference_smoothing_mm, "fading_gw": variation.fading_gw}
-        # a start brain that is older than stated meets the atlas' weeks earlier
-        atlas_weeks = [round(week - shift, 2) for week in params.weeks]
-        inputs = (params.start_week, pairs, surfaces, atlas_weeks, params.further_weeks)
+        inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
         weeks, positions, further, ages = predict_shapes(mesh, *inputs, **options)
     targets = WeeklyShapes(
         np.array(weeks), positions, sizes_of(mesh, positions), further, ages.table() if ages else None

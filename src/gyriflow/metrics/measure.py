@@ -158,8 +158,10 @@ def _mode_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
 
 
 def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
-    """Return volume and area of a hemisphere or of the whole, and the number of faces that cut others."""
-    return {"volume": volume_ml(cap(mesh)), "area": area_cm2(mesh), "crossing_faces": float(crossing)}
+    """Return volume and area of a hemisphere or of the whole, their ratio, and the number of faces that cut others."""
+    volume, area_of_mesh = volume_ml(cap(mesh)), area_cm2(mesh)
+    relative = area_of_mesh / volume ** (2 / 3) if volume > 0 else np.nan
+    return {"volume": volume, "area": area_of_mesh, "relative_area": relative, "crossing_faces": float(crossing)}
 
 
 def folding_metrics(sides: Sequence[Folds]) -> Metrics:

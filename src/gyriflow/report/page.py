@@ -99,6 +99,7 @@ class Tables:
     quality, metrics, centiles : as for `brains_table`
     warnings : columns subject, run, step, level, message
     runs, validation : as for `scores_table`; None if nothing was simulated
+    intervals : those of the ensemble of the one prediction, if any
     """
 
     quality: pd.DataFrame
@@ -107,6 +108,7 @@ class Tables:
     warnings: pd.DataFrame
     runs: pd.DataFrame | None = None
     validation: pd.DataFrame | None = None
+    intervals: pd.DataFrame | None = None
 
     def __post_init__(self) -> None:
         # messages name files without their folders
@@ -160,8 +162,11 @@ def study_page(
     if prediction:
         title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
         title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
-        numbers, accuracy = predicted_table(tables.metrics, prediction), accuracy_table(prediction["accuracy"])
+        numbers = predicted_table(tables.metrics, prediction, tables.centiles, tables.intervals)
+        accuracy = accuracy_table(prediction["accuracy"])
+        has_centiles = any("centile" in str(head) for head in numbers)
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
+        prediction["individuals"] = norm if has_centiles else ""
     return _shared(brains, tables, tables.warnings, origin, figures, norm, pictures) | {
         "title": title,
         "verdict": sentence,

@@ -40,7 +40,9 @@ COMMON_PARAMETERS = (
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
-PREDICTION_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness")
+PREDICTION_METRICS = (
+    *("volume", "area", "relative_area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness"),
+)
 """Metrics of predicted brains, without cortical thickness, which is a setting."""
 AROUND_ZERO = "mean_shape_index"
 """A metric around zero, for which differences in per cent are meaningless."""
@@ -230,26 +232,46 @@ def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     return table[[*columns, "roughness_ratio", "skill", "skill_low", "skill_high"]].rename(columns=plain)
 
 
-def predicted_table(metrics: pd.DataFrame, prediction: Mapping[str, Any]) -> pd.DataFrame:
+def predicted_table(
+    metrics: pd.DataFrame, prediction: Mapping[str, Any], centiles: pd.DataFrame, intervals: pd.DataFrame | None = None
+) -> pd.DataFrame:
     """Return the metrics of a predicted brain, its start and the atlas' brain, and the difference from the atlas in %.
 
-    `metrics` are as for `metrics_table`; `prediction` is the output of `Study.prediction_facts`.
+    Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble beside them.
+
+    Parameters
+    ----------
+    metrics : as for `metrics_table`
+    prediction : the output of `Study.prediction_facts`
+    centiles : of the study, as for `brain_table`
+    intervals : the output of `compare.ensemble.interval_table`
     """
     rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(PREDICTION_METRICS)]
     rows = rows.assign(name=_named).set_index("name")
 
-    def values(brain: str, run: str, when: str) -> pd.Series:
-        at = rows["week"] == prediction[when]
-        return rows.loc[at & (rows["subject"] == prediction[brain]) & (rows["run"] == run), "value"]
+    scores = centiles[(centiles["hemisphere"] == "whole") & centiles["centile"].notna()].assign(name=_named)
+    scores = scores.assign(text=centile_text(scores)).set_index("name")
 
-    start, atlas_brain = values("brain", MEASURED, "start_week"), values("atlas_brain", MEASURED, "atlas_week")
-    predicted = values("brain", prediction["run"], "week")
-    columns = {
-        f"start, {week_label(prediction['start_week'])}": start,
-        f"predicted, {week_label(prediction['week'])}": predicted,
-        f"the atlas' own brain, {week_label(prediction['atlas_week'])}": atlas_brain,
-        "predicted less the atlas' (%)": (100 * (predicted / atlas_brain - 1)).map(_signed),
+    def of_brain(table: pd.DataFrame, column: str, brain: str, run: str, when: str) -> pd.Series:
+        at = table["week"] == prediction[when]
+        return table.loc[at & (table["subject"] == prediction[brain]) & (table["run"] == run), column]
+
+    brains = {
+        f"start, {week_label(prediction['start_week'])}": ("brain", MEASURED, "start_week"),
+        f"predicted, {week_label(prediction['week'])}": ("brain", prediction["run"], "week"),
+        f"the atlas' own brain, {week_label(prediction['atlas_week'])}": ("atlas_brain", MEASURED, "atlas_week"),
     }
+    columns: dict[str, pd.Series] = {}
+    for head, key in brains.items():
+        columns[head] = of_brain(rows, "value", *key)
+        if len(texts := of_brain(scores, "text", *key)):
+            columns[f"{head}: centile (90 % interval), z"] = texts
+        if intervals is not None and key[0] == "brain" and key[1] != MEASURED:
+            last = intervals[intervals["week"] == prediction["week"]].assign(name=_named).set_index("name")
+            ends = zip(last["low"], last["high"], strict=True)
+            columns["90 % interval of the ensemble"] = pd.Series([f"{a:.4g} to {b:.4g}" for a, b in ends], last.index)
+    predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
+    columns["predicted less the atlas' (%)"] = (100 * (predicted / atlas_brain - 1)).map(_signed)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
 
 

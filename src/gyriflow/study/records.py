@@ -176,6 +176,12 @@ class Chain:
     def later_weeks(self) -> list[float]:
         return self.weeks[1:]
 
+    @property
+    def growth_weeks(self) -> list[float]:
+        """The weeks of the start at which the later brains are as old as it: an older start meets them earlier."""
+        shift = self.variation.age_shift_gw if self.variation else 0.0
+        return [round(week - shift, 2) for week in self.later_weeks]
+
 
 def chain_name(origin: Origin, run: str = "", member_of: str | None = None) -> str:
     """Return the name of a start brain's chain for its runs, or for one run that is a member of an ensemble."""

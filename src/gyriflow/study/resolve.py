@@ -257,6 +257,8 @@ def _chains(plan: Sequence[_Planned], series: Series, brains: Sequence[Brain]) -
         start, end = planned.start, planned.settings.end_week
         if planned.shapes == "self":
             members, further = _own_chain(start, end, series), []
+            # ages of one series have the same error
+            variation = replace(variation, age_shift_gw=0.0)
         else:
             # the whole age axis of the run is shifted, also its end, which may lie beyond the atlas
             week, end_week = start.week + variation.age_shift_gw, end + variation.age_shift_gw

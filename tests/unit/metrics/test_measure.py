@@ -7,6 +7,7 @@ from scipy.spatial import Delaunay
 from shapes import ellipsoid, octasphere, sphere
 
 from gyriflow.compare.deviation import deviation_maps
+from gyriflow.compare.ensemble import ensemble_maps
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
@@ -141,7 +142,8 @@ def test_each_map_and_metric_has_a_record_and_each_record_is_written(apart: Brai
     deviations = {**deviation_maps(ball, ball), "thickness_difference_mm": np.zeros(len(ball.vertices))}
     at_template = maps_on_template({}, ball, ball, [])
     drawn_in_report = {"displacement_mm", "area_growth_percent_per_gw", "thickness_growth_percent_per_gw"}
-    assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report} == set(VERTEX_MAPS)
+    spread = ensemble_maps(ball, [ball, ball], [np.zeros(len(ball.vertices))] * 3)
+    assert {*thick.maps["left"], *at_template, *deviations, *drawn_in_report, *spread} == set(VERTEX_MAPS)
     white, white_maps = measure_white({"left": ball})
     assert set(white_maps["left"]) <= set(thick.maps["left"])
     regions = region_metrics({"left": ball}, thick.maps, {"left": np.ones(len(ball.vertices))}, {1: "all"})

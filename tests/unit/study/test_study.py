@@ -311,6 +311,9 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     shifts = [chain.variation.age_shift_gw for chain in chains]
     assert len(set(shifts)) == 4
     assert all(abs(shift) < 1.2 for shift in shifts)
+    assert [chain.growth_weeks[0] for chain in chains] == pytest.approx(
+        [chain.later_weeks[0] - shift for chain, shift in zip(chains, shifts, strict=True)]
+    )
     # a shifted age needs shapes up to its own end
     assert all(24 in chain.further_weeks for chain in chains)
     assert [chain.variation for chain in chains] == [
@@ -325,6 +328,7 @@ def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
     chain = found.chains["b21", "self.a-member-1"]
     assert chain.weeks == found.chains["b21", "self"].weeks
     assert all(".smoothing-" in file and ".seed-1" in file for file in chain.correspondences)
+    assert chain.growth_weeks == chain.later_weeks
     assert refusal(real, runs={"a": {"ensemble": 3}}) == Facts("runs.a.ensemble", "rates", "shapes")
     taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
     assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
