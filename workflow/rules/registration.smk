@@ -1,4 +1,6 @@
 # Correspondences between brains of successive weeks, and the targets of start brains.
+from gyriflow.running.cost import targets_memory_mib
+
 if workflow.is_main_process:
     for series, cause in study.unmatched_starts.items():
         print(
@@ -112,7 +114,7 @@ rule targets:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=8000,
+        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
     params:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: chain_of(w).growth_weeks,

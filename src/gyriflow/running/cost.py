@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import voxels_of
 from ..settings.stages import MeshSettings
-from ..study.records import Simulation
+from ..study.records import Brain, Simulation
 from ..units import ML_PER_MM3, SECONDS_PER_GW
 
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
@@ -58,6 +58,12 @@ def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
     needs = simulation_needs(simulation, mesh)
     minutes = ERROR_FACTOR * needs.seconds / simulation.settings.ranks / 60
     return max(ceil(ERROR_FACTOR * needs.memory_mib), MIN_MIB), max(ceil(minutes), MIN_MINUTES)
+
+
+def targets_memory_mib(start: Brain, mesh: MeshSettings) -> int:
+    """Return the memory limit in MiB for the targets of a start brain, whose linear elements are fitted on one rank."""
+    needed = predicted_memory_mib(round(linear_elements(start.week, mesh)), 1, "global", 1)
+    return max(MIN_SURFACE_MIB, ceil(ERROR_FACTOR * needed))
 
 
 def surface_memory_mib(labels: str, week: float) -> int:
