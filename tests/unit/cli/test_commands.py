@@ -113,6 +113,9 @@ def test_a_prediction_is_configured_with_the_weeks_of_an_atlas_and_run(predicted
     assert (other.exit_code, other.output) == (2, Facts(tmp_path / "gyriflow.yaml", "--force"))
     assert predicted("--week", "22.4", "--until", "24", "--force").exit_code == 0
     assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs["predicted"].end_week == 24
+    assert predicted("--week", "22.4", "--until", "24", "--force", "--ensemble", "5").exit_code == 0
+    run = load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).runs["predicted"]
+    assert run.ensemble.members == 5
 
 
 def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monkeypatch, predicted, tmp_path):

@@ -11,7 +11,7 @@ import yaml
 from matplotlib.figure import Figure as Drawing
 from scripts import run_script
 
-from gyriflow.growth.maps import growth_per_week
+from gyriflow.growth.maps import growth_per_week, growth_sd
 from gyriflow.io.files import write_json, write_table
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.report.page import caption_html
@@ -39,7 +39,10 @@ OWN, OTHERS = (
     for name, weeks in (("own", (22, 23)), ("atlas", (21, 22, 23, 24)))
 )
 ALONE = {"brains": [*OWN[:1], *OTHERS], "start": "own22", "folding": {"end_week": 23, "preset": "expected"}}
-PREDICTION = ALONE | {"brains": [*OWN, *OTHERS], "runs": {"expected": {}, "plain": {"preset": "fetalfoldsim"}}}
+PREDICTION = ALONE | {
+    "brains": [*OWN, *OTHERS],
+    "runs": {"expected": {"ensemble": 3}, "plain": {"preset": "fetalfoldsim"}},
+}
 PREDICTION |= {"metrics": {"regions": {"own22": {"volume": str(LABELS), "names": {5: "cortex"}}}}}
 EXAMPLES = SHIPPED / "config" / "examples"
 
@@ -188,6 +191,10 @@ def test_growth_is_that_of_a_week_up_to_the_later_frame(frames):
     assert maps["area_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(2 * 4 * 0.01)))
     assert maps["thickness_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(4 * 0.02)))
     assert maps["growth_direction_y"] == pytest.approx([0, 4, 0, 0])
+    repeats = [maps, {name: values + 2.0 for name, values in maps.items()}]
+    found = growth_sd(repeats)
+    assert set(found) == {"area_growth_percent_per_gw", "thickness_growth_percent_per_gw"}
+    assert found["area_growth_percent_per_gw"] == pytest.approx(np.full(4, np.sqrt(2)))
 
 
 def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path, frames):

@@ -85,6 +85,7 @@ def pages(folder):
     inputs = {name: f"{name}.csv" for name in tables} | {name: PAGE / file for name, file in PARTS.items()}
     inputs |= {
         "page": PAGE / "page.html",
+        "intervals": [],
         "provenance": "provenance.json",
         "methods": "methods.rst",
     }
