@@ -102,6 +102,8 @@ rule targets:
         correspondences=lambda w: chain_of(w).correspondences,
         surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
         reports=lambda w: [brain.report for brain in chain_of(w).later],
+        # norms of another study, whose volumes the curve of an atlas follows as well
+        norms=lambda w: [] if is_own_growth(w) else CONFIG.metrics.norms or [],
     output:
         TARGETS,
     log:

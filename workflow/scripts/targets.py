@@ -7,9 +7,11 @@ import numpy as np
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.expected import carry_sharply, predict_shapes, sizes_of
+from gyriflow.io.files import read_json
 from gyriflow.io.registrations import WeeklyShapes, read_correspondence, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.metrics.norms import cohort_from_plain
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -31,6 +33,8 @@ with step(snakemake.log[0]):
         positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
     else:
         options = {"make_body": ElasticFit, "by_size": params.by_size}
+        if files.norms:
+            options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.weeks)
         if variation:
             options |= {"smoothing_mm": variation.difference_smoothing_mm, "fading_gw": variation.fading_gw}
         inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)

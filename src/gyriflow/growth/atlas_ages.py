@@ -39,15 +39,21 @@ class AtlasAges:
         )
 
 
-def ages_by_size(weeks: Sequence[float], volumes_ml: Sequence[float]) -> AtlasAges:
+def ages_by_size(
+    weeks: Sequence[float], volumes_ml: Sequence[float], norm_ml: Sequence[float] | Floats = ()
+) -> AtlasAges:
     """Return the ages by size of an atlas' brains with volumes in mL at two or more ascending weeks.
 
-    The curve of volume is monotone and robust against single weeks (`curves.fitted`). Each brain gets the week at which
-    the curve has its volume; ages that do not ascend are replaced by their nearest ascending ones (isotonic
-    regression). InputError if the atlas shrinks.
+    The curve of volume is monotone and robust against single weeks (`curves.fitted`). It is fitted to the atlas'
+    volumes and, with the same weight, to the medians of a norm at these weeks, `norm_ml`, NaN where it has none. Each
+    brain gets the week at which the curve has its volume; ages that do not ascend are replaced by their nearest
+    ascending ones (isotonic regression). InputError if the atlas shrinks.
     """
     stated, volumes = np.asarray(weeks, dtype=float), np.asarray(volumes_ml, dtype=float)
-    curve = fitted(weeks, volumes_ml, name="volume of the atlas").curve
+    points = pd.DataFrame({"week": stated, "volume": volumes})
+    if len(norm_ml):
+        points = pd.concat([points, points.assign(volume=norm_ml).dropna()]).sort_values("week", kind="stable")
+    curve = fitted(points["week"].tolist(), points["volume"].tolist(), name="volume of the atlas").curve
     logs, sizes = np.log(curve.values), np.log(volumes)
     # the curve is flat where brains do not grow; beyond its ends ages follow its rate there, or its mean rate if higher
     inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)

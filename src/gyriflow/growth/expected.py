@@ -160,14 +160,18 @@ def positions_at(week: float, atlas: Floats, weeks: Sequence[float] | Floats, si
     return np.asarray((1 - part) * atlas[first] + part * transform_points(atlas[first + 1], motion))
 
 
-def resample_by_size(mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float]) -> tuple[Floats, AtlasAges]:
+def resample_by_size(
+    mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float], norm_ml: Sequence[float] = ()
+) -> tuple[Floats, AtlasAges]:
     """Return the (k, n, 3) positions of an atlas at its k weeks, resampled along its curve of volume, and the ages.
+
+    `norm_ml` are volumes of a norm at these weeks, which the curve follows as well (`ages_by_size`).
 
     At each week the shape is that between the brains whose ages by size are around it, and the volume that of the
     curve through all brains.
     """
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    ages = ages_by_size(weeks, list(sizes_of(mesh, atlas)["volume_ml"]))
+    ages = ages_by_size(weeks, list(sizes_of(mesh, atlas)["volume_ml"]), norm_ml)
     shapes = np.stack([positions_at(week, atlas, ages.ages, sizes) for week in np.clip(weeks, *ages.ages[[0, -1]])])
     volumes = sizes_of(mesh, shapes)["volume_ml"]
     scales = [(ages.volume(week) / volume) ** (1 / 3) for week, volume in zip(weeks, volumes, strict=True)]
@@ -232,12 +236,14 @@ def predict_shapes(
     *,
     make_body: Callable[[TetrahedralMesh], FittedBody] | None = None,
     by_size: bool = True,
+    norm_ml: Sequence[float] = (),
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
 ) -> tuple[list[float], Floats, dict[str, list[Floats]], AtlasAges | None]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
-    With `by_size` the brain moves as the atlas resampled by size (`resample_by_size`), whose ages are returned as well;
+    With `by_size` the brain moves as the atlas resampled by size (`resample_by_size`, with volumes of a norm at the
+    atlas' weeks, `norm_ml`, if they are known), whose ages are returned as well;
     else as its brains at their stated weeks. The baselines are simpler predictions of the boundary's vertices: `atlas`,
     the atlas' own brain; `atlas_deformed`, that brain with the whole individual difference; and `displaced`, the start
     moved by registration alone.
@@ -249,7 +255,7 @@ def predict_shapes(
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
     carried = carry_sharply(mesh, pairs, surfaces, make_body(mesh) if make_body else None)[1:]
-    grown, ages = resample_by_size(mesh, carried, weeks) if by_size else (carried, None)
+    grown, ages = resample_by_size(mesh, carried, weeks, norm_ml) if by_size else (carried, None)
     individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
     shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also, **individual)
     if make_body:

@@ -181,6 +181,14 @@ class CohortNorms:
         """The hemispheres of its brains, as of `_hemispheres_of`."""
         return " ".join(sorted({hemisphere for hemisphere, _ in self.norms}))
 
+    def volumes_ml(self, weeks: Sequence[float]) -> Floats:
+        """Return the median volumes (k,) of whole brains in mL at weeks, NaN outside those of the norm."""
+        if ("whole", "volume") not in self.norms:
+            return np.full(len(weeks), np.nan)
+        norm, at = self.norms["whole", "volume"][1], np.asarray(weeks, dtype=float)
+        medians = norm.values(at.clip(norm.first, norm.last), 0.0)
+        return np.where((at >= norm.first) & (at <= norm.last), medians, np.nan)
+
     @property
     def plain(self) -> dict[str, Any]:
         """The norms as plain values for JSON."""

@@ -31,6 +31,17 @@ def test_a_week_that_jumps_in_size_is_taken_for_the_age_of_its_size():
     assert (np.diff(ages.ages) >= MIN_SPACING_GW - 1e-9).all()
 
 
+def test_the_curve_also_follows_the_norm_where_it_has_volumes():
+    weeks = np.arange(22.0, 31.0)
+    small = 50 * np.exp(0.12 * (weeks - 22))
+    norm = np.where(weeks < 29, 1.2 * small, np.nan)
+    found = ages_by_size(weeks, small, norm)
+    assert found.volume(25) == pytest.approx(np.sqrt(1.2) * small[3], rel=0.02)
+    # a brain that is smaller than the curve is younger
+    assert found.ages[3] == pytest.approx(25 - np.log(1.2) / 2 / 0.12, abs=0.1)
+    assert ages_by_size(weeks, small, np.full(len(weeks), np.nan)).volume(25) == pytest.approx(small[3], rel=0.01)
+
+
 def test_shape_follows_the_ages_and_size_the_curve():
     mesh = ellipsoid_mesh(4, (20.0, 24.0, 18.0))
     # longer every week, and one week is too large

@@ -200,6 +200,16 @@ def test_norms_are_read_by_another_study_with_the_same_settings(tmp_path) -> Non
     assert problems(raw) == [Facts(path, "results/study/norms.json")]
 
 
+def test_a_norm_gives_median_volumes_within_its_weeks() -> None:
+    weeks = np.repeat(np.arange(22.0, 31.0), 2)
+    metrics, reference = table(weeks, 20 * weeks * np.tile([1.02, 0.98], 9))
+    whole = metrics.assign(metric="volume", hemisphere="whole", person=metrics["subject"])
+    found = cohort_norms(whole, reference).volumes_ml([21.0, 24.0, 30.0])
+    assert found[1:] == pytest.approx([480, 600], rel=0.02)
+    assert np.isnan(found[0])
+    assert np.isnan(cohort_norms(whole.assign(metric="area"), reference).volumes_ml([24.0])).all()
+
+
 def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     weeks, values = np.repeat([24.0, 25.0, 26.0, 27.0], 6), np.random.default_rng(1).normal(100, 5, 24)
     metrics, reference = table(weeks, values)
