@@ -59,7 +59,8 @@ class Settings(BaseModel):
     @classmethod
     def _reject_booleans_and_nul(cls, value: Any, info: ValidationInfo) -> Any:
         # YAML reads `on`, `yes` and the like as true, which would pass as 1.0
-        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
+        kind = cls.model_fields[str(info.field_name)].annotation
+        if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
             raise ValueError("should be a number or text, not true or false")
         # which ends a path or an argument for the system
         inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]

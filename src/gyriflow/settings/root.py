@@ -79,9 +79,6 @@ class Config(Settings):
 
     @property
     def opens_sulci(self) -> bool:
-        """Whether fused sulci are opened.
-
-        They stay fused in studies with runs: elements are wider than slits, and the brains that such a mesh grows
-        towards or is compared with must be fused, too.
-        """
-        return self.surface.open_sulci and not self.runs
+        """Whether fused sulci of all brains are opened; by default in studies without runs."""
+        opens = self.surface.open_sulci
+        return not self.runs if opens is None else opens
