@@ -54,8 +54,8 @@ MAX_DRAWS = 3
 """Attempts to draw the boundary to its goals with no such element or face on the path."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
-MIN_STEPS, STRAIN_PER_STEP = 2, 0.1
-"""Smallest number of steps in which the body moves to a shape, and mean growth of length of a step."""
+STRAIN_PER_STEP = 0.1
+"""Largest mean growth of length in a step; more steps than one take longer and press elements flatter."""
 MAX_HALVINGS = 5
 """Largest number of times that a step which fails is halved."""
 SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=30)
@@ -141,7 +141,7 @@ class ElasticFit:
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
         ratio = signed_volume(TriangleMesh(goal[self._used], boundary.faces)) / signed_volume(boundary)
-        steps = max(MIN_STEPS, math.ceil(abs(math.log(max(ratio, 1e-3))) / 3 / STRAIN_PER_STEP))
+        steps = max(1, math.ceil(abs(math.log(max(ratio, 1e-3))) / 3 / STRAIN_PER_STEP))
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
         for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left
