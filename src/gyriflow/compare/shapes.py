@@ -1,7 +1,7 @@
 """Surfaces prepared for comparison: scaled to the observed brain's volume, remeshed, aligned, with their curvature."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -23,6 +23,9 @@ MAX_CURVATURE_PER_MM = 1.0
 
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
+
+MAX_VOXELS = 1 << 20
+"""Largest number of voxels along a direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,7 @@ class PreparedSurface:
         clipped = np.clip(self.mean_curvature, -MAX_CURVATURE_PER_MM, MAX_CURVATURE_PER_MM)
         object.__setattr__(self, "mean_curvature", clipped)
 
-    @property
+    @cached_property
     def areas(self) -> Floats:
         """The (n,) areas of the vertices in mm²."""
         return vertex_areas(self.mesh)
@@ -102,17 +105,18 @@ def curvature_differences(surface: PreparedSurface, observed: PreparedSurface) -
 
 def cortex_dice(surface: TriangleMesh, observed: TriangleMesh) -> float:
     """Return the Dice overlap of the outermost `CORTEX_MM` of two aligned closed surfaces in mm."""
-    ribbons = [_ribbon(mesh) for mesh in (surface, observed)]
-    both = sum(map(len, ribbons)) - len(np.unique(np.concatenate(ribbons), axis=0))
-    return 2 * both / sum(map(len, ribbons))
+    first, second = _ribbon(surface), _ribbon(observed)
+    both = np.intersect1d(first, second, assume_unique=True)
+    return 2 * len(both) / (len(first) + len(second))
 
 
 @lru_cache(maxsize=2)
 def _ribbon(mesh: TriangleMesh) -> Ints:
-    """Return the voxels of the outermost `CORTEX_MM`, (k, 3) multiples of `VOXEL_MM`."""
+    """Return the voxels of the outermost `CORTEX_MM` as (k,) numbers, the same for all surfaces."""
     corner = np.floor(mesh.vertices.min(axis=0) / VOXEL_MM)
     box = np.stack([corner * VOXEL_MM, mesh.vertices.max(axis=0)])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
     # distances are to the centres of voxels outside, half a voxel beyond the surface
     depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2
-    return np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
+    voxels = np.argwhere((mask > 0) & (depth <= CORTEX_MM)) + np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
+    return np.asarray(voxels @ (MAX_VOXELS ** np.arange(3)))

@@ -200,18 +200,18 @@ def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
 def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
     for start in range(0, len(vertices), CHUNK):
         centres = np.arange(start, min(start + CHUNK, len(vertices)))
-        ball = links[centres]
-        size = 0
-        while ball.nnz > size:
-            size = ball.nnz
-            ball = ball @ links
-            counts = np.diff(ball.indptr)
-            offset = vertices[ball.indices] - np.repeat(vertices[centres], counts, axis=0)
-            inside = np.einsum("ij,ij->i", offset, offset) < np.repeat(radii_mm[centres] ** 2, counts)
-            ends = np.concatenate([[0], np.cumsum(inside)])[ball.indptr]
-            ball = sparse.csr_matrix(
-                (np.ones(ends[-1], dtype=bool), ball.indices[inside], ends), shape=(len(centres), len(vertices))
-            )
+        reached = np.zeros((len(centres), len(vertices)), dtype=bool)
+        found, ring = [], sparse.eye(len(centres), len(vertices), start, dtype=bool, format="csr")
+        while ring.nnz:
+            row, column = np.repeat(np.arange(len(centres)), np.diff(ring.indptr)), ring.indices
+            offset = vertices[column] - vertices[centres[row]]
+            is_new = ~reached[row, column] & (np.einsum("ij,ij->i", offset, offset) < radii_mm[centres[row]] ** 2)
+            row, column = row[is_new], column[is_new]
+            reached[row, column] = True
+            found.append((row, column))
+            ring = sparse.csr_matrix((np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape) @ links
+        row, column = np.concatenate(found, axis=1)
+        ball = sparse.csr_matrix((np.ones(len(row), dtype=bool), (row, column)), shape=reached.shape)
         yield centres, ball
 
 

@@ -1,3 +1,4 @@
+import igl
 import numpy as np
 import pytest
 from shapes import box, box_mesh, rigid, scaling, sphere
@@ -11,9 +12,9 @@ from gyriflow.geometry.deformations import (
     transform_points,
 )
 from gyriflow.geometry.diffusion import diffuse, harmonic_continuation, vertex_sizes
-from gyriflow.geometry.matching import labels_at, layer_labels, match_points, values_at
+from gyriflow.geometry.matching import labels_at, layer_labels, match_points, nearest_on, surface_mask, values_at
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, merged, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, merged, transformed, vertex_normals
 
 GRID = scaling(2.0, -30.0)
 
@@ -113,6 +114,17 @@ def test_a_harmonic_continuation_of_a_gradient_is_the_gradient():
         found = harmonic_continuation(vertices, cells, known, tolerance=1e-12)(given[known])
         np.testing.assert_allclose(found, given, atol=1e-9)
         np.testing.assert_array_equal(found[known], given[known])
+
+
+@pytest.mark.parametrize("turn", [0, 17])
+def test_a_mask_is_the_inside_even_where_lines_of_voxels_meet_vertices_and_edges(turn):
+    ball = transformed(sphere(8.0, 1), rigid(0, 0, turn))
+    for mesh in (ball, TriangleMesh(ball.vertices[:, [1, 0, 2]], ball.faces[:, ::-1])):
+        mask, affine = surface_mask(mesh, 0.5, np.array([[-8.0, -8, -8], [8, 8, 8]]))
+        places = transform_points(np.argwhere(mask >= 0), affine)
+        winding = igl.winding_number(mesh.vertices, mesh.faces, places)
+        clear = nearest_on(places, mesh)[0] > 1e-6
+        np.testing.assert_array_equal(mask.ravel()[clear] > 0, winding[clear] > 0.5)
 
 
 def test_labels_of_a_layer_below_a_surface():
