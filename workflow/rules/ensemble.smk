@@ -6,7 +6,7 @@ def ensemble_of(wildcards):
 
 
 def reached(simulations, weeks):
-    """Return the measurements at weeks of simulations, of members as far as they got."""
+    """Return the measurements of simulations at those of some weeks that each has reached."""
     return [
         simulation.at(week)
         for simulation in simulations
@@ -72,7 +72,8 @@ for suffix, sides in PARTS_OF_BRAINS.items():
 
 rule growth_sd:
     input:
-        lambda w: [
+        run=GROWTH_MAPS,
+        members=lambda w: [
             member.file(GROWTH_MAPS)
             for member in ensemble_of(w)[1]
             if reaches(member.run, w.brain, member.weeks[-1])

@@ -31,11 +31,11 @@ def pair_of(wildcards):
     return study.brains[wildcards.earlier], study.brains[wildcards.later]
 
 
-for rule_name, registered in (
+for rule_name, output_file in (
     ("register", REGISTERED),
     ("register_varied", VARIED_REGISTRATION),
 ):
-    pair = registered.removeprefix(f"{STUDY}/registration/").removesuffix(".h5").replace("/", ".")
+    pair = output_file.removeprefix(f"{STUDY}/registration/").removesuffix(".h5").replace("/", ".")
 
     rule:
         name:
@@ -44,7 +44,7 @@ for rule_name, registered in (
             brains=lambda w: [brain.registered.path for brain in pair_of(w)],
             images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
         output:
-            registered,
+            output_file,
         log:
             f"{STUDY}/logs/register.{pair}.log",
         benchmark:
@@ -60,6 +60,7 @@ for rule_name, registered in (
             images=lambda w: [brain.config.image for brain in pair_of(w)],
             smoothing=lambda w: float(dict(w).get("smoothing", 1)),
             seed=lambda w: int(dict(w).get("seed", 0)),
+            is_varied=rule_name == "register_varied",
         script:
             "../scripts/register.py"
 
@@ -120,6 +121,7 @@ rule targets:
     params:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: chain_of(w).growth_weeks,
+        stated_weeks=lambda w: chain_of(w).later_weeks,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
         is_own_growth=is_own_growth,

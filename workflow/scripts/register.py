@@ -12,13 +12,14 @@ from gyriflow.step import step
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
 with step(snakemake.log[0], *files.brains):
     brains, with_images = [], all(params.images)
-    for labels, image in zip(params.brains, params.images, strict=True):
+    for brain, labels, image in zip((names.earlier, names.later), params.brains, params.images, strict=True):
         volume, scheme = labels.read(), labels.scheme
-        found = perturb_labels(volume.labels, params.seed) if params.seed else volume.labels
+        found = perturb_labels(volume.labels, params.seed, brain) if params.seed else volume.labels
         intensity = read_values(image, labels.affine_from, "grey values") if with_images else None
         brains.append(channels(found, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity))
     found = register(*brains, smoothing=params.smoothing, threads=snakemake.threads)
     quality = measure_quality(*brains, found.deformation)
-    require_good(quality, pair=f"{names.earlier} to {names.later}")
+    # one member of an ensemble must not end the study
+    require_good(quality, pair=f"{names.earlier} to {names.later}", only_warn=params.is_varied)
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}
     write_correspondence(snakemake.output[0], found.deformation, report | asdict(quality))

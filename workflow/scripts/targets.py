@@ -29,17 +29,16 @@ with step(snakemake.log[0]):
     ]
     ages, variation = None, params.variation
     if params.is_own_growth:
-        weeks, further = [params.start_week, *params.weeks], {}
+        weeks, baselines = [params.start_week, *params.weeks], {}
         positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
     else:
         options = {"make_body": ElasticFit, "by_size": params.by_size}
         if files.norms:
-            options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.weeks)
+            options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.stated_weeks)
         if variation:
             options |= {"smoothing_mm": variation.difference_smoothing_mm, "fading_gw": variation.fading_gw}
         inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, further, ages = predict_shapes(mesh, *inputs, **options)
-    targets = WeeklyShapes(
-        np.array(weeks), positions, sizes_of(mesh, positions), further, ages.table() if ages else None
-    )
+        weeks, positions, baselines, ages = predict_shapes(mesh, *inputs, **options)
+    sizes, table = sizes_of(mesh, positions), ages.table() if ages else None
+    targets = WeeklyShapes(np.array(weeks), positions, sizes, baselines, table)
     write_weekly_shapes(snakemake.output[0], targets)

@@ -13,14 +13,14 @@ from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
 """The metrics of whole brains that have intervals."""
 LEVEL = 0.9
-"""Probability with which an interval is to contain the value of a brain that differs as the members do."""
-VALLEY, RIDGE = -0.25, 0.25
-"""Shape index up to which a place is a sulcus, and from which on a gyrus (Koenderink & van Doorn 1992: the saddle's
-range is between them)."""
+"""Coverage of the prediction interval for one further member."""
+SULCUS, GYRUS = -0.375, 0.375
+"""Shape index up to which a vertex counts as sulcus, and from which on as gyrus: the limits of rut and ridge of
+Koenderink & van Doorn 1992."""
 
 
 def prediction_interval(values: Sequence[float] | Floats, level: float = LEVEL) -> tuple[float, float]:
-    """Return the interval in which a further value lies with a probability, if the values are normally distributed.
+    """Return the two-sided prediction interval for one further value of a normal sample.
 
     It is mean ± t s √(1 + 1/n) with Student's t of n − 1 degrees of freedom; NaN for fewer than two values.
     """
@@ -75,15 +75,19 @@ def ensemble_maps(
     Returns
     -------
     dict
-        position_sd_mm, the root mean square distance of the members from their mean position, with n − 1; and
-        sulcus_probability and gyrus_probability, the shares of run and members in which the place is a valley or a
-        ridge.
+        position_sd_mm, the root mean square distance of the members from their mean position, with n − 1, NaN for
+        fewer than two; and
+        sulcus_probability and gyrus_probability, the shares of run and members in which the vertex is sulcus
+        or gyrus.
     """
     areas = vertex_areas(run)
-    aligned = [transform_points(member.vertices, rigid_fit(member.vertices, run.vertices, areas)) for member in members]
-    values = np.stack(shape_indices)
+    motions = [rigid_fit(member.vertices, run.vertices, areas) for member in members]
+    aligned = [transform_points(member.vertices, motion) for member, motion in zip(members, motions, strict=True)]
+    values, spread = np.stack(shape_indices), np.full(run.vertices.shape, np.nan)
+    if len(members) > 1:
+        spread = np.var(aligned, axis=0, ddof=1)
     return {
-        "position_sd_mm": np.sqrt(np.stack(aligned).var(axis=0, ddof=1).sum(axis=1)),
-        "sulcus_probability": (values <= VALLEY).mean(axis=0),
-        "gyrus_probability": (values >= RIDGE).mean(axis=0),
+        "position_sd_mm": np.sqrt(spread.sum(axis=1)),
+        "sulcus_probability": (values <= SULCUS).mean(axis=0),
+        "gyrus_probability": (values >= GYRUS).mean(axis=0),
     }

@@ -1,9 +1,9 @@
-"""Elastic registration with contact: the finite-element brain is drawn to shapes that its elements can have.
+"""Elastic registration with contact: deform a mesh towards a shape while elements stay valid and folds do not cross.
 
 A shape made by carrying vertices along a registration may turn elements inside out, or move one bank of a sulcus
 through the other. Here the body itself does the fitting: it takes the smoothed stretch of that shape as growth, springs
 draw its boundary there, and elasticity and the contact barrier keep elements positive and folds apart. It is the same
-solver as that of a simulation; stress is forgotten after each step.
+solver as that of a simulation; the reference is updated after each step, so stress does not accumulate.
 """
 
 import logging
@@ -40,7 +40,8 @@ from .zones import Zones
 log = logging.getLogger(__name__)
 
 MODULUS_PA, POISSON_RATIO = 1000.0, 0.3
-"""Of the body that is fitted. The modulus only sets the unit of forces; a compressible body yields more evenly."""
+"""Shear modulus and Poisson's ratio of the body that is fitted. The modulus only sets the unit of forces; a
+compressible body yields more evenly."""
 BARRIER_PA = 1000.0
 """Stiffness of the contact barrier: stiffer than in a simulation, since springs press folds together harder."""
 SPRING_LENGTH_MM = 3.3
@@ -55,7 +56,7 @@ MAX_DRAWS = 3
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STRAIN_PER_STEP = 0.1
-"""Largest mean growth of length in a step; more steps than one take longer and press elements flatter."""
+"""Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
 MAX_HALVINGS = 5
 """Largest number of times that a step which fails is halved."""
 SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=30)
@@ -153,7 +154,8 @@ class ElasticFit:
         """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
         `before` are the last two shapes (n, 3) at most, if any. The path from them must have no inverted elements and
-        no crossing faces: where it has, the boundary is drawn less. A body that cannot be drawn stays as it is.
+        no crossing faces: where it has, the boundary is drawn less, and faults left after the last attempt are warned
+        of. A body that cannot be drawn stays as it is.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))

@@ -2,8 +2,8 @@
 
 This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result, and mechanics shows whether
 such growth is possible. docs/model.md has the equations. The path X*(t) is smooth in time, and the growth of a step is
-the smoothed stretch of its velocity plus feedback: what smoothing and mechanics prevent is made up for with a time
-constant, so that growth and stress have limits as the time step tends to zero.
+the smoothed stretch of its velocity plus feedback with a time constant, which corrects the misfit that smoothing and
+mechanics leave. So growth and stress converge as the time step tends to zero.
 """
 
 from collections.abc import Sequence

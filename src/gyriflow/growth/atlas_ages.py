@@ -1,7 +1,7 @@
 """Sizes and ages of an atlas: a smooth curve of its volume, and the week at which the curve has the size of each brain.
 
-The brains of an atlas are not as old as stated: a week may jump in size and the next hardly grow. Shape goes with size
-more than with the stated week, so a brain is used at the age of its size.
+Stated ages of an atlas are imprecise: volume may jump between two weeks and then stagnate. Shape goes with volume more
+than with the stated age, so a brain is used at the age of its size.
 """
 
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ def ages_by_size(
 ) -> AtlasAges:
     """Return the ages by size of an atlas' brains with volumes in mL at two or more ascending weeks.
 
-    The curve of volume is monotone and robust against single weeks (`curves.fitted`). It is fitted to the atlas'
+    The curve of volume is monotone and robust against single brains (`curves.fitted`). It is fitted to the atlas'
     volumes and, with the same weight, to the medians of a norm at these weeks, `norm_ml`, NaN where it has none. Each
     brain gets the week at which the curve has its volume; ages that do not ascend are replaced by their nearest
     ascending ones (isotonic regression). InputError if the atlas shrinks.
@@ -58,8 +58,8 @@ def ages_by_size(
     # the curve is flat where brains do not grow; beyond its ends ages follow its rate there, or its mean rate if higher
     inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
     mean_rate = (logs[-1] - logs[0]) / (curve.weeks[-1] - curve.weeks[0])
-    beyond = [max(float(rate(curve, curve.weeks[end])), mean_rate) for end in (0, -1)]
-    ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / beyond[0], inside)
-    ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / beyond[1], ages)
+    end_rates = [max(float(rate(curve, curve.weeks[end])), mean_rate) for end in (0, -1)]
+    ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / end_rates[0], inside)
+    ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / end_rates[1], ages)
     spacing = MIN_SPACING_GW * np.arange(len(ages))
     return AtlasAges(stated, volumes, curve, isotonic_regression(ages - spacing).x + spacing)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,9 +95,13 @@ def channels(
     return Channels(grid, tissue, smoothed[CEREBRUM_BIT], smoothed.get(CORTEX_BIT), intensity)
 
 
-def perturb_labels(labels: NDArray[np.integer], seed: int) -> NDArray[np.integer]:
-    """Return labels (i, j, k) with their boundaries shifted by a random smooth displacement of half a voxel."""
-    random, index = np.random.default_rng(seed), np.indices(labels.shape, dtype=np.float32)
+def perturb_labels(labels: NDArray[np.integer], seed: int, brain: str) -> NDArray[np.integer]:
+    """Return labels (i, j, k) with their boundaries shifted by a random smooth displacement of half a voxel.
+
+    Brains of different names are shifted independently with the same seed, and each equally in all its registrations.
+    """
+    random = np.random.default_rng([seed, crc32(brain.encode())])
+    index = np.indices(labels.shape, dtype=np.float32)
     for axis in index:
         shift = gaussian_filter(random.normal(size=labels.shape).astype(np.float32), PERTURBATION_SCALE)
         axis += PERTURBATION_VOXELS / shift.std() * shift

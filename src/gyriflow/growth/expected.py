@@ -15,7 +15,7 @@ from ..geometry.matching import match_points, nearest_on, surface_distance, valu
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..settings.growth import BEFORE_GW
-from .atlas_ages import AtlasAges, ages_by_size
+from .atlas_ages import MIN_SPACING_GW, AtlasAges, ages_by_size
 from .carrying import carry_over_weeks
 from .matched_surfaces import follow_surfaces
 
@@ -217,7 +217,9 @@ def expected_positions(
     smooth = diffuse(mesh.vertices, pieces, difference, smoothing_mm)
     size = cell_sizes(start, pieces).sum()
     by_week = {start_week: mesh.vertices}
-    for week in sorted({*weeks, *also}):
+    # the path through shapes at almost the same time would be rough
+    apart = [week for week in weeks if all(abs(week - other) >= MIN_SPACING_GW for other in (start_week, *also))]
+    for week in sorted({*apart, *also}):
         if week > start_week + 1e-6:
             places = positions_at(week, atlas, weeks, sizes)
             scale = (cell_sizes(places, pieces).sum() / size) ** (1 / 3)

@@ -9,9 +9,14 @@ from ..geometry.triangles import Floats, TriangleMesh
 from ..units import SECONDS_PER_GW
 
 
-def growth_sd(members: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
-    """Return the standard deviation (n − 1) of the growth of area and thickness in maps of `growth_per_week`."""
-    names = [name for name in members[0] if not name.startswith("growth_direction")]
+def growth_sd(run: Mapping[str, Floats], members: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
+    """Return the standard deviation (n − 1) of the growth of area and thickness over the members of a run's ensemble.
+
+    All are maps of `growth_per_week`. The result is NaN for fewer than two members.
+    """
+    names = [name for name in run if not name.startswith("growth_direction")]
+    if len(members) < 2:
+        return {name: np.full_like(run[name], np.nan) for name in names}
     return {name: np.std([maps[name] for maps in members], axis=0, ddof=1) for name in names}
 
 
@@ -23,9 +28,9 @@ def growth_per_week(
     Parameters
     ----------
     frames
-        {week: (surface, fields)} with the logarithms of the growth in a step, the mean since the last output week:
+        {week: (surface, fields)} with log growth per step, averaged since the previous output week:
         `tangential_growth_per_step` and `radial_growth_per_step` (n,), and `growth_direction_per_step` (n, 3), the
-        tangential direction of largest growth, as long as the difference to the growth across it.
+        tangential direction of largest growth, as long as the difference of the two principal tangential log growths.
     step_s
         Length of that step in s.
 
@@ -36,6 +41,7 @@ def growth_per_week(
         vectors of the frames as logarithms per week.
     """
     steps = SECONDS_PER_GW / step_s
+    # area grows with the square of the mean tangential stretch
     return {
         (before, week): {
             "area_growth_percent_per_gw": 100 * np.expm1(2 * steps * frames[week][1]["tangential_growth_per_step"]),

@@ -1,5 +1,6 @@
 """Quality of a registration: overlap, folding of the map, and displacement at its rim."""
 
+import logging
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ from ..errors import InputError
 from ..geometry.deformations import Deformation, carry, determinants, transform_points
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM_BIT, CORTEX_BIT, Channels
+
+log = logging.getLogger(__name__)
 
 MIN_DICE = {"cerebrum": 0.95, "cortex": 0.60}
 """Below these overlaps a registration is refused. Overlap of a cortex of one voxel is low."""
@@ -65,8 +68,11 @@ def measure_quality(earlier: Channels, later: Channels, deformation: Deformation
     )
 
 
-def require_good(quality: RegistrationQuality, *, pair: str) -> None:
-    """Raise InputError, with all measures, if a registration of a named `pair` of brains must not be used."""
+def require_good(quality: RegistrationQuality, *, pair: str, only_warn: bool = False) -> None:
+    """Raise InputError, with all measures, if a registration of a named `pair` of brains must not be used.
+
+    With `only_warn`, log a warning instead.
+    """
     values = asdict(quality)
     faults = [
         f"Dice of the {mask} {values[f'dice_{mask}']:.3f} below {limit:g}"
@@ -77,12 +83,15 @@ def require_good(quality: RegistrationQuality, *, pair: str) -> None:
         faults.append(f"the map folds in {quality.folded_share:.2%} of the cerebrum, above {MAX_FOLDED:.2%}")
     if faults:
         numbers = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
-        raise InputError(
+        error = InputError(
             f"the registration {pair} has failed: {'; '.join(faults)}",
             found=numbers,
             expected="two brains that differ by some weeks of growth",
             remedy="Look at both label volumes; leave out the one that does not fit, or use brains of closer weeks.",
         )
+        if not only_warn:
+            raise error
+        log.warning("%s", error)
 
 
 def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:

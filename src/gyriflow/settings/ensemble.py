@@ -21,9 +21,9 @@ FADING_RANGE_GW = (1.0, 16.0)
 class Variation:
     """The inputs of a member of an ensemble that differ from those of its run.
 
-    `number` counts the members from 0, `seed` is that of its perturbed labels. `registration_smoothing` is a factor of
-    the registration's smoothing. The others are of predictions: `age_shift_gw` is added to the age of the start brain;
-    for `difference_smoothing_mm` and `fading_gw` see `growth.expected`.
+    `number` counts the members from 0, `seed` is the random seed of the label perturbation, `registration_smoothing` a
+    factor of the registration's smoothing. Predictions only: `age_shift_gw` is added to the start brain's age; for
+    `difference_smoothing_mm` and `fading_gw` see `growth.expected`.
     """
 
     number: int
@@ -35,10 +35,10 @@ class Variation:
 
 
 class Ensemble(Settings):
-    """Further runs with uncertain inputs varied, which give intervals; their number alone will do, as in `ensemble: 8`.
+    """Repeat a run with perturbed inputs to get prediction intervals. `ensemble: 8` is short for `{members: 8}`.
 
-    Varied are the registrations (smoothing; labels at their boundaries), and of predictions also the age of the start
-    brain, the atlas, if growth series of several can be used, and which individual differences persist.
+    Members differ in registrations (smoothing; label boundaries), and in predictions also in the age of the start
+    brain, the atlas, if several atlases cover the run, and the individual differences that persist.
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "integer", "null"]})
@@ -57,11 +57,13 @@ class Ensemble(Settings):
 
     @property
     def variations(self) -> list[Variation]:
-        """The variation of each member, by a Latin hypercube: each quantity has one value in each of n strata."""
+        """The variation of each member, by a Latin hypercube: one sample per stratum."""
         random, n = np.random.default_rng(self.seed), self.members
-        shares = [(random.permutation(n) + random.uniform(size=n)) / n for _ in range(4)]
+        quantiles = [(random.permutation(n) + random.uniform(size=n)) / n for _ in range(4)]
         log_ranges = [np.log(ends) for ends in (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW)]
-        scaled = [np.exp(low + share * (high - low)) for share, (low, high) in zip(shares[1:], log_ranges, strict=True)]
+        scaled = [
+            np.exp(low + q * (high - low)) for q, (low, high) in zip(quantiles[1:], log_ranges, strict=True)
+        ]
         return [
             Variation(
                 number=number,
@@ -71,5 +73,5 @@ class Ensemble(Settings):
                 difference_smoothing_mm=float(difference),
                 fading_gw=float(fading),
             )
-            for number, (age, smoothing, difference, fading) in enumerate(zip(shares[0], *scaled, strict=True))
+            for number, (age, smoothing, difference, fading) in enumerate(zip(quantiles[0], *scaled, strict=True))
         ]

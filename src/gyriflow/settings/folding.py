@@ -144,7 +144,7 @@ class FoldingSettings(Settings):
     solver: Solver = Solver()
     """Solvers."""
     ensemble: Ensemble | None = None
-    """With growth by `shapes`, members of an ensemble that give intervals."""
+    """With growth by `shapes`, an ensemble that gives prediction intervals."""
     ranks: int = Field(2, ge=1, le=4096)
     """MPI ranks of a simulation."""
 

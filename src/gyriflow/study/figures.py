@@ -376,10 +376,10 @@ GROWTH_SPREAD = Kind(
     f"{RUN_FIGURES}/growth_sd.png",
     "pictures:growth_maps",
     section="Folding",
-    title="Repeat error of growth",
+    title="Standard deviation of growth in the ensemble",
     caption=(
-        "Standard deviation of the growth in area over the members of the ensemble of run *{run}*, whose registrations "
-        "and labels vary. The maps are in ``surfaces/growth_sd.shape.gii`` of the run."
+        "Standard deviation of the growth in area over the members of the ensemble of run *{run}*: its repeat error "
+        "if the run follows its own later brains. The maps are in ``surfaces/growth_sd.shape.gii`` of the run."
     ),
 )
 
@@ -398,10 +398,10 @@ INTERVALS = Kind(
     section="Folding",
     title="Intervals of the ensemble",
     caption=(
-        "Run *{run}* (line) and the interval that contains a further member of its ensemble with a probability of "
-        "90 % (band). Members differ in registrations, in labels and, for predictions, in age, atlas and persistence "
-        "of individual differences. Stars: observed brains. The ensemble does not vary how individuals grow, so fewer "
-        "than 90 % of later scans lie in the band (docs/science.md)."
+        "Run *{run}* (line) and the 90 % prediction interval for one further member of its ensemble (band). Members "
+        "differ in registrations, in labels and, for predictions, in age, atlas and persistence of individual "
+        "differences. Stars: observed brains. Individual deviations from the atlas' growth do not vary, so fewer than "
+        "90 % of later scans lie in the band."
     ),
 )
 POSITION_SPREAD = Kind(
@@ -409,8 +409,8 @@ POSITION_SPREAD = Kind(
     f"{RUN_FIGURES}/position_sd.png",
     "pictures:shape_maps",
     section="Folding",
-    title="Spread of positions in the ensemble",
-    caption="Standard deviation of the position of each place over the members of the ensemble of run *{run}*.",
+    title="Standard deviation of positions in the ensemble",
+    caption="Standard deviation of the position of each vertex over the members of the ensemble of run *{run}*.",
     job="ensemble_figures",
 )
 SULCUS_PROBABILITY = Kind(
@@ -419,7 +419,10 @@ SULCUS_PROBABILITY = Kind(
     "pictures:shape_maps",
     section="Folding",
     title="Probability of a sulcus",
-    caption="Share of the members of the ensemble of run *{run}* in which a place is a valley (shape index ≤ −¼).",
+    caption=(
+        "Share of run *{run}* and the members of its ensemble in which a vertex is in a sulcus (shape index at most "
+        "−⅜)."
+    ),
     job="ensemble_figures",
 )
 

@@ -178,13 +178,13 @@ class Chain:
 
     @property
     def growth_weeks(self) -> list[float]:
-        """The weeks of the start at which the later brains are as old as it: an older start meets them earlier."""
+        """Weeks of the later brains on the start brain's time axis: their own week minus the age shift."""
         shift = self.variation.age_shift_gw if self.variation else 0.0
         return [round(week - shift, 2) for week in self.later_weeks]
 
 
 def chain_name(origin: Origin, run: str = "", member_of: str | None = None) -> str:
-    """Return the name of a start brain's chain for its runs, or for one run that is a member of an ensemble."""
+    """Return the name of a start brain's chain: its origin, or ORIGIN.RUN for a member of an ensemble."""
     return f"{origin}.{run}" if member_of else origin
 
 

@@ -22,6 +22,10 @@ from .records import Brain, CalibrationRuns, Chain, Origin, Simulation, Sweep, c
 from .series import Series, series_of, several_subjects
 from .study import Study
 
+UNVARIED = (1.0, 0)
+"""Factor of the smoothing, and seed of the perturbed labels, of the registrations of runs."""
+MAX_BEYOND_ATLAS_GW = 0.5
+"""How far the growth of an atlas is extrapolated for members of an ensemble that are older than stated."""
 Chains = Mapping[tuple[str, str], Chain]
 
 
@@ -256,44 +260,58 @@ def _chains(plan: Sequence[_Planned], series: Series, brains: Sequence[Brain]) -
             continue
         start, end = planned.start, planned.settings.end_week
         if planned.shapes == "self":
-            members, further = _own_chain(start, end, series), []
             # ages of one series have the same error
+            chain_brains, further = _own_chain(start, end, series), []
             variation = replace(variation, age_shift_gw=0.0)
+            start_variation = atlas_variation = variation.registration_smoothing, variation.seed
         else:
-            # the whole age axis of the run is shifted, also its end, which may lie beyond the atlas
-            week, end_week = start.week + variation.age_shift_gw, end + variation.age_shift_gw
-            further = sorted({*(w for w in _later_observed_weeks(start, brains) if w <= end), end})
             names = series.from_other_populations(start, all_atlases=True)
             names = [name for name in names if _covers(series.brains[name], start.week, end)]
-            members = _atlas_chain(start, week, end_week, names[variation.number % max(len(names), 1) :][:1], series)
-        chains[planned.chain] = _chain(members, series, further, variation)
+            name, round_of_atlases = variation.number % max(len(names), 1), variation.number // max(len(names), 1)
+            atlas_weeks = [brain.week for brain in series.brains[names[name]]] if names else [start.week, end]
+            # the age of the whole run is shifted, as far as the atlas goes, or a little further
+            low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
+            variation = replace(variation, age_shift_gw=round(min(max(variation.age_shift_gw, low), high), 2))
+            week, end_week = start.week + variation.age_shift_gw, end + variation.age_shift_gw
+            further = sorted({*(w for w in _later_observed_weeks(start, brains) if w <= end), end})
+            chain_brains = _atlas_chain(start, week, end_week, names[name : name + 1], series)
+            start_variation = variation.registration_smoothing, variation.seed
+            # one of two, so that members share the registrations between the atlas' brains
+            atlas_variation = (SMOOTHING_RANGE[1], 0) if round_of_atlases % 2 else UNVARIED
+        chain = _chain(chain_brains, series, further, start_variation, atlas_variation)
+        if planned.shapes == "self" and chain.correspondences == chains[start.id, "self"].correspondences:
+            raise InputError(
+                f"the members of the ensemble of run {planned.member_of} would be equal: the surfaces of "
+                f"{start.id} and its later brains are matched by their vertices, so there are no registrations to vary",
+                remedy="Remove ensemble, or set growth.matched_surfaces to false.",
+            )
+        chains[planned.chain] = replace(chain, further_weeks=tuple(further), variation=variation)
     return chains
 
 
 def _chain(
-    brains: Sequence[Brain], series: Series, further_weeks: Iterable[float] = (), variation: Variation | None = None
+    brains: Sequence[Brain],
+    series: Series,
+    further_weeks: Iterable[float] = (),
+    first_variation: tuple[float, int] = UNVARIED,
+    later_variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
-    """Return a chain with its correspondences; those of a member of an ensemble have its variation.
-
-    Registrations between the brains of an atlas have one of two smoothings, so that members share them.
-    """
-    of_start = (variation.registration_smoothing, variation.seed) if variation else (1.0, 0)
-    of_atlas = (SMOOTHING_RANGE[1], 0) if variation and variation.number % 2 else (1.0, 0)
-    correspondences = []
-    for pair in pairwise(brains):
-        is_of_atlas = brains[0] not in pair and brains[0].config.population != pair[0].config.population
-        correspondences.append(series.correspondence(*pair, *(of_atlas if is_of_atlas else of_start)))
-    chain_weeks = {brain.week for brain in brains[1:]} if variation is None else set()
+    """Return a chain, with smoothing and seed of its first registration and of the later ones."""
+    variations = [first_variation, *[later_variation] * (len(brains) - 2)]
+    chain_weeks = {brain.week for brain in brains[1:]}
     return Chain(
         brains=tuple(brains),
-        correspondences=tuple(correspondences),
+        correspondences=tuple(
+            series.correspondence(*pair, *variation)
+            for pair, variation in zip(pairwise(brains), variations, strict=False)
+        ),
         posed=tuple(series.posed(*pair) for pair in pairwise(brains)),
         further_weeks=tuple(week for week in further_weeks if week not in chain_weeks),
-        variation=variation,
     )
 
 
 def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
+    """Return whether growth from a week to an end is known from brains of an atlas."""
     weeks = {brain.week for brain in brains}
     return len(weeks) > 1 and min(weeks) <= week + BEFORE_GW and max(weeks) >= end
 
@@ -396,7 +414,7 @@ def _simulation(
         series=series.for_sizes(start),
         curves=CURVES["curves"] if sizes or growth.thickness_mm == "measured" else [],
         base=config.calibrate.base if config.calibrate and run in config.calibrate.runs else run,
-        ensemble=() if planned.member_of else tuple(members_of(run, planned.settings)),
+        ensemble=tuple(members_of(run, planned.settings)) if run in config.runs else (),
         member_of=planned.member_of,
         observed_brains=observed_brains,
         observed={} if start.config.synthetic else observed,

@@ -59,6 +59,7 @@ def test_spread_is_that_of_places_after_rigid_alignment():
         TriangleMesh(transform_points(places, rigid(0, 0, 30 * number, shift=(5, 0, 0))), mesh.faces)
         for number, places in enumerate(moved)
     ]
+    assert np.isnan(ensemble_maps(mesh, [], [far * 1.0])["position_sd_mm"]).all()
     values = [np.where(far, share, 0.5) for share in (-0.5, -0.5, 0.5, 0.0)]
     found = ensemble_maps(mesh, members, values)
     # ±1 mm along the radius

@@ -192,9 +192,10 @@ def test_growth_is_that_of_a_week_up_to_the_later_frame(frames):
     assert maps["thickness_growth_percent_per_gw"] == pytest.approx(np.full(4, 100 * np.expm1(4 * 0.02)))
     assert maps["growth_direction_y"] == pytest.approx([0, 4, 0, 0])
     repeats = [maps, {name: values + 2.0 for name, values in maps.items()}]
-    found = growth_sd(repeats)
+    found = growth_sd(maps, repeats)
     assert set(found) == {"area_growth_percent_per_gw", "thickness_growth_percent_per_gw"}
     assert found["area_growth_percent_per_gw"] == pytest.approx(np.full(4, np.sqrt(2)))
+    assert np.isnan(growth_sd(maps, repeats[:1])["area_growth_percent_per_gw"]).all()
 
 
 def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_path, frames):

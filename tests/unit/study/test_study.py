@@ -4,10 +4,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from configurations import ids, resolved
+from configurations import both_kinds, ids, resolved, touched
 from facts import Facts
+from shapes import sphere
 
 from gyriflow.errors import InputError
+from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
@@ -307,7 +309,8 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     firsts, others = zip(*((chain.correspondences[0], chain.correspondences[1:]) for chain in chains), strict=True)
     assert len({*firsts, found.chains["own22", "atlas"].correspondences[0]}) == 5
     assert "results/study/registration/b22/b23.h5" in others[0]
-    assert "results/study/registration/third22/third23.smoothing-1.5.seed-0.h5" in others[1]
+    assert "results/study/registration/third22/third23.h5" in others[1]
+    assert "results/study/registration/b22/b23.smoothing-1.5.seed-0.h5" in others[2]
     shifts = [chain.variation.age_shift_gw for chain in chains]
     assert len(set(shifts)) == 4
     assert all(abs(shift) < 1.2 for shift in shifts)
@@ -321,6 +324,23 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
         for chain in study(brains, runs={"a": run}, growth={"series": "atlas"}).chains.values()
         if chain.variation
     ]
+
+
+def test_the_age_of_a_member_stays_within_its_atlas(of_two):
+    run = {"preset": "expected", "ensemble": {"members": 6, "age_sd_gw": 2}}
+    # the start is a week before the atlas, which ends with the run
+    found = study(of_two(21, 24, atlas=(22, 23, 24)), runs={"a": run})
+    chains = [found.chains["own21", f"atlas.a-member-{number}"] for number in range(1, 7)]
+    shifts = [chain.variation.age_shift_gw for chain in chains]
+    assert (min(shifts), max(shifts)) == (0.0, 0.5)
+    assert all(len(chain.later) > 1 for chain in chains)
+
+
+def test_members_that_would_be_equal_are_refused(tmp_path):
+    raw = both_kinds(touched(tmp_path), (21, 22)) | {"runs": {"a": {"growth": "shapes", "ensemble": 3}}}
+    write_surface(tmp_path / "pial.surf.gii", sphere(30.0, 2))
+    with pytest.raises(InputError, check=Facts("s21", "ensemble", "growth.matched_surfaces")):
+        resolve(load(raw | {"folding": {"end_week": 22}}, tmp_path))
 
 
 def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
