@@ -25,6 +25,9 @@ LAST_WORDS = 1000
 
 RADIUS_EDGE_RATIO = 1.3
 """TetGen's bound on circumradius over shortest edge: from here on edges grow as fast as elements stay good."""
+STOP_ENERGY = 50
+"""Largest AMIPS energy at which fTetWild stops improving elements before it sizes them, which improves them again; that
+of the regular element is 3."""
 OPTIMISED_DEG = 140
 """Dihedral angles beyond this are what TetGen improves last; with its own 165 slivers stay."""
 
@@ -100,6 +103,9 @@ def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
         edge_length_abs=float(arrays["edge"]),
         epsilon=float(arrays["epsilon"]),
         simplify=False,
+        stop_energy=STOP_ENERGY,
+        # a second thread costs more processor time than it saves
+        num_threads=1,
         vtk_ordering=True,
         bg_vertices=arrays["bg_vertices"],
         bg_tets=arrays["bg_tets"].astype(np.int32),

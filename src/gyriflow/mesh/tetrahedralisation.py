@@ -3,6 +3,7 @@
 import logging
 from typing import Any
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -44,13 +45,20 @@ def edge_length_at(
 def background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
-    """Return a regular tetrahedral grid around the surface and the requested edge length in mm at its vertices."""
+    """Return a regular tetrahedral grid over the inside of the surface and the requested edge length in mm.
+
+    The lengths are those at the grid's vertices. fTetWild also fills the box around the surface, with elements that are
+    removed in the end; beyond the grid, which ends a cell from the surface, they are as long as those of the core.
+    """
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
     counts = np.ceil((surface.vertices.max(axis=0) + spacing - low) / spacing).astype(int) + 1
     background = grid([start + spacing * np.arange(count) for start, count in zip(low, counts, strict=True)])
     depth = cKDTree(surface.vertices).query(background.vertices)[0]
-    return background, edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
+    inside = igl.fast_winding_number(surface.vertices, surface.faces, background.vertices) > 0.5
+    near = background.tets[(inside | (depth < spacing))[background.tets].any(axis=1)]
+    lengths = edge_length_at(depth, surface_edge_mm, core_edge_mm, order)
+    return TetrahedralMesh(background.vertices, near), lengths
 
 
 def tetrahedralise(
