@@ -106,6 +106,7 @@ rule html_report:
         warnings=rules.study_records.output.warnings,
         runs=rules.run_tables.output.csv if study.run_simulations else [],
         validation=f"{STUDY}/validation.csv" if study.validated else [],
+        atlas_brain=study.prediction_facts["atlas_surface"] if study.prediction else [],
         intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.ensemble else [],
         small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
         accuracy=f"{workflow.basedir}/norms/predictions.yaml" if study.prediction else [],

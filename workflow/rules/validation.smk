@@ -79,6 +79,26 @@ rule prediction:
         "../scripts/prediction.py"
 
 
+rule atlas_brain:
+    input:
+        predicted=lambda w: simulation_of(w).at(float(w.week)).parts["whole"],
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        targets=TARGETS.format(brain="{brain}", origin="atlas"),
+    output:
+        ATLAS_BRAIN,
+    log:
+        f"{RUN}/logs/atlas_brain.{WEEK}.log",
+    benchmark:
+        f"{RUN}/benchmarks/atlas_brain.{WEEK}.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        week=lambda w: float(w.week),
+    script:
+        "../scripts/atlas_brain.py"
+
+
 def deviating(wildcards):
     """Return the start brain, its run at the first week and at another week, and the observed brain of that week."""
     simulation, week = simulation_of(wildcards), float(wildcards.week)

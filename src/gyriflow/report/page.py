@@ -355,12 +355,23 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
         f"{range_text(group['distance_mm'])} mm (r {range_text(group['r_shape_index'])})"
         for group in map(models.get_group, ("run", "atlas", "scaled"))
     )
+    means = {name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean() for name in ("run", "atlas")}
+    better = [
+        words
+        for words, is_better in (
+            ("closer", means["atlas"]["distance_mm"] < means["run"]["distance_mm"]),
+            ("more similar in shape index", means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"]),
+        )
+        if is_better
+    ]
+    simpler = f" On average the atlas' own brain was {' and '.join(better)}; it is given beside the prediction."
+    simpler = simpler if better else ""
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
         f"This is a prediction, not a scan. In tests over {horizon:g} weeks, the mean distance from the observed brain "
         f"and the correlation of shape index with it were {run} for predictions, {atlas} for the atlas' own brain and "
-        f"{scaled} for the scaled start.{beyond} The test brains were averages of many normal fetuses; the accuracy "
-        "for a single fetus is unknown."
+        f"{scaled} for the scaled start.{simpler}{beyond} The test brains were averages of many normal fetuses; the "
+        "accuracy for a single fetus is unknown."
     )
 
 

@@ -61,9 +61,7 @@ class Ensemble(Settings):
         random, n = np.random.default_rng(self.seed), self.members
         quantiles = [(random.permutation(n) + random.uniform(size=n)) / n for _ in range(4)]
         log_ranges = [np.log(ends) for ends in (SMOOTHING_RANGE, DIFFERENCE_RANGE_MM, FADING_RANGE_GW)]
-        scaled = [
-            np.exp(low + q * (high - low)) for q, (low, high) in zip(quantiles[1:], log_ranges, strict=True)
-        ]
+        scaled = [np.exp(low + q * (high - low)) for q, (low, high) in zip(quantiles[1:], log_ranges, strict=True)]
         return [
             Variation(
                 number=number,

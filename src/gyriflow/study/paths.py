@@ -113,6 +113,8 @@ PREPARED = {
 }
 """Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
+ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
+"""The atlas' own brain beside a prediction: aligned with it, with its volume."""
 GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"
 """Standard deviation of the growth maps of an ensemble."""
 ENSEMBLE = f"{RUN}/metrics/ensemble.csv"

@@ -186,7 +186,8 @@ def foretold(weeks: float) -> dict:
     return {
         "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks,
         "atlas_brain": "crl-30", "atlas_week": 30, "population": "well", "atlas": atlas, "accuracy": ACCURACY,
-        "surfaces": ["results/a.surf.gii"], "labels": "results/a_dseg.nii.gz",
+        "surfaces": ["results/a.surf.gii"], "atlas_surface": "results/atlas.surf.gii",
+        "labels": "results/a_dseg.nii.gz",
     }  # fmt: skip
 
 
@@ -198,7 +199,7 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
     parts = (
         *("</h1>", str(escape(accuracy_sentence(foretold(7.5)))), "210.5"),
-        *("norms/predictions.yaml", "results/a.surf.gii"),
+        *("norms/predictions.yaml", "results/a.surf.gii", "results/atlas.surf.gii"),
         *("results/a_dseg.nii.gz", "A. et al., doi 10.1/x.", "CRL licence", "Research only.", '<section id="brains"'),
     )
     order = [text.index(part) for part in parts]
@@ -212,6 +213,12 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
 def test_a_prediction_beyond_those_that_were_tried_says_so():
     last = max(row["horizon"] for row in ACCURACY["rows"])
     assert accuracy_sentence(foretold(last)).count(f"{last:g} weeks") == 1
+    rows = [
+        {"horizon": 2.0, "model": name, "distance_mm": 0.5, "r_shape_index": 0.8} for name in ("run", "atlas", "scaled")
+    ]
+    worse = [rows[0] | {"r_shape_index": 0.7}, *rows[1:]]
+    told = [accuracy_sentence(foretold(2.0) | {"accuracy": {"rows": accuracy}}) for accuracy in (rows, worse)]
+    assert ["shape index; it is given beside" in sentence for sentence in told] == [False, True]
     assert accuracy_sentence(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
 
 
