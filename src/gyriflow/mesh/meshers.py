@@ -104,7 +104,7 @@ def _pytetwild(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
         epsilon=float(arrays["epsilon"]),
         simplify=False,
         stop_energy=STOP_ENERGY,
-        # a second thread costs more processor time than it saves
+        # one job uses one core; threads add processor time
         num_threads=1,
         vtk_ordering=True,
         bg_vertices=arrays["bg_vertices"],
