@@ -255,7 +255,7 @@ _SIZES = (
     Metric("area", "cm2", "pial area"),
     Metric("area_share", "1", "area share"),
     # cm² over mL^(2/3) is a number
-    Metric("relative_area", "1", "area / volume^⅔"),
+    Metric("relative_area", "1", "area / volume^(2/3)"),
     Metric("volume_tissue", "mL", "volume of tissue"),
     Metric("volume_ventricles", "mL", "volume of ventricles"),
     Metric("volume_cortex", "mL", "volume of cortex"),
