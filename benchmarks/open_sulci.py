@@ -1,8 +1,9 @@
-"""Measure surfaces with fused and with opened sulci, on phantoms of known shape and on shipped brains.
+"""Measure surfaces with fused and with opened sulci, on phantoms of known shape, on brains and on known surfaces.
 
-`python benchmarks/open_sulci.py [FOLDER …]`: without folders, phantoms; with folders named by their week, each with a
-`parcellation.nii.gz` in the labels of the spina bifida atlas, pial area, thickness and the ratio of the area to the
-cortex's volume divided by its thickness.
+`python benchmarks/open_sulci.py [PATH …]`: without paths, phantoms, some with noise at the borders of their labels. For
+a folder named by its week with a `parcellation.nii.gz` in the labels of the spina bifida atlas, pial area, thickness
+and the ratio of the area to the cortex's volume divided by its thickness. For a file `….pial.surf.gii` with its
+`….white.surf.gii` (one hemisphere), surfaces are made from labels of 0.8 mm between both, and their area compared.
 """
 
 import json
@@ -14,14 +15,28 @@ from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gyriflow.anatomy.extraction import remove_bridges, smooth_mask
+from gyriflow.anatomy.extraction import make_simple, remove_bridges, smooth_mask
+from gyriflow.anatomy.fissure import sample
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
 from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
-from gyriflow.geometry.triangles import area, convex_hull, euler_number, vertex_areas
+from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.matching import surface_mask
+from gyriflow.geometry.triangles import (
+    area,
+    area_cm2,
+    convex_hull,
+    euler_number,
+    transformed,
+    vertex_areas,
+    volume_ml,
+)
+from gyriflow.io.surfaces import read_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.gyrification import sulcal_depth
@@ -33,6 +48,11 @@ WIDTHS_MM, VOXELS_MM, TURNS_DEG = (0.0, 0.2, 0.5, 1.0), (0.5, 0.8, 1.0), ((0, 0,
 # cells of a voxel along each axis; the label is that of most cells
 CELLS = 3
 EDGE_MM = 1.0
+# shares of the voxels at a border whose label is replaced by that of its other side
+NOISES = (0.0, 0.1, 0.2)
+# a voxel of a slit that is further from all sulci is a crack in a crown
+MAX_OFF_MM = 1.5
+LABEL_MM, MIN_CORTEX_MM = 0.8, 1.6
 SULCI = ("fused", "opened")
 
 
@@ -88,6 +108,112 @@ def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, floa
     return body, core & body, affine
 
 
+def network() -> tuple[np.ndarray, np.ndarray]:
+    """Return the unit vectors (20, 3) of a dodecahedron's corners and its edges (30, 2): a net with Y junctions."""
+    golden = (1.0 + 5.0**0.5) / 2.0
+    corners = [np.array(c, dtype=float) for c in product((-1.0, 1.0), repeat=3)]
+    for a, b in product((-1.0 / golden, 1.0 / golden), (-golden, golden)):
+        corners += [np.roll([0.0, a, b], shift) for shift in range(3)]
+    points = np.array(corners) / 3.0**0.5
+    cosines = points @ points.T
+    return points, np.argwhere(np.triu(np.isclose(cosines, 5.0**0.5 / 3.0), 1))
+
+
+def branching_area(radius_mm: float, depth_mm: float, n_arcs: int) -> float:
+    """Return the area (mm²) of a ball with closed sulci below the first arcs of the network: exact, without width."""
+    angle = n_arcs * np.arccos(5.0**0.5 / 3.0)
+    return float(4.0 * np.pi * radius_mm**2 + angle * (radius_mm**2 - (radius_mm - depth_mm) ** 2))
+
+
+def branching_phantom(
+    voxel_mm: float,
+    turn_deg: tuple[float, float, float] = (20, 30, 10),
+    *,
+    radius_mm: float = RADIUS_MM,
+    depth_mm: float = DEPTH_MM,
+    thickness_mm: float = THICKNESS_MM,
+    n_arcs: int = 30,
+):
+    """Return the masks of a ball with fused sulci below arcs of the network and of its core, to-sulci (mm), affine."""
+    count = int(np.ceil(radius_mm / voxel_mm)) + 6
+    axis = np.arange(-count, count + 1) * voxel_mm + 0.13
+    turn = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1) @ turn
+    corners, arcs = network()
+    share, height = np.linspace(0.0, 1.0, 200), np.arange(radius_mm - depth_mm, radius_mm, 0.1)
+    ends = corners[arcs[:n_arcs]][:, :, None]
+    lines = (ends[:, 0] * (1.0 - share[:, None]) + ends[:, 1] * share[:, None]).reshape(-1, 3)
+    lines /= np.linalg.norm(lines, axis=1, keepdims=True)
+    sheets = (height[:, None, None] * lines).reshape(-1, 3)
+    reach = 3.0 * thickness_mm
+    to_sulci = cKDTree(sheets).query(points.reshape(-1, 3), distance_upper_bound=reach)[0]
+    to_sulci = np.minimum(to_sulci, reach).reshape(points.shape[:3])
+    below = radius_mm - np.linalg.norm(points, axis=-1)
+    affine = np.diag([voxel_mm] * 3 + [1.0])
+    affine[:3, 3] = axis[0]
+    return below > 0, (below > thickness_mm) & (to_sulci > thickness_mm), to_sulci, affine
+
+
+def with_noise(body: np.ndarray, core: np.ndarray, share: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the masks of a body and its core with a share of the voxels at both borders replaced."""
+    random, masks = np.random.default_rng(seed), []
+    for mask in (body, core):
+        border = ndimage.binary_dilation(mask) & ~ndimage.binary_erosion(mask)
+        masks.append(mask ^ (border & (random.random(mask.shape) < share)))
+    return masks[0], masks[1] & masks[0]
+
+
+def try_branching(voxel_mm: float, turn_deg: tuple[float, float, float], noise: float, **shape: float) -> dict:
+    """Measure a phantom with branching sulci: areas relative to the exact one, and cracks in crowns (mm³)."""
+    whole, solid, to_sulci, affine = branching_phantom(voxel_mm, turn_deg, **shape)
+    body, core = with_noise(whole, solid, noise)
+    sizes = {"radius_mm": RADIUS_MM, "depth_mm": DEPTH_MM, "n_arcs": 30} | shape
+    exact = branching_area(sizes["radius_mm"], sizes["depth_mm"], int(sizes["n_arcs"]))
+    (field, _), volume = remove_bridges(body, smooth_mask(body)), float(body.sum() * voxel_mm**3)
+    fused = surface_of_mask(field, affine, volume, EDGE_MM).mesh
+    simple, _ = make_simple(field)
+    slits, fine, report = open_fused_sulci(simple, affine, core)
+    opened = surface_of_mask(slits, fine, volume, EDGE_MM, taken_mm3=1e3 * report.get("opened_mL", 0.0)).mesh
+    places = transform_points(np.argwhere(slits <= 0.5), fine)
+    places = places[sample(simple, affine, places) > 0.5]
+    off = sample(to_sulci, affine, places) > MAX_OFF_MM
+    row = {"voxel_mm": voxel_mm, "turn_deg": turn_deg, "noise": noise, **shape, "area_mm2": exact, **report}
+    row |= {name: area(mesh) / exact - 1.0 for name, mesh in zip(SULCI, (fused, opened), strict=True)}
+    return row | {"cracks_mm3": float(off.sum() * abs(np.linalg.det(fine[:3, :3])))}
+
+
+def try_surface(pial_file: Path) -> dict:
+    """Return areas of a hemisphere's surfaces with fused and opened sulci, made of labels between its surfaces."""
+    pial, white = read_surface(pial_file), read_surface(Path(str(pial_file).replace(".pial.", ".white.")))
+    # both may have been moved, and have the same vertices
+    shift = np.average(pial.vertices - white.vertices, axis=0, weights=vertex_areas(white))
+    box = np.array([pial.vertices.min(axis=0), pial.vertices.max(axis=0)])
+    fine, affine = surface_mask(pial, LABEL_MM / CELLS, box)
+    inner, _ = surface_mask(transformed(white, motion(shift=shift)), LABEL_MM / CELLS, box)
+    # atlases have thin cortex, label volumes of fetuses do not
+    inner *= ndimage.distance_transform_edt(fine, sampling=LABEL_MM / CELLS) > MIN_CORTEX_MM
+    shape = [size // CELLS for size in fine.shape]
+    cells = [side for size in shape for side in (size, CELLS)]
+    within = tuple(slice(CELLS * size) for size in shape)
+    body, core = (mask[within].reshape(cells).mean(axis=(1, 3, 5)) > 0.5 for mask in (fine, inner))
+    affine = affine @ np.diag([CELLS] * 3 + [1.0])
+    affine[:3, 3] += 0.5 * (LABEL_MM - LABEL_MM / CELLS)
+    labels = np.pad(np.where(body & core, 3, np.where(body, 2, 0)), 6)
+    affine[:3, 3] -= 6 * LABEL_MM
+    row: dict = {"area_cm2": area_cm2(pial), "volume_mL": volume_ml(pial)}
+    for name in SULCI:
+        field, _ = remove_bridges(labels > 0, smooth_mask(labels > 0))
+        report: dict = {}
+        grid = affine
+        if name == "opened":
+            field, _ = make_simple(field)
+            field, grid, report = open_fused_sulci(field, affine, labels == 3)
+        volume = float((labels > 0).sum() * LABEL_MM**3)
+        mesh = surface_of_mask(field, grid, volume, EDGE_MM, taken_mm3=1e3 * report.get("opened_mL", 0.0)).mesh
+        row[name] = {"area": area(mesh) / area(pial) - 1.0, "euler": euler_number(mesh), **report}
+    return row
+
+
 def measure(mesh, body, core, affine) -> dict[str, float]:
     """Measure the quantities of `truth` on a surface of the body, and its Euler number."""
     hull, weights = convex_hull(mesh), vertex_areas(mesh)
@@ -101,7 +227,7 @@ def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, 
     """Measure the surfaces of a phantom with fused and with opened sulci."""
     body, core, affine = phantom(width_mm, voxel_mm, turn_deg)
     # as for brains: slits one voxel wide are opened
-    field, _ = remove_bridges(body, smooth_mask(body), np.zeros_like(body))
+    field, _ = remove_bridges(body, smooth_mask(body))
     volume = float(body.sum() * voxel_mm**3)
     fused = surface_of_mask(field, affine, volume, EDGE_MM).mesh
     field, fine, report = open_fused_sulci(field, affine, core)
@@ -110,9 +236,11 @@ def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, 
     return row | {name: measure(mesh, body, core, affine) for name, mesh in zip(SULCI, (fused, opened), strict=True)}
 
 
-def try_brain(path: Path, week: float) -> dict:
+def try_brain(path: Path) -> dict:
     """Return area, thickness and area ratio of a brain with fused and with opened sulci."""
-    volume, scheme, row = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"], {"week": week}
+    volume, scheme = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"]
+    week = float(re.findall(r"\d+", path.parent.name)[0])
+    row: dict = {"week": week}
     for name in SULCI:
         began = time.process_time()
         brain = from_labels(volume.labels, volume.affine, scheme, week=week, open_sulci=name == "opened")
@@ -125,15 +253,18 @@ def try_brain(path: Path, week: float) -> dict:
 
 
 if __name__ == "__main__":
-    true, phantoms, brains = {width: truth(width) for width in WIDTHS_MM}, [], {}
-    for voxel, width, turn in product(VOXELS_MM, WIDTHS_MM, TURNS_DEG) if not sys.argv[1:] else []:
-        phantoms.append(row := try_phantom(width, voxel, turn))
+    true, rows, paths = {width: truth(width) for width in WIDTHS_MM}, [], [Path(path) for path in sys.argv[1:]]
+    for voxel, width, turn in product(VOXELS_MM, WIDTHS_MM, TURNS_DEG) if not paths else []:
+        rows.append(row := try_phantom(width, voxel, turn))
         fused, opened = (
             {key: f"{row[name][key] / exact - 1:+.1%}" for key, exact in true[width].items()} for name in SULCI
         )
         print(f"{voxel} mm voxels, {width} mm wide, rotated {turn}: fused {fused}, opened {opened}", flush=True)
-    for folder in sys.argv[1:]:
-        week = re.findall(r"\d+", Path(folder).name)[0]
-        brains[Path(folder).name] = row = try_brain(Path(folder) / "parcellation.nii.gz", float(week))
-        print(f"{Path(folder).name}: {row}", flush=True)
-    print(json.dumps({"truth": true, "phantoms": phantoms, "brains": brains}))
+    for voxel, turn, noise in product(VOXELS_MM, TURNS_DEG, NOISES) if not paths else []:
+        rows.append(row := try_branching(voxel, turn, noise))
+        print(row, flush=True)
+    for path in paths:
+        found = try_surface(path) if path.is_file() else try_brain(path / "parcellation.nii.gz")
+        rows.append({"path": path.name} | found)
+        print(rows[-1], flush=True)
+    print(json.dumps({"truth": true, "rows": rows}))

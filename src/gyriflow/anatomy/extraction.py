@@ -88,17 +88,16 @@ def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArr
     return ndimage.gaussian_filter(mask.astype(np.float32), smoothing_voxels)
 
 
-def remove_bridges(mask: Mask, field: NDArray[np.float32], stays_fused: Mask) -> tuple[NDArray[np.float32], int]:
+def remove_bridges(mask: Mask, field: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
     """Reopen slits of a mask that smoothing has closed; return the smoothed field and the number of voxels reopened.
 
     A slit is a group of voxels outside the mask and connected to the outside: a sulcus, the fissure or the Sylvian
     opening, one voxel wide. Its voxels get the value that places the surface at the slit's walls. Groups of a few
-    voxels are roughness of the labels and stay closed. So do slits that would pierce the mask, and voxels of the mask
-    `stays_fused`.
+    voxels are roughness of the labels and stay closed. So do slits that would pierce the mask.
     """
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
-    closed = (number == number[0, 0, 0]) & (field > LEVEL) & ~stays_fused
+    closed = (number == number[0, 0, 0]) & (field > LEVEL)
     number, gains = _parts_with_gains(field > LEVEL, closed)
     opened = (np.bincount(number[closed], minlength=len(gains)) >= MIN_SLIT_VOXELS) & (gains == 0)
     slits = closed & opened[number]

@@ -1,5 +1,6 @@
 """Mid-sagittal plane, interhemispheric fissure (a curved surface, opened where labels touch), left and right sides."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import igl
@@ -7,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.optimize import minimize
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.transform import Rotation
+from skimage.segmentation import watershed
 
 from ..errors import InputError
 from ..geometry.alignment import motion
@@ -18,6 +20,7 @@ from ..geometry.matching import nearest_on
 from ..geometry.triangles import (
     Ints,
     TriangleMesh,
+    area_vectors,
     corners,
     face_areas,
     face_components,
@@ -27,7 +30,8 @@ from ..geometry.triangles import (
     vertex_normals,
 )
 from ..settings.schemes import LabelScheme
-from .extraction import EDGE_SLOPE, Floats, Mask
+from ..settings.terms import Side
+from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
 
 SAMPLES = 600
 DIRECTIONS = 400
@@ -53,8 +57,14 @@ BEND_MM = 4.0
 MAX_SHIFT_MM = 5.0
 # the mid-surface is searched this often around the previous one, so that it can follow a midline shifted far
 N_UPDATES = 4
-# the labels show a fissure only as a gap of at least twice this many half millimetres in the mid-surface
-MIN_VISIBLE_CELLS = 8
+# tissue inside the cortex further from the mid-surface than this is on its own side
+SEED_MM = 6.0
+# what breaks ties of a flood, per mm from the mid-surface
+TILT = 1e-3
+# the labels show a fissure only as a gap of at least twice this in the surface between the hemispheres
+MIN_VISIBLE_MM = 3.0
+# a contact of the tissue inside the cortex joins the hemispheres if it has this share of the largest contact's size
+MIN_JOINT = 0.1
 # width to which a fissure hidden by cortex is opened
 FISSURE_MM = 1.5
 # thickness of the cortex left on the tissue that connects the hemispheres
@@ -67,6 +77,8 @@ COMPARABLE_PIECE = 0.1
 MIN_SHARE_ON_SIDE = 0.75
 # patches on the wrong side of the cut are bulges over the fissure if they are at most this share of the area
 MAX_BULGE_SHARE = 0.05
+# largest share of a hemisphere's area outside its largest piece that is left out
+MAX_LEFT_OUT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,39 +266,6 @@ class Fissure:
         ends = np.array(self.heights.shape)[:, None] - 1
         return tuple(np.clip(np.rint(self.cells(points)).astype(int), 0, ends))
 
-    @property
-    def places(self) -> Floats:
-        """The (a, b, 3) points of the mid-surface in mm."""
-        a, b = np.meshgrid(*(np.arange(n) * SPACING_MM for n in self.heights.shape), indexing="ij")
-        flat = np.stack([a + self.corner[0], b + self.corner[1]], axis=-1)
-        return np.asarray(flat @ self.axes + (self.plane.offset + self.heights)[..., None] * self.plane.normal)
-
-    def hidden(self, mask: Mask, affine: Floats) -> Mask:
-        """Return (a, b) bool: no gap in a brain's (i, j, k) mask within half a gap's width of the mid-surface."""
-        voxel = float(np.linalg.norm(affine[:3, :3], axis=0).min())
-        reach = max(0.5 * FISSURE_MM, voxel)
-        visible = np.zeros(self.heights.shape, dtype=bool)
-        for height in np.arange(-reach, reach + 0.25 * voxel, 0.5 * voxel):
-            index = voxel_index(self.places + height * self.plane.normal, affine)
-            visible |= ndimage.map_coordinates(mask.astype(np.float32), index, order=0, mode="constant") < 0.5
-        # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
-        return ~ndimage.binary_opening(visible, iterations=MIN_VISIBLE_CELLS)
-
-    def near(self, shape: tuple[int, ...], affine: Floats, reach_mm: float) -> tuple[Ints, Floats, Floats]:
-        """Return the voxels of an (i, j, k) volume within a distance of the mid-surface.
-
-        These are their indices (n, 3), their points in mm (n, 3) and their distances (n,).
-        """
-        steps = affine[:3, :3].T @ self.plane.normal
-        i, j, k = (float(step) * np.arange(size, dtype=np.float32) for step, size in zip(steps, shape, strict=True))
-        first = float(self.plane.normal @ affine[:3, 3] - self.plane.offset)
-        above_plane = np.abs((i + first)[:, None, None] + j[:, None] + k)
-        voxels = np.argwhere(above_plane < reach_mm + np.abs(self.heights).max() + SPACING_MM)
-        points = transform_points(voxels, affine)
-        distance = np.abs(self.height_above(points))
-        close = distance < reach_mm
-        return voxels[close], points[close], distance[close]
-
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
     """Return the mid-surface half-way between the facing medial walls of a closed surface."""
@@ -313,37 +292,86 @@ def between(walls: TriangleMesh, start: Fissure) -> Fissure:
     return fissure
 
 
-def open_fissure(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, hidden: Mask
+def side_distance(
+    mask: Mask, core: Mask, affine: Floats, fissure: Fissure, left: Mask | None = None, right: Mask | None = None
 ) -> NDArray[np.float32]:
-    """Open the fissure of a smoothed (i, j, k) mask to `FISSURE_MM`, down to the tissue that joins the hemispheres.
+    """Return each voxel's distance in mm from the surface between the hemispheres, negative on the left.
 
-    Labels of small fetal brains have no CSF between the medial walls: the cortex labels of both sides touch and hide
-    the fissure. It lies half-way between the tissue inside the cortex (`core`) of the two sides, and ends where that
-    tissue crosses the mid-surface (corpus callosum, deep grey matter, ventricles). It is opened only where it is
-    `hidden` (see `Fissure.hidden`). Elsewhere its width is that of the CSF labels.
+    A voxel of an (i, j, k) mask belongs to the hemisphere from which a flood reaches it first (watershed). The flood
+    starts from the labels `left` and `right`, or else in the `core`, the tissue inside the cortex, far from the
+    mid-surface `fissure`. It fills the core, then the cortex by its distance from the core. So gyri may reach over the
+    mid-surface, cortex is parted half-way where it touches, and cortex of any thickness where CSF shows the fissure.
+    """
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    places = np.argwhere(core)
+    height = fissure.height_above(transform_points(places, affine))
+    order = ndimage.distance_transform_edt(~core, sampling=size).astype(np.float32)
+    order[core] = -np.abs(height)
+    seeds = np.zeros(mask.shape, dtype=np.int8)
+    if left is None or right is None:
+        seeds[core] = np.where(np.abs(height) > SEED_MM, np.where(height < 0, 1, 2), 0)
+    else:
+        seeds[left & mask], seeds[right & mask] = 1, 2
+    # where both sides are equally near, they win in turn, and the middle is between
+    tilt = np.zeros(mask.shape, dtype=np.float32)
+    tilt[mask] = TILT * fissure.height_above(transform_points(np.argwhere(mask), affine))
+    distances = []
+    for sign, compare in ((1, np.less), (-1, np.less_equal)):
+        side = watershed(order + sign * tilt, seeds, mask=mask)
+        to_left, to_right = (ndimage.distance_transform_edt(side != part, sampling=size) for part in (1, 2))
+        distances.append(_signed_distance(compare(to_right, to_left), size))
+    return ndimage.gaussian_filter(np.mean(distances, axis=0, dtype=np.float32), SMOOTHING_VOXELS)
+
+
+def _signed_distance(mask: Mask, size: Floats) -> Floats:
+    """Return each voxel's distance (mm) from the border of a mask, half a voxel from its voxels; negative outside."""
+    inside, outside = (ndimage.distance_transform_edt(part, sampling=size) for part in (mask, ~mask))
+    return np.asarray(inside - outside - 0.5 * size.mean() * np.where(mask, 1.0, -1.0))
+
+
+def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine: Floats) -> Mask:
+    """Return the voxels of the surface between the hemispheres that cortex hides, in two or three layers.
+
+    `side_mm` is the result of `side_distance`, `brain` the (i, j, k) mask with all gaps that its labels show, `core`
+    the tissue inside the cortex. The hidden fissure ends above the tissue that joins the hemispheres (corpus callosum,
+    deep grey matter, ventricles). Small contacts of the core elsewhere are errors of the labels.
+    """
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    # not whole voxels, which rounding would include or not
+    sheet, reach = np.abs(side_mm) < 1.25 * size.max(), max(0.5 * FISSURE_MM, 1.25 * size.min())
+
+    def distance(voxels: Mask) -> NDArray[np.float32]:
+        """Return each voxel's distance in mm from the nearest of some voxels, infinite if there are none."""
+        if not voxels.any():
+            return np.full(voxels.shape, np.inf, dtype=np.float32)
+        return ndimage.distance_transform_edt(~voxels, sampling=size).astype(np.float32)
+
+    shows = sheet & (distance(~brain) < reach)
+    # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
+    wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
+    hidden = sheet & (distance(wide) > MIN_VISIBLE_MM)
+    is_right = side_mm > 0
+    touching = [ndimage.binary_dilation(core & part) & core & ~part for part in (is_right, ~is_right)]
+    number, _ = ndimage.label(touching[0] | touching[1], OUTSIDE)
+    sizes = np.bincount(number.ravel())
+    sizes[0] = 0
+    above = sheet & (distance((number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]) > FLOOR_MM)
+    number, _ = ndimage.label(above, OUTSIDE)
+    return above & hidden & np.isin(number, np.setdiff1d(number[~brain], 0))
+
+
+def open_fissure(
+    field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], to_hidden_mm: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Open the hidden fissure of a smoothed (i, j, k) mask to `FISSURE_MM`.
+
+    Labels of small fetal brains, and of older ones with a narrow fissure, have no CSF between the medial walls: the
+    cortex labels of both sides touch. `to_hidden_mm` is each voxel's distance from the result of `hidden_fissure`;
+    elsewhere the fissure is as wide as its CSF.
     """
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
-    # core and brain on the mid-surface
-    index = voxel_index(fissure.places, affine)
-    core_on_surface = ndimage.map_coordinates(core.astype(np.float32), index, order=1, mode="constant") > 0.5
-    brain_on_surface = ndimage.map_coordinates(field, index, order=1, mode="constant") > 0.5
-    depth = ndimage.distance_transform_edt(~core_on_surface) * SPACING_MM - FLOOR_MM
-    number, _ = ndimage.label(depth > 0)
-    reached = np.isin(number, np.setdiff1d(number[~brain_on_surface], 0))
-    if not hidden.all():
-        reached &= hidden
-        depth = np.minimum(depth, ndimage.distance_transform_edt(hidden) * SPACING_MM)
-    if not reached.any():
-        return field
-    depth = np.where(reached, depth, -ndimage.distance_transform_edt(~reached) * SPACING_MM)
-    # signed distance of voxels near the mid-surface from the opening
-    near, points, distance = fissure.near(field.shape, affine, FISSURE_MM / 2 + 2.0 * voxel)
-    below = -ndimage.map_coordinates(depth, fissure.cells(points), order=1, mode="nearest")
-    outside = np.maximum(distance - FISSURE_MM / 2, below)
-    result, voxels = field.copy(), tuple(near.T)
-    result[voxels] = np.minimum(result[voxels], np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0))
-    return result
+    outside = np.maximum(np.abs(side_mm) - 0.5 * FISSURE_MM, to_hidden_mm - max(voxel, 0.5 * FISSURE_MM))
+    return np.minimum(field, np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0)).astype(np.float32)
 
 
 def signed_side_distance(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:
@@ -380,34 +408,13 @@ def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
     return MidPlane(normal, float(normal @ centre), float("nan"), len(places))
 
 
-def fissure_between_labels(side: Floats, affine: Floats, fissure: Fissure) -> Fissure:
-    """Move the mid-surface `fissure` to half-way between the labels of the two sides.
-
-    Parts that would move by more than 5 mm stay. `side` (i, j, k) is the result of `signed_side_distance`, for voxels
-    of the (4, 4) affine.
-    """
-    steps = np.arange(-MAX_SHIFT_MM, MAX_SHIFT_MM + SPACING_MM, SPACING_MM)
-    line = fissure.places[None] + steps[:, None, None, None] * fissure.plane.normal
-    values = sample(side, affine, line.reshape(-1, 3)).reshape(line.shape[:3])
-    crossing = (values[:-1] < 0) & (values[1:] >= 0)
-    share = -values[:-1] / np.where(crossing, values[1:] - values[:-1], 1.0)
-    moves = np.where(crossing, steps[:-1, None, None] + share * SPACING_MM, np.inf)
-    nearest = np.abs(moves).argmin(axis=0)
-    move = np.take_along_axis(moves, nearest[None], axis=0)[0]
-    crossed = np.isfinite(move)
-    bend = 0.25 * BEND_MM / SPACING_MM
-    weight = ndimage.gaussian_filter(crossed.astype(float), bend)
-    total = ndimage.gaussian_filter(np.where(crossed, move, 0.0), bend)
-    return replace(fissure, heights=fissure.heights + total / (weight + 0.02))
-
-
 def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
     """Return the (m,) mask of the faces of the left hemisphere.
 
     `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
     mostly on different sides are the hemispheres, even if they reach over the fissure. Otherwise patches that bulge
-    over the fissure are assigned to the hemisphere that surrounds them, so that each is in one piece. InputError if
-    such patches are too large, so that a cut would not separate the hemispheres.
+    over the fissure are assigned to the nearest hemisphere, so that each is in one piece, except for closed pieces of
+    the surface. InputError if such patches are too large, so that a cut would not separate the hemispheres.
     """
     surface = face_components(mesh)
     areas = face_areas(mesh)
@@ -423,27 +430,66 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
             middles = np.bincount(surface, weights=areas * heights) / sizes
             return np.asarray(middles < 0)[surface]
     a, b = igl.facet_adjacency_matrix(mesh.faces).nonzero()
-    reassigned = np.zeros(len(side), dtype=bool)
-    # reassigned patches may connect pieces of the other side
-    for _ in range(3):
-        within = side[a] == side[b]
-        graph = sparse.coo_matrix((np.ones(within.sum()), (a[within], b[within])), shape=(len(side),) * 2)
-        piece = connected_components(graph, directed=False)[1]
-        area = np.bincount(piece, weights=areas)
-        largest = [
-            piece[side == left][area[piece[side == left]].argmax()] for left in (True, False) if (side == left).any()
-        ]
-        strays = ~np.isin(piece, largest)
-        if not strays.any():
-            break
-        reassigned ^= strays
-        side = side ^ strays
-    share = float(areas[reassigned].sum() / areas.sum())
+    within = side[a] == side[b]
+    piece = connected_components(_links(a[within], b[within], len(side)), directed=False)[1]
+    area = np.bincount(piece, weights=areas)
+    largest = [
+        piece[side == part][area[piece[side == part]].argmax()] for part in (True, False) if (side == part).any()
+    ]
+    # strays go to the nearest of the largest pieces, so that each of these stays in one piece
+    main = np.flatnonzero(np.isin(piece, largest))
+    _, _, start = dijkstra(
+        _links(a, b, len(side)), indices=main, return_predecessors=True, unweighted=True, min_only=True
+    )
+    assigned = side[np.where(start < 0, np.arange(len(side)), start)]
+    share = float(areas[assigned != side].sum() / areas.sum())
     if share > MAX_BULGE_SHARE:
         found = f"several pieces on each side; {100 * share:.0f} % of the area is not in the two largest"
         expected = f"at most {100 * MAX_BULGE_SHARE:.0f} %"
         raise InputError("the surface cannot be split at the fissure", found=found, expected=expected)
-    return side
+    return assigned
+
+
+def _links(first: Ints, second: Ints, size: int) -> sparse.csr_matrix:
+    return sparse.csr_matrix((np.ones(len(first)), (first, second)), shape=(size, size))
+
+
+def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floats) -> tuple[Mask, list[str]]:
+    """Return the (m,) mask of the faces of each hemisphere's largest piece, and warnings of what is left out.
+
+    `sides` has the (m,) mask of each hemisphere's faces; `to_file` (4, 4) leads to the coordinates of places in
+    messages. InputError if more than `MAX_LEFT_OUT` of a hemisphere's area would be left out.
+    """
+    is_kept, warnings = np.zeros(len(mesh.faces), dtype=bool), []
+    for side, is_side in sides.items():
+        part, faces = submesh(mesh, is_side)[0], np.flatnonzero(is_side)
+        component, areas = face_components(part), face_areas(part)
+        is_kept[faces[component == 0]] = True
+        if not component.any():
+            continue
+        place = transform_points(corners(part)[component == 1].mean(axis=(0, 1))[None], to_file)[0]
+        share = areas[component > 0].sum() / areas.sum()
+        found = f"the {side} hemisphere is in {component.max() + 1} pieces, {100 * share:.1f} % of its area is outside "
+        found += f"the largest, around ({', '.join(str(round(x)) for x in place)}) mm in the file's coordinates"
+        if share > MAX_LEFT_OUT:
+            raise InputError(
+                "a hemisphere is not in one piece",
+                found=found,
+                expected=f"at most {100 * MAX_LEFT_OUT:.0f} % outside its largest piece",
+                remedy="Connect the piece in the labels or the surface, or remove it.",
+            )
+        warnings.append(f"{found}: it was left out")
+    return is_kept, warnings
+
+
+def cut_share(*sides: TriangleMesh) -> float:
+    """Return the share of the medial walls that is a cut, of hemispheres posed with left and right along x.
+
+    It is the area of their openings (the area vectors of a closed surface sum to zero) over that of the convex outlines
+    of the hemispheres, seen from the side.
+    """
+    cuts = sum(float(np.linalg.norm(area_vectors(side).sum(axis=0))) for side in sides)
+    return cuts / sum(ConvexHull(side.vertices[:, 1:]).volume for side in sides)
 
 
 def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ..errors import InputError, MeshError
 from ..geometry.alignment import angle_deg, motion
@@ -42,19 +43,20 @@ from .extraction import (
 )
 from .fissure import (
     FISSURE_MM,
-    SPACING_MM,
     Fissure,
     MidPlane,
-    between,
+    cut_share,
     cut_sides,
     fissure_between,
-    fissure_between_labels,
+    hidden_fissure,
+    largest_pieces,
     left_faces,
     mid_plane,
     open_fissure,
     plane_between_labels,
     sample,
     separate,
+    side_distance,
     signed_side_distance,
     smallest_gap,
     split,
@@ -65,6 +67,8 @@ from .labels import MIN_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_ce
 from .layout import layout_of, scheme_contradictions
 from .plausible import (
     DOUBTFUL_RATIO,
+    cut_warnings,
+    max_cut_share,
     proportion_warnings,
     require_common_pose,
     require_pair,
@@ -78,8 +82,6 @@ from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
 
-# slits this close to the mid-surface belong to the fissure
-FISSURE_REACH_MM = 3.0
 # the mid-plane agrees with the labels if this is the cosine between its normal and the line from left to right: 45°
 MIN_AXIS_COSINE = 0.7
 # an asymmetry of more than this share of the brain's width gives a warning
@@ -90,12 +92,6 @@ MAX_AREA_RATIO = 15.0
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
 MIN_GAP_MM = 0.5
-# area of the mid-surface inside a mask without cortex labels over its volume to the power 2/3: in masks of four
-# shipped brains 1.24 and 1.36 with a fused fissure, 0.36 and 0.54 with an open one
-MAX_HIDDEN_FISSURE = 0.9
-FUSED_FISSURE = (
-    "the fissure is fused in the mask, which loses 20 % of the area in two shipped brains: use cortex labels"
-)
 # distance of the medial wall of a single hemisphere from the mid-sagittal plane
 WALL_DISTANCE_MM = 0.5
 
@@ -204,25 +200,20 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
     core = mask & ~np.isin(tissue, scheme.cortex)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smooth_mask(core) if scheme.cortex else field, affine)
-    fissure, to_right, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
+    fissure, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
     warnings += logged(doubts)
-    # gaps that smoothing closes, and that stay closed when slits are reopened, are not visible
-    slit, _ = remove_bridges(mask, field, np.zeros_like(mask))
-    hidden = fissure.hidden(slit > LEVEL, affine)
-    if not scheme.cortex and hidden.sum() * SPACING_MM**2 > MAX_HIDDEN_FISSURE * cerebrum.volume_mm3 ** (2 / 3):
-        warnings += logged([FUSED_FISSURE])
-    # a hidden fissure is opened as a whole, down to the tissue that joins the hemispheres
-    stays_fused = np.zeros_like(mask)
-    if scheme.cortex:
-        voxels, points, _ = fissure.near(mask.shape, affine, FISSURE_REACH_MM)
-        stays_fused[tuple(voxels.T)] = hidden[fissure.nearest_cells(points)]
-    field, report["slit_voxels_reopened"] = remove_bridges(mask, field, stays_fused)
+    sides = [np.isin(tissue, side) for side in (scheme.left, scheme.right) if scheme.left and scheme.right]
+    side_mm = side_distance(mask, core if scheme.cortex else mask, affine, fissure, *sides)
+    field, report["slit_voxels_reopened"] = remove_bridges(mask, field)
     original = field, grid
+    # a hidden fissure is opened as a whole, down to the tissue that joins the hemispheres
+    hidden = hidden_fissure(side_mm, field > LEVEL, core, affine) if scheme.cortex else np.zeros_like(mask)
+    if hidden.any():
+        field, affine, opened_ml = _with_fissure(field, affine, side_mm, hidden)
     if scheme.cortex:
-        field, affine, opened_ml = _with_fissure(field, affine, core, fissure, hidden)
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
-        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, fissure)
+        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, side_mm)
         warnings += logged(_fused_sulci_warning(report))
         opened_ml += taken_ml
     volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
@@ -231,14 +222,17 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
     )
     mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
     warnings += logged(even.warnings)
-    # half-way between the walls of the surface itself, since cortex may be thicker on one side
-    heights = between(mesh, fissure).height_above(centres) if to_right is None else sample(to_right, grid, centres)
+    heights = sample(side_mm, grid, centres)
     even = replace(even, report={"source": "labels", **report, **even.report}, warnings=warnings)
     return _upright(even, left_faces(mesh, heights), fissure.plane, volume.pose, volume.week)
 
 
 def _with_sulci(
-    field: NDArray[np.float32], affine: Floats, cerebrum: Cerebrum, scheme: LabelScheme, fissure: Fissure | None = None
+    field: NDArray[np.float32],
+    affine: Floats,
+    cerebrum: Cerebrum,
+    scheme: LabelScheme,
+    side_mm: NDArray[np.float32] | None = None,
 ) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any]]:
     """Open fused sulci; return the field, its affine, the volume removed (mL), and a report."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
@@ -246,7 +240,7 @@ def _with_sulci(
     # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
-    opened, fine, report = open_fused_sulci(simple, affine, core, fissure)
+    opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     if not report.get("sheets"):
         return field, affine, 0.0, report
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
@@ -268,20 +262,16 @@ def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelSche
 
 def _fissure_of_labels(
     tissue: Labels, mask: Mask, walls: TriangleMesh, scheme: LabelScheme, affine: Floats
-) -> tuple[Fissure, Floats | None, list[str]]:
+) -> tuple[Fissure, list[str]]:
     plane, doubts = mid_plane(walls), []
-    to_right = signed_side_distance(tissue, scheme, affine) if scheme.left and scheme.right else None
-    if to_right is not None:
+    if scheme.left and scheme.right:
         left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
         axis = affine[:3, :3] @ (right - left)
         if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
-            plane = plane_between_labels(to_right, affine, mask)
+            plane = plane_between_labels(signed_side_distance(tissue, scheme, affine), affine, mask)
             doubts.append("the hemispheres are not mirror images of each other: the mid-plane is that of their labels")
     require_sides(tissue, scheme, affine, plane.normal)
-    fissure = fissure_between(walls, plane)
-    if to_right is not None:
-        fissure = fissure_between_labels(to_right, affine, fissure)
-    return fissure, to_right, doubts
+    return fissure_between(walls, plane), doubts
 
 
 def from_hemispheres(
@@ -447,6 +437,9 @@ def _pial_surface(
 
 
 def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, week: float) -> PialSurface:
+    to_file = np.asarray(np.linalg.inv(pose.of_file()), dtype=float)
+    surface, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, to_file)
+    is_left, doubts = is_left[is_kept], list[str]()
     matrix, angle = upright(plane, surface.mesh.vertices.mean(axis=0))
     whole = transformed(surface.mesh, matrix)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_left)
@@ -457,7 +450,6 @@ def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pos
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
-    doubts = []
     if plane.fissure_points == 0:
         doubts.append("no fissure was found between facing walls: the plane of mirror symmetry is used")
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
@@ -469,13 +461,34 @@ def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pos
         raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
         doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
-    facts = {"rotation_deg": angle, "fissure_points": plane.fissure_points, "asymmetry_mm": plane.asymmetry_mm}
+    share = cut_share(left, right)
+    doubts += cut_warnings(share, week)
+    facts = {
+        "cut_share": share,
+        "usual_cut_share": max_cut_share(week),
+        "rotation_deg": angle,
+        "fissure_points": plane.fissure_points,
+        "asymmetry_mm": plane.asymmetry_mm,
+    }
     report, warnings = {**surface.report, **facts}, [*surface.warnings, *logged(doubts)]
     surface = RepairedSurface(whole, report, warnings)
     return _pial_surface(surface, {"left": left, "right": right}, fissure_x, pose.then(matrix), week)
 
 
+def _without_islands(
+    surface: RepairedSurface, sides: Mapping[Side, Mask], to_file: Floats
+) -> tuple[RepairedSurface, Mask]:
+    """Leave out what is not connected to a hemisphere's largest piece; return the surface and the faces that remain."""
+    is_kept, warnings = largest_pieces(surface.mesh, sides, to_file)
+    if not warnings:
+        return surface, is_kept
+    is_cap = surface.is_cap[is_kept] if len(surface.is_cap) else surface.is_cap
+    mesh = submesh(surface.mesh, is_kept)[0]
+    return replace(surface, mesh=mesh, is_cap=is_cap, warnings=[*surface.warnings, *logged(warnings)]), is_kept
+
+
 def _single_hemisphere(surface: RepairedSurface, side: Side, pose: Pose, week: float) -> PialSurface:
+    surface, _ = _without_islands(surface, {side: np.ones(len(surface.mesh.faces), dtype=bool)}, np.eye(4))
     whole = pial = transformed(surface.mesh, pose.of_file())
     if surface.is_cap.any():
         _require_medial(submesh(whole, surface.is_cap)[0], 1.0 if side == "left" else -1.0)
@@ -514,19 +527,21 @@ def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.flo
 
 
 def _with_fissure(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure, hidden: Mask
+    field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], hidden: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
     """Open the fissure; return the field, its affine, and the volume removed (mL).
 
     If more than a thousandth of the brain is removed, the fissure was fused. Voxels that are too coarse for its walls
     are then refined first.
     """
-    wide = open_fissure(field, affine, core, fissure, hidden)
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(np.float32)
+    wide = open_fissure(field, affine, side_mm, to_hidden)
     # an opening of less than two voxels would be lost
-    factor = int(np.ceil(1.8 * np.linalg.norm(affine[:3, :3], axis=0).max() / FISSURE_MM))
+    factor = int(np.ceil(1.8 * size.max() / FISSURE_MM))
     if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
-        solid, _ = refine(core.astype(np.float32), affine, factor)
+        distances = (refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
         field, affine = refine(field, affine, factor)
-        wide = open_fissure(field, affine, solid > 0.5, fissure, hidden)
+        wide = open_fissure(field, affine, *distances)
     voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
     return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)

@@ -19,6 +19,11 @@ MIN_RATIO, MAX_RATIO = 0.2, 6.0
 MIN_USUAL_RATIO, MAX_USUAL_RATIO = 0.55, 1.45
 # width and height over length are 0.74 to 0.83 and 0.63 to 0.72 in atlases
 WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
+# largest share of the medial wall that is a cut by week, in 25 volumes of the atlases of Fidon et al. 2021, CRL and Wu
+# et al. 2021 (21 to 38 GW); most have 0.15 at 22, 0.13 at 27 and 0.10 at 35 GW
+CUT_SHARES = ((21.0, 0.23), (23.0, 0.17), (27.0, 0.15), (31.0, 0.12), (36.0, 0.103))
+# a share above this multiple of it is doubtful: individuals vary more than atlases
+MAX_CUT_FACTOR = 2.0
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
@@ -64,6 +69,21 @@ def proportion_warnings(extents_mm: Floats) -> list[str]:
         for name, share, (low, high) in (("width", width / length, WIDTHS), ("height", height / length, HEIGHTS))
         if not low <= share <= high
     ]
+
+
+def max_cut_share(week: float) -> float:
+    """Return the largest usual share of the medial wall that is a cut, at a gestational week."""
+    weeks, shares = zip(*CUT_SHARES, strict=True)
+    return MAX_CUT_FACTOR * float(np.interp(week, weeks, shares))
+
+
+def cut_warnings(share: float, week: float) -> list[str]:
+    """Return a warning if the cut at the midline takes a larger share of the medial wall than in atlases."""
+    limit = max_cut_share(week)
+    if share <= limit:
+        return []
+    cut = f"the cut at the midline takes {100 * share:.0f} % of the medial wall"
+    return [f"{cut}, usually at most {100 * limit:.0f} % at week {week:g}: is the fissure fused in the labels?"]
 
 
 def narrowness(mesh: TriangleMesh) -> float:

@@ -15,7 +15,7 @@ from scipy import ndimage
 from ..geometry.deformations import transform_points
 from ..units import ML_PER_MM3
 from .extraction import INSIDE, LEVEL, OUTSIDE, Floats, Mask, is_simple, main_parts, refine, shifted_affine
-from .fissure import Fissure, sample
+from .fissure import sample
 from .thickness import MIN_VOXELS
 
 # voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
@@ -38,16 +38,16 @@ FAR, MAX_FAR_SHARE = 3.0, 0.05
 
 
 def open_fused_sulci(
-    field: NDArray[np.float32], affine: Floats, core: Mask, fissure: Fissure | None = None
+    field: NDArray[np.float32], affine: Floats, core: Mask, side_mm: NDArray[np.float32] | None = None
 ) -> tuple[NDArray[np.float32], Floats, dict[str, Any]]:
     """Open the fused sulci of a cerebrum's smoothed mask by slits; return the field, its affine, and a report.
 
     The (i, j, k) `field` is cropped to the brain and refined to voxels of at most 0.55 mm. Its voxels are those of the
     mask `core`, the tissue inside the cortex, or an integer fraction of these. Slits grow inward from outside over
     simple points, so they add neither handles nor cavities, and end where both banks have the same white matter. Slits
-    between the hemispheres, on different sides of the `fissure`, are not sulci. The field is returned unchanged if no
-    sulcus is fused, if much cortex is far from all white matter, or if the cortex is thinner than 1.5 voxels. In the
-    latter two cases the report has the reason as "stays_fused".
+    between the hemispheres, whose sides are the signs of `side_mm` in the voxels of `core`, are not sulci. The field
+    is returned unchanged if no sulcus is fused, if much cortex is far from all white matter, or if the cortex is
+    thinner than 1.5 voxels. In the latter two cases the report has the reason as "stays_fused".
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
@@ -58,6 +58,7 @@ def open_fused_sulci(
     size = np.linalg.norm(fine[:3, :3], axis=0)
     inside, solid = whole > LEVEL, solid > LEVEL
     cortex = inside & ~solid
+    is_right = None if side_mm is None else refine(side_mm[part], affine, every * factor)[0] > 0
     nearest = ndimage.distance_transform_edt(~solid, sampling=size, return_distances=False, return_indices=True)
     places = np.argwhere(cortex).astype(np.int32)
     depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
@@ -73,7 +74,7 @@ def open_fused_sulci(
     bank[cortex] = depth_mm > MIN_BANK * thickness
     distance = np.zeros(cortex.shape, dtype=np.float32)
     for axis in range(3):
-        _mark_sheet(distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, fine, fissure)
+        _mark_sheet(distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, size, is_right)
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0))
     depth = sample(below, grid, transform_points(np.argwhere(distance > 0), fine))
@@ -115,22 +116,22 @@ def _mark_sheet(
     nearest: NDArray[np.int32],
     axis: int,
     min_mm: float,
-    affine: Floats,
-    fissure: Fissure | None,
+    size: Floats,
+    is_right: Mask | None,
 ) -> None:
     """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
 
     It is set in the voxels that the plane half-way between the banks passes, which are connected through faces.
     """
-    size, step = np.linalg.norm(affine[:3, :3], axis=0), np.eye(3, dtype=int)[axis]
+    step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))
     banks = [nearest[(slice(None), *voxels.T)].T for voxels in (first, first + step)]
     offset = (banks[1] - banks[0]) * size
     length = np.linalg.norm(offset, axis=1)
     differ = length > min_mm
-    if fissure is not None:
-        sides = [fissure.height_above(transform_points(bank[differ], affine)) > 0 for bank in banks]
-        differ[differ] = sides[0] == sides[1]
+    if is_right is not None:
+        sides = [is_right[tuple(bank.T)] for bank in banks]
+        differ &= sides[0] == sides[1]
     first, offset, length = first[differ], offset[differ], length[differ]
     middle = (0.5 * (banks[0] + banks[1]) * size)[differ]
     normal = offset / length[:, None]

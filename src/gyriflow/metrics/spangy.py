@@ -56,7 +56,7 @@ def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> f
     values = lowest_modes(stiffness, mass, 3).eigenvalues
     # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives the scale
     if values[1] < 1e-6 * 4.0 * np.pi / mass.sum():
-        raise MeshError("the surface is not in one piece", remedy="Give each hemisphere by itself")
+        raise MeshError("the surface is not in one piece", remedy="Remove all but its largest piece.")
     return float(values[1])
 
 

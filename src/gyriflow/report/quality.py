@@ -203,6 +203,9 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
     }
     if row["asymmetry_mm"] is not None:
         facts["asymmetry"] = f"{row['asymmetry_mm']:.1f} mm"
+    if row["cut_share"] is not None:
+        usual = f"usually at most {100 * row['usual_cut_share']:.0f} %"
+        facts["cut at the midline"] = f"{100 * row['cut_share']:.0f} % of the medial wall ({usual})"
     if thickness is not None:
         facts["thickness"] = f"{thickness:.2f} mm (measured on {100 * row['thickness_measured_share']:.0f} %)"
     if row["area_ratio"] is not None:
@@ -245,6 +248,8 @@ def quality_row(
         "pose_by": pose.by,
         "rotation_deg": angle_deg(pose.of_file()[:3, :3]),
         "asymmetry_mm": report.get("asymmetry_mm"),
+        "cut_share": report.get("cut_share"),
+        "usual_cut_share": report.get("usual_cut_share"),
     }
 
 

@@ -5,15 +5,28 @@ import odd_brains
 import pytest
 from facts import Facts
 from phantoms import CENTRE_MM
+from scipy import ndimage
 from shapes import cerebrum_surface, ellipsoid, phantom, rigid, sheet, sphere
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask
-from gyriflow.anatomy.fissure import MidPlane, cut_sides, fissure_between, left_faces, mid_plane, open_fissure, upright
+from gyriflow.anatomy.fissure import (
+    MidPlane,
+    cut_share,
+    cut_sides,
+    fissure_between,
+    hidden_fissure,
+    largest_pieces,
+    left_faces,
+    mid_plane,
+    open_fissure,
+    side_distance,
+    upright,
+)
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError
 from gyriflow.geometry.remeshing import remesh
-from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, flipped, merged, transformed
+from gyriflow.geometry.triangles import TriangleMesh, area, corners, face_areas, flipped, merged, submesh, transformed
 from gyriflow.io.yaml_files import SCHEMES
 
 
@@ -38,8 +51,30 @@ def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
     lump = sphere(8.7, 3, (-38.0, 0.0, 0.0))
     assert 0.1 < area(lump) / area(brain) < 0.12
     mesh = merged(brain, lump)
-    with pytest.raises(InputError, check=Facts("10 %", "5 %")):
-        left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+    left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+    to_file = rigid(shift=(100.0, 0.0, 0.0))
+    with pytest.raises(InputError, check=Facts("left", "2 pieces", "18.2 %", "(62, 0, 0)", "10 %")):
+        largest_pieces(mesh, {"left": left, "right": ~left}, to_file)
+
+
+def test_a_small_piece_beside_a_hemisphere_is_left_out_and_told():
+    mesh = merged(ellipsoid((24, 33, 22)), sphere(4.0, 3, (-38.0, 0.0, 0.0)))
+    left = left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1))
+    kept, (warning,) = largest_pieces(mesh, {"left": left, "right": ~left}, np.eye(4))
+    share = 201.0 / (201.0 + area(ellipsoid((24, 33, 22))) / 2)
+    assert warning == Facts("left", "2 pieces", f"{100 * share:.1f} %", "(-38, 0, 0)", "left out")
+    assert len(pieces(submesh(mesh, kept)[0])) == 1
+
+
+def test_stray_patches_leave_each_hemisphere_in_one_piece():
+    mesh = ball_at(0.0, 0.0, 0.0)
+    x, y, z = corners(mesh).mean(axis=1).T
+    # rings of the right within the left, and of the left within those
+    from_pole = np.hypot(x + 10.0, y)
+    heights = np.where(from_pole < 4.0, np.sin(from_pole * 3.0) + 0.2 * np.sin(9.0 * z), x)
+    left = left_faces(mesh, heights)
+    assert [len(pieces(side)) for side in cut_sides(mesh, left)] == [1, 1]
+    assert left[x < -5.0].all()
 
 
 @pytest.mark.parametrize("mm", [3.0, 6.0])
@@ -71,7 +106,7 @@ def test_a_brain_of_one_piece_is_cut_in_its_fissure(brain, pathology):
 def test_a_cut_that_does_not_part_the_surface_is_refused():
     mesh = ball_at(0.0, 0.0, 0.0)
     stripes = np.sin(corners(mesh)[:, :, 0].mean(axis=1) * 1.2)
-    with pytest.raises(InputError, check=Facts("48 %", "5 %")):
+    with pytest.raises(InputError, check=Facts("37 %", "5 %")):
         left_faces(mesh, stripes)
 
 
@@ -105,14 +140,48 @@ def block(gap_voxels):
 def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     brain, core, affine = block(gap_voxels)
     walls = isosurface(smooth_mask(core, 1.0), affine)
-    fissure = fissure_between(walls, mid_plane(walls))
+    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
+    hidden = hidden_fissure(side_mm, brain, core, affine)
     field = smooth_mask(brain, 0.5)
-    hidden = fissure.hidden(brain, affine)
-    wide = open_fissure(field, affine, core, fissure, hidden)
+    to_hidden = ndimage.distance_transform_edt(~hidden, sampling=0.9) if hidden.any() else np.full(brain.shape, np.inf)
+    wide = open_fissure(field, affine, side_mm, to_hidden)
     # cortex beside a fissure that CSF shows stays; a hidden one is opened
     taken = (field > 0.5) & (wide <= 0.5)
     assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)
     assert not (wide[20, 20, 17:24] > 0.5).any()
+
+
+@pytest.mark.parametrize("sided", [False, True])
+def test_gyri_that_reach_over_the_middle_are_on_their_own_side(sided):
+    # cores of two hemispheres, joined below; a gyrus of the left one reaches 4 mm over the middle, cortex all around
+    x, y, z = np.indices((61, 40, 40)) - np.array([30.0, 20.0, 0.0])[:, None, None, None]
+    right = x > np.where((np.abs(y) < 6) & (np.abs(z - 25) < 6), 4, 0)
+    brain = (np.abs(x) < 27) & (np.abs(y) < 17) & (z > 3) & (z < 37)
+    inner = ndimage.binary_erosion(brain, iterations=2)
+    gap = ndimage.distance_transform_edt(right) + ndimage.distance_transform_edt(~right) - 1.0
+    core = inner & ((gap > 2.0) | (z < 12))
+    affine = np.eye(4)
+    affine[:3, 3] = [-30, -20, 0]
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    labels = [brain & ~right, brain & right] if sided else []
+    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)), *labels)
+    above = brain & (z > 14)
+    assert ((side_mm > 0) == right)[above].mean() > 0.99
+    hidden = hidden_fissure(side_mm, brain, core, affine)
+    opened = open_fissure(smooth_mask(brain), affine, side_mm, ndimage.distance_transform_edt(~hidden)) <= 0.5
+    number, _ = ndimage.label(~opened & brain & (z > 14))
+    assert number[50, 20, 30] != number[10, 20, 30]
+    assert not opened[core].any()
+
+
+def test_the_share_of_a_cut_is_that_of_the_medial_wall():
+    ball = ball_at(0.0, 0.0, 0.0)
+    x = corners(ball)[:, :, 0].mean(axis=1)
+    left, right = cut_sides(ball, x < -6.0)
+    # radius 8 of 10
+    assert cut_share(left) == pytest.approx(1.0, abs=0.03)
+    assert cut_share(right) == pytest.approx(0.64, abs=0.03)
+    assert cut_share(ball) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_narrow_fissure_shown_by_csf_keeps_its_width(brain):

@@ -6,12 +6,12 @@ import numpy as np
 import odd_brains
 import pytest
 from facts import Facts
+from open_sulci import try_branching
 from scipy import ndimage
 from shapes import moved, phantom, rigid, scaling, sphere
 
 from gyriflow.anatomy import repair
 from gyriflow.anatomy.extraction import handles, smooth_mask
-from gyriflow.anatomy.fissure import Fissure, MidPlane
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import faults, pieces, surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
@@ -72,10 +72,8 @@ def test_a_shut_sulcus_is_opened_to_its_depth(depth_mm):
 
 def test_hemispheres_are_no_banks_of_a_sulcus():
     body, core, affine = with_sulcus(6.0)
-    normal = np.array([0.8, 0.36, 0.48])
-    axes = np.linalg.svd(normal[None])[2][1:]
-    between = Fissure(MidPlane(normal, 0.0, 0.0, 0), axes, np.array([-20.0, -20.0]), np.zeros((81, 81)))
-    assert open_fused_sulci(smooth_mask(body), affine, core, between)[2]["slit_voxels"] == 0
+    side_mm = (ball()[1] @ np.array([0.8, 0.36, 0.48])).astype(np.float32)
+    assert open_fused_sulci(smooth_mask(body), affine, core, side_mm)[2]["slit_voxels"] == 0
 
 
 @pytest.mark.parametrize("kind", ["thick crest", "groove"])
@@ -213,3 +211,14 @@ def test_it_does_not_depend_on_where_the_brain_lies():
     assert turned.vertices == pytest.approx(transformed(plain, pose).vertices, abs=1e-6)
     farthest = np.linalg.norm(plain.vertices - steps.vertices, axis=1).max()
     assert 0.0 < farthest < VOXEL_MM + 1e-6
+
+
+@pytest.mark.parametrize(("n_arcs", "noise"), [(0, 0.2), (20, 0.0), (20, 0.1)])
+def test_branching_sulci_have_their_area_and_crowns_stay_whole(n_arcs, noise):
+    shape = {"radius_mm": 14.0, "depth_mm": 5.0, "thickness_mm": 1.8, "n_arcs": n_arcs}
+    found = try_branching(0.8, (20, 30, 10), noise, **shape)
+    assert found["opened"] == pytest.approx(0.0, abs=0.05)
+    # without opening, what the sulci hide is missing
+    assert (found["fused"] < -0.3) == (n_arcs > 0)
+    # of noise alone nothing opens; with sulci, less than a percent of their slits is in crowns
+    assert found["cracks_mm3"] <= 0.01 * 1e3 * found["opened_mL"]

@@ -23,6 +23,8 @@ REPORT = {
     "volume_mL": 40.0,
     "pose": Pose(np.eye(4), {"whole": LPS_TO_RAS}, "shape").plain(),
     "asymmetry_mm": 0.5,
+    "cut_share": 0.31,
+    "usual_cut_share": 0.23,
 }
 
 
@@ -41,7 +43,7 @@ def test_the_page_shows_planes_views_and_warnings():
     parts = {"a, 24 GW", "NEEDS REVIEW", "Warnings:\n• it is crooked", "coronal, y = 0 mm"}
     assert parts | {"left", "right medial", "front"} <= shown
     (head,) = (text.replace("\N{NO-BREAK SPACE}", " ") for text in shown if "cm²" in text)
-    assert head == Facts("labels", "100.0 cm²", 49, 51, "40.0 mL", "50 %", "180.0°", "0.5 mm")
+    assert head == Facts("labels", "100.0 cm²", 49, 51, "40.0 mL", "50 %", "180.0°", "0.5 mm", "31 %", "23 %")
     # the inner border is a circle of 18 mm in the coronal plane
     (coronal,) = [axes for axes in figure.axes if axes.get_title().startswith("coronal")]
     rings = [path.vertices for artist in coronal.collections for path in artist.get_paths()]
@@ -60,6 +62,7 @@ def test_verdicts_and_refused_brains_stand_in_one_table():
     assert table["cause"].tolist() == ["no such file", "", ""]
     assert table["warnings"].tolist()[1] == "one | two"
     assert table["area_ratio"].tolist()[2] == 0.93
+    assert table["cut_share"].tolist()[1:] == [0.31, 0.31]
     # of one hemisphere half a brain is expected
     assert table["share_of_expected_volume"].tolist()[1:] == [1.0, 0.5]
 
