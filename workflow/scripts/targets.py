@@ -30,9 +30,9 @@ with step(snakemake.log[0]):
     ages, variation = None, params.variation
     if params.is_own_growth:
         weeks, baselines = [params.start_week, *params.weeks], {}
-        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh))
+        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh), open_sulci=params.open_sulci)
     else:
-        options = {"make_body": ElasticFit, "by_size": params.by_size}
+        options = {"make_body": ElasticFit, "by_size": params.by_size, "open_sulci": params.open_sulci}
         if files.norms:
             options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.stated_weeks)
         if variation:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.alignment import rigid_fit
-from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, transform_points
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, transform_points
 from ..geometry.diffusion import cell_sizes, diffuse, harmonic_continuation, vertex_sizes
-from ..geometry.matching import match_points, nearest_on, surface_distance, values_at
+from ..geometry.matching import match_layers, match_points, match_surface, nearest_on, surface_distance, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..settings.growth import BEFORE_GW
@@ -21,14 +21,16 @@ from .matched_surfaces import follow_surfaces
 
 log = logging.getLogger(__name__)
 
+INNER_MM = 2.0
+"""Depth below a surface of the tissue that tells the banks of a sulcus from each other: about that of the cortex."""
 PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
-FINAL_PULL_MM = (0.5,)
-"""Smoothing (SD, mm) of the pull on a body that is close to the surface."""
-REACH_MM = 4.0
-"""Largest distance over which a surface pulls."""
+FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
+"""The same on a body that is close to the surface, and before it on one that is to open sulci."""
+REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
+"""Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
 MAX_MISFIT_MM = 0.25
 """Mean distance of a body from the surface it is fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
@@ -40,6 +42,10 @@ FADING_GW = 4.0
 (docs/science.md)."""
 
 
+Target = tuple[TriangleMesh, Floats | None]
+"""A surface, and where the tissue below the vertices that are fitted to it is in its brain (n, 3), if it counts."""
+
+
 class FittedBody(Protocol):
     """A mesh that is drawn to shapes, without inverted elements and crossing faces (`folding.elastic_fit`)."""
 
@@ -49,23 +55,33 @@ class FittedBody(Protocol):
     def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats: ...
 
 
-def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh, pull_mm: Sequence[float] = PULL_MM) -> Floats:
+def fit_onto_surface(
+    moving: TriangleMesh, surface: TriangleMesh, pull_mm: Sequence[float] = PULL_MM, inner: Floats | None = None
+) -> Floats:
     """Deform a surface smoothly onto another one close to it; return its (n, 3) vertices in mm.
 
     Each round pulls the vertices to the nearest points of the other surface whose normals agree. Vertices of the other
     surface also pull their nearest points, so that the fundus of a sulcus has an effect although it is nearest to no
     vertex. The pull is smoothed along the moving surface, in each round as `pull_mm` says.
+
+    With `inner` (n, 3), where the tissue `INNER_MM` below the vertices is in the brain of the other surface, points are
+    matched by that, too (`match_layers`). So a fold without a slit opens to both banks of a sulcus.
     """
     vertices, faces = moving.vertices, moving.faces
-    normals, areas = vertex_normals(surface), vertex_areas(surface)
+    normals, areas, below = vertex_normals(surface), vertex_areas(surface), points_below(surface)
+    reach_mm = REACH_MM if inner is None else REACH_BY_TISSUE_MM
     for spread in pull_mm:
         moved = TriangleMesh(vertices, faces)
-        moved_areas = vertex_areas(moved)
-        forward = match_points(vertices, vertex_normals(moved), surface)
-        weight = moved_areas * (forward.agrees & (forward.distance_mm < REACH_MM))
+        moved_areas, moved_normals = vertex_areas(moved), vertex_normals(moved)
+        if inner is None:
+            forward = match_points(vertices, moved_normals, surface)
+            backward = match_points(surface.vertices, normals, moved)
+        else:
+            forward = match_layers(vertices, moved_normals, inner, surface, below)
+            backward = match_layers(surface.vertices, normals, below, moved, inner)
+        weight = moved_areas * (forward.agrees & (forward.distance_mm < reach_mm))
         pull = (values_at(forward, surface.vertices) - vertices) * weight[:, None]
-        backward = match_points(surface.vertices, normals, moved)
-        shares = backward.weights * (areas * (backward.agrees & (backward.distance_mm < REACH_MM)))[:, None]
+        shares = backward.weights * (areas * (backward.agrees & (backward.distance_mm < reach_mm)))[:, None]
         misfit = surface.vertices - values_at(backward, vertices)
         np.add.at(weight, backward.corners, shares)
         np.add.at(pull, backward.corners, shares[..., None] * misfit[:, None])
@@ -74,8 +90,13 @@ def fit_onto_surface(moving: TriangleMesh, surface: TriangleMesh, pull_mm: Seque
         move = smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-3)
         # a mean of pulls is at most as long as these; near obtuse faces smoothed weights may be zero or negative
         length = np.linalg.norm(move, axis=1, keepdims=True)
-        vertices = vertices + move * np.minimum(1.0, REACH_MM / np.maximum(length, 1e-9))
+        vertices = vertices + move * np.minimum(1.0, reach_mm / np.maximum(length, 1e-9))
     return np.asarray(vertices)
+
+
+def points_below(surface: TriangleMesh) -> Floats:
+    """Return the (n, 3) points `INNER_MM` below the vertices of a surface."""
+    return surface.vertices - INNER_MM * vertex_normals(surface)
 
 
 def carry_sharply(
@@ -83,6 +104,8 @@ def carry_sharply(
     pairs: Sequence[Correspondence],
     surfaces: Sequence[TriangleMesh] | None,
     body: FittedBody | None = None,
+    *,
+    open_sulci: bool = False,
 ) -> Floats:
     """Carry a mesh's vertices through w brains with its boundary fitted to theirs; return (w + 1, n, 3) positions.
 
@@ -92,6 +115,9 @@ def carry_sharply(
 
     Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
     week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
+
+    With `open_sulci` the surfaces have slits that registration by labels does not know. Then points are matched by the
+    tissue below them, too, and a body is drawn to its surface twice.
 
     The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
     of the later brains, all in the spaces of these correspondences. Without surfaces nothing is fitted.
@@ -103,34 +129,43 @@ def carry_sharply(
     extend = harmonic_continuation(mesh.vertices, pieces, used)
     positions = [mesh.vertices]
 
-    def carried(numbered: Sequence[tuple[int, Correspondence]]) -> Iterator[tuple[Floats, Floats, int | None]]:
-        """Yield (n, 3) places after each pair of one kind, the boundary's there, and the surface it is fitted to."""
+    def fitted(moving: TriangleMesh, target: Target | None, pull_mm: Sequence[float] = PULL_MM) -> Floats:
+        # a surface that is matched by its vertices is the goal itself
+        return moving.vertices if target is None else fit_onto_surface(moving, target[0], pull_mm, target[1])
+
+    def tissue_below(number: int, pair: Deformation) -> Floats:
+        """Return the (n, 3) places, after a pair, of the tissue below the boundary before it."""
+        before = TriangleMesh(positions[-1][used], boundary.faces)
+        # below the observed surface: with the body's normals its roughness would add up from week to week
+        observed = surfaces[number - 1] if number and surfaces else before
+        return carry(pair, values_at(match_surface(before, observed), points_below(observed)))
+
+    def carried(numbered: Sequence[tuple[int, Correspondence]]) -> Iterator[tuple[Floats, Floats, Target | None]]:
+        """Yield (n, 3) places after each pair of one kind, the boundary's there, and what it is fitted to."""
         if matched := [pair for _, pair in numbered if isinstance(pair, MatchedSurfaces)]:
             for moved in follow_surfaces(TriangleMesh(positions[-1][used], boundary.faces), matched)[1:]:
                 yield positions[-1], moved, None
         for number, pair in numbered:
             if isinstance(pair, Deformation):
                 places = carry_over_weeks(positions[-1], [pair])[-1]
-                moved, surface = places[used], None if surfaces is None else number
-                if surfaces is not None:
-                    moved = fit_onto_surface(TriangleMesh(moved, boundary.faces), surfaces[number])
-                yield places, moved, surface
+                inner = tissue_below(number, pair) if open_sulci else None
+                yield places, places[used], None if surfaces is None else (surfaces[number], inner)
 
     for _, group in groupby(enumerate(pairs), lambda numbered: type(numbered[1])):
-        for places, moved, surface in carried(list(group)):
+        for places, moved, target in carried(list(group)):
+            moved = fitted(TriangleMesh(moved, boundary.faces), target)
             if body is not None:
                 # on the shape of the week before, which has no inverted elements
                 extend = harmonic_continuation(positions[-1], pieces, used, CONTINUATION_TOL)
             shape = places + extend(moved - places[used])
             if body is not None:
-                shape = body.follow(shape)
-                # a surface that is matched by its vertices is the goal itself
-                goals = moved
-                if surfaces is not None and surface is not None:
-                    goals = fit_onto_surface(body.boundary, surfaces[surface], FINAL_PULL_MM)
+                body.follow(shape)
+                if target is not None and open_sulci:
+                    body.draw(fitted(body.boundary, target, OPENING_PULL_MM))
+                goals = moved if target is None else fitted(body.boundary, target, FINAL_PULL_MM)
                 shape = body.draw(goals, before=positions[-2:])
-                if surfaces is not None and surface is not None:
-                    _warn_of_misfit(body.boundary, surfaces[surface], surface + 1)
+                if target is not None:
+                    _warn_of_misfit(body.boundary, target[0], len(positions))
             positions.append(shape)
     return np.stack(positions)
 
@@ -241,6 +276,7 @@ def predict_shapes(
     norm_ml: Sequence[float] = (),
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,
     fading_gw: float = FADING_GW,
+    open_sulci: bool = False,
 ) -> tuple[list[float], Floats, dict[str, list[Floats]], AtlasAges | None]:
     """Return the weeks from the start on, the (w, n, 3) predicted positions of a mesh, and baselines of its boundary.
 
@@ -252,11 +288,12 @@ def predict_shapes(
 
     `mesh` is that of the start brain; `pairs` lead from the start to the atlas' first week, and from each of its
     `weeks` to the next. `surfaces` are the atlas' pial surfaces, in the spaces of these correspondences. `also` are
-    further weeks; `smoothing_mm` and `fading_gw` are those of `expected_positions`. `make_body` makes bodies of the
-    mesh, which follow the atlas' shapes and the predicted ones; without it, elements of these may be inverted.
+    further weeks; `smoothing_mm` and `fading_gw` are those of `expected_positions`, `open_sulci` is that of
+    `carry_sharply`. `make_body` makes bodies of the mesh, which follow the atlas' shapes and the predicted ones;
+    without it, elements of these may be inverted.
     """
     used, sizes = boundary_surface(mesh)[1], vertex_sizes(mesh.vertices, linear_pieces(mesh))
-    carried = carry_sharply(mesh, pairs, surfaces, make_body(mesh) if make_body else None)[1:]
+    carried = carry_sharply(mesh, pairs, surfaces, make_body(mesh) if make_body else None, open_sulci=open_sulci)[1:]
     grown, ages = resample_by_size(mesh, carried, weeks, norm_ml) if by_size else (carried, None)
     individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
     shape_weeks, positions = expected_positions(mesh, start_week, grown, weeks, also=also, **individual)

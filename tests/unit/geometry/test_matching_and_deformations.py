@@ -12,7 +12,15 @@ from gyriflow.geometry.deformations import (
     transform_points,
 )
 from gyriflow.geometry.diffusion import diffuse, harmonic_continuation, vertex_sizes
-from gyriflow.geometry.matching import labels_at, layer_labels, match_points, nearest_on, surface_mask, values_at
+from gyriflow.geometry.matching import (
+    labels_at,
+    layer_labels,
+    match_layers,
+    match_points,
+    nearest_on,
+    surface_mask,
+    values_at,
+)
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, merged, transformed, vertex_normals
 
@@ -75,6 +83,18 @@ def test_the_other_wall_is_not_matched():
     assert match.agrees.all()
     assert values_at(match, mesh.vertices)[0, 0] == pytest.approx(-0.5)
     assert match_points(point, -normal, mesh).distance_mm == pytest.approx([0.2])
+
+
+def test_the_tissue_below_tells_the_wall():
+    mesh = walls()
+    inner = mesh.vertices - 2.0 * vertex_normals(mesh)
+    point, normal = np.array([[0.3, 0.0, 0.0]]), np.array([[-1.0, 0.0, 0.0]])
+    for wall in (-0.5, 0.5):
+        # the tissue of a point lies behind one wall, 0.4 mm lower than the point
+        match = match_layers(point, normal, np.array([[5.0 * wall, 0.0, -0.4]]), mesh, inner)
+        assert values_at(match, mesh.vertices)[0, 0] == pytest.approx(wall)
+        assert match.agrees.all()
+        assert match.distance_mm == pytest.approx(np.linalg.norm(values_at(match, mesh.vertices) - point))
 
 
 def test_values_are_linear_in_faces_and_labels_those_of_the_nearest_corner():

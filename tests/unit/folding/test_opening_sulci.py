@@ -1,0 +1,83 @@
+"""A body without a sulcus follows surfaces in which one opens, although registration does not know of it."""
+
+from itertools import pairwise
+
+import numpy as np
+from shapes import box_mesh
+from skimage.measure import marching_cubes
+
+from gyriflow.folding.elastic_fit import ElasticFit
+from gyriflow.geometry.deformations import Deformation
+from gyriflow.geometry.matching import faces_that_cross, nearest_on
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
+from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas
+from gyriflow.growth.expected import carry_sharply, fit_onto_surface
+
+SIZE_MM = np.array([20.0, 20.0, 12.0])
+"""Of a block below z = 0."""
+WIDTH_MM, HALF_LENGTH_MM, VOXEL_MM = 0.5, 7.0, 0.5
+CORTEX_MM = 2.0
+DEPTHS_MM = (0.0, 1.5, 3.0, 4.5)
+"""Of the slit in the plane x = 0, week by week. Its banks touch at first."""
+
+
+def grid(margin_mm):
+    """Return the (3, i, j, k) places of a grid around the block, and its affine."""
+    sides = [
+        np.arange(low - margin_mm, low + size + margin_mm + 1e-9, VOXEL_MM)
+        for low, size in zip((-SIZE_MM[0] / 2, -SIZE_MM[1] / 2, -SIZE_MM[2]), SIZE_MM, strict=True)
+    ]
+    affine = np.diag([VOXEL_MM] * 3 + [1.0])
+    affine[:3, 3] = [side[0] for side in sides]
+    return np.stack(np.meshgrid(*sides, indexing="ij")), affine
+
+
+def block_with_slit(depth_mm):
+    """Return the surface of the block with a slit; its bottom is half an ellipse."""
+    (x, y, z), affine = grid(2 * VOXEL_MM)
+    over = np.abs([x, y, z + SIZE_MM[2] / 2]) - SIZE_MM.reshape(3, 1, 1, 1) / 2
+    signed = np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(over.max(axis=0), 0)
+    depth = depth_mm * np.sqrt(np.clip(1 - (y / HALF_LENGTH_MM) ** 2, 0, 1))
+    slit = np.where(depth > 0.2, np.maximum(np.abs(x) - WIDTH_MM / 2, -z - depth), 0.3)
+    places, faces, _, _ = marching_cubes(np.maximum(signed, -slit), 0.0, spacing=(VOXEL_MM,) * 3)
+    return TriangleMesh(places + affine[:3, 3], faces)
+
+
+def registration(before_mm, after_mm):
+    """Return the map of a week by labels: the tissue below the cortex sinks, and the top does not know of the slit."""
+    (x, y, z), affine = grid(3.0)
+    place = np.exp(-((x / 2) ** 2) / 2) * np.sqrt(np.clip(1 - (y / 9) ** 2, 0, 1))
+    below = before_mm + CORTEX_MM
+    share = np.interp(-z, [0.0, below, SIZE_MM[2]], [0.0, 1.0, 0.0])
+    sunk = np.zeros((*x.shape, 3), np.float32)
+    sunk[..., 2] = -(after_mm - before_mm) * place * share
+    return Deformation(np.eye(4), sunk, affine)
+
+
+def area_at_slit(surface):
+    centres = corners(surface).mean(axis=1)
+    near = (np.abs(centres[:, 0]) < 8) & (np.abs(centres[:, 1]) < 9) & (centres[:, 2] > -8)
+    return face_areas(surface)[near].sum()
+
+
+def test_a_body_opens_a_slit_that_registration_does_not_know():
+    box = box_mesh((20, 20, 12), tuple(SIZE_MM))
+    mesh = TetrahedralMesh(box.vertices - [0, 0, SIZE_MM[2] / 2], box.tets)
+    surfaces = [block_with_slit(depth) for depth in DEPTHS_MM]
+    pairs = [registration(*depths) for depths in pairwise(DEPTHS_MM)]
+    found = carry_sharply(mesh, pairs, surfaces[1:], ElasticFit(mesh), open_sulci=True)
+    faces, used = boundary_surface(mesh)[0].faces, boundary_surface(mesh)[1]
+    start = area_at_slit(surfaces[0])
+    for positions, surface in zip(found[1:], surfaces[1:], strict=True):
+        body = TriangleMesh(positions[used], faces)
+        assert len(faces_that_cross(body)) == 0
+        assert (volumes_between(positions, linear_pieces(mesh)) > 0).all()
+        away, _, _ = nearest_on(surface.vertices, body)
+        assert np.quantile(away, 0.99) < 0.8
+        gained, opened = area_at_slit(body) - start, area_at_slit(surface) - start
+        assert gained > 0.4 * opened
+    assert 0.7 < gained / opened < 1.1
+    # by places and normals alone the slit has hardly an effect
+    top = TriangleMesh(mesh.vertices[used], faces)
+    alone = TriangleMesh(fit_onto_surface(top, surfaces[-1]), faces)
+    assert area_at_slit(alone) - start < 0.2 * opened
