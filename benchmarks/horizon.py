@@ -7,6 +7,11 @@ has its own study in FOLDER; the same command continues after an interruption. G
 atlas; the prediction is compared with every second week of the other atlas. The last line is one JSON object, which
 `--write` also writes as YAML: for each start, horizon (GW) and model, the columns of `results/study/prediction.csv`
 listed in `NUMBERS`. With `--ensemble N`, `coverage` is the share of later brains within the intervals of N members.
+
+`--surfaces` predicts the same start brain once more from its pial surfaces, and from its pial and white surfaces, which
+gyriflow made from its labels; rows then have `given`.
+
+    ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --starts chinese --weeks 24 30 --surfaces
 """
 
 import argparse
@@ -19,10 +24,11 @@ import yaml
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.atlas import ATLASES
-from gyriflow.study.paths import ENSEMBLE
+from gyriflow.settings.terms import SIDES
+from gyriflow.study.paths import ENSEMBLE, pial_of, white_of
 from workflow import call
 
-WEEKS = range(22, 35)
+WEEKS = (22, 34)
 GROWN_BY = {"crl": "chinese", "chinese": "crl"}
 MODELS = ("run", "target", "atlas", "atlas_deformed", "scaled")
 NUMBERS = {"distance_mm": 3, "r_shape_index": 3, "area_error": 4, "volume_error": 4}
@@ -34,14 +40,15 @@ HEAD = """\
 NOTE = "The Chinese brain of 26 GW is 14 % smaller than the weeks around it suggest; no way of predicting meets that."
 
 
-def study(start: str, folders: dict[str, Path], edge_mm: float, ensemble: int | None) -> dict[str, Any]:
+def study(start: str, folders: dict[str, Path], weeks: range, edge_mm: float, ensemble: int | None) -> dict[str, Any]:
     """Return the configuration of a prediction from the first brain of an atlas."""
-    weeks = {start: list(WEEKS[::2]), GROWN_BY[start]: list(WEEKS)}
+    grown_by = GROWN_BY[start]
+    used = {start: list(weeks[::2]), grown_by: list(weeks)}
     return {
         "atlas": [
-            {"name": name, "folder": str(folders[name]), "weeks": weeks[name], "accept_licence": True} for name in weeks
+            {"name": name, "folder": str(folders[name]), "weeks": used[name], "accept_licence": True} for name in used
         ],
-        "start": f"{start}-{WEEKS[0]}",
+        "start": f"{start}-{weeks[0]}",
         "mesh": {
             "order": 1,
             "mesher": "tetgen",
@@ -50,16 +57,36 @@ def study(start: str, folders: dict[str, Path], edge_mm: float, ensemble: int | 
             # a coarse mesh of a detailed surface has flat elements
             "min_radius_ratio": 0.005,
         },
-        "folding": {"preset": "expected", "end_week": WEEKS[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
+        "folding": {"preset": "expected", "end_week": weeks[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
         "runs": {RUN: {"ensemble": ensemble}},
     }
 
 
+def with_surfaces(config: dict[str, Any], folder: Path, start: str, cores: int) -> dict[str, Any]:
+    """Return the configuration with the start brain given as surfaces, too, which are made in a folder."""
+    brain, grown_by = config["start"], GROWN_BY[start]
+    week = config["atlas"][0]["weeks"][0]
+    folder.mkdir(parents=True, exist_ok=True)
+    pial, white = pial_of(*SIDES), white_of(*SIDES)
+    names = [pial[side] for side in SIDES] + [white[f"{side}_surface"] for side in SIDES]
+    files = [name.format(brain=brain) for name in names]
+    call(folder, config | {"metrics": {"white_surfaces": "all"}}, cores, *files)
+    left, right, *whites = (str(folder / file) for file in files)
+    population = read_keys(ATLASES / start / "atlas.yaml")["series"]["normative"]["population"]
+    entry = {"week": week, "population": population, "hemispheres": {"left": left, "right": right}}
+    brains = [entry | {"id": f"{brain}-pial"}, entry | {"id": f"{brain}-white", "white": whites}]
+    growing = {grown_by: [f"{grown_by}-{week}" for week in config["atlas"][1]["weeks"]]}
+    starts = [brain, *(entry["id"] for entry in brains)]
+    return config | {"brains": brains, "start": starts, "growth": {"brains": growing}}
+
+
 def rows(folder: Path, start: str) -> list[dict[str, Any]]:
-    """Return the numbers of a finished study, rounded."""
+    """Return the numbers of a finished study, rounded; of start brains given in several ways, as what."""
     table = read_table(folder / "results" / "study" / "prediction.csv").sort_values("horizon", kind="stable")
+    given = {brain: brain.split("-")[2:] for brain in table["subject"]}
     return [
         {"start": start, "horizon": float(row["horizon"]), "model": row["model"]}
+        | ({"given": (given[row["subject"]] or ["labels"])[0]} if any(given.values()) else {})
         | {name: round(float(row[name]), digits) for name, digits in NUMBERS.items()}
         for row in table[table["model"].isin(MODELS)].to_dict("records")
     ]
@@ -70,26 +97,33 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     for name in GROWN_BY:
         parser.add_argument(f"--{name}", type=Path, required=True)
+    parser.add_argument("--starts", nargs="+", choices=GROWN_BY, default=list(GROWN_BY))
+    parser.add_argument("--weeks", nargs=2, type=int, default=WEEKS, help="week of the start brains, and last week")
+    parser.add_argument("--surfaces", action="store_true", help="also predict from surfaces of the start brain")
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--edge", type=float, default=0.9, help="edges of the mesh (mm)")
     parser.add_argument("--ensemble", type=int, metavar="N", help="members of an ensemble, for coverage")
     parser.add_argument("--write", type=Path)
     arguments = parser.parse_args()
     folders = {name: getattr(arguments, name).resolve() for name in GROWN_BY}
+    first, last = arguments.weeks
     found, elements, covered = [], [], {}
-    for start in GROWN_BY:
+    for start in arguments.starts:
         folder = arguments.folder.resolve() / start
         folder.mkdir(parents=True, exist_ok=True)
-        config, files = study(start, folders, arguments.edge, arguments.ensemble), ["results/study/prediction.csv"]
-        intervals = ENSEMBLE.format(run=RUN, brain=f"{start}-{WEEKS[0]}")
+        config = study(start, folders, range(first, last + 1), arguments.edge, arguments.ensemble)
+        if arguments.surfaces:
+            config = with_surfaces(config, folder / "surfaces", start, arguments.cores)
+        files = ["results/study/prediction.csv"]
+        intervals = ENSEMBLE.format(run=RUN, brain=f"{start}-{first}")
         call(folder, config, arguments.cores, *files, *([intervals] if arguments.ensemble else []))
         found += rows(folder, start)
         if arguments.ensemble:
             table = read_table(folder / intervals).dropna(subset=["observed"])
-            later = table[table["week"] > WEEKS[0]]
+            later = table[table["week"] > first]
             print(start, later.to_string(), sep="\n")
             covered[start] = later.groupby("metric")["contains_observed"].mean().to_dict()
-        summary = read_json(folder / f"results/runs/{RUN}/{start}-{WEEKS[0]}/folding/summary.json")
+        summary = read_json(folder / f"results/runs/{RUN}/{start}-{first}/folding/summary.json")
         elements.append(int(summary["tets"]))
     # tests of other starts, made once, are kept
     kept = (
@@ -102,7 +136,7 @@ def main() -> None:
         "source": "benchmarks/horizon.py",
         "references": [f"{paper['citation']}, {paper.get('doi') or paper['url']}" for paper in references],
         "note": NOTE,
-        "start_week": WEEKS[0],
+        "start_week": first,
         "mesh": {"order": 1, "surface_edge_mm": arguments.edge, "elements": elements},
         "rows": found + kept,
     }

@@ -9,21 +9,32 @@ if workflow.is_main_process:
         )
 
 
-rule surface_mask:
+def similar_thickness(brain):
+    """Return the summary of the thickness of a similar brain; empty if there is none."""
+    similar = study.similar_in_thickness(brain)
+    return THICKNESS["summary"].format(brain=similar.id) if similar else []
+
+
+# labels for the registration of brains that are given as surfaces
+rule filled_labels:
     input:
-        PIAL["whole"],
+        whole=PIAL["whole"],
+        sides=lambda w: brain_of(w).measurement.hemispheres,
+        report=PIAL["report"],
+        white=lambda w: list(brain_of(w).config.white_files.values()),
+        similar=lambda w: similar_thickness(brain_of(w)),
     output:
-        MASK,
+        FILLED_LABELS,
     log:
-        f"{BRAIN}/logs/surface_mask.log",
+        f"{BRAIN}/logs/filled_labels.log",
     benchmark:
-        f"{BRAIN}/benchmarks/surface_mask.tsv"
+        f"{BRAIN}/benchmarks/filled_labels.tsv"
     conda:
         ENVIRONMENT
     params:
-        voxel_mm=CONFIG.surface.edge_length_mm,
+        white=lambda w: brain_of(w).config.white_files,
     script:
-        "../scripts/surface_mask.py"
+        "../scripts/filled_labels.py"
 
 
 def pair_of(wildcards):

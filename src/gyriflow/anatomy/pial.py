@@ -71,6 +71,7 @@ from .plausible import (
     max_cut_share,
     proportion_warnings,
     require_common_pose,
+    require_left_and_right,
     require_pair,
     require_plausible_size,
     require_single_hemisphere,
@@ -293,9 +294,17 @@ def from_hemispheres(
     between them. With coordinates "auto" each may have any rigid pose, which is determined from its
     shape; `declared` is whether both files name the same coordinate system. If a shape contradicts named coordinates,
     there is a warning.
+    Hemispheres that share the vertices of a cut, as those that gyriflow writes, are joined along it to one surface.
     InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
     impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
     """
+    if (joined := joined_along_cut(left, right)) is not None:
+        connected = from_surface(
+            joined, week=week, coordinates=coordinates, edge_length_mm=edge_length_mm, max_hole_mm=max_hole_mm
+        )
+        to_pose = connected.pose.of_file()
+        require_left_and_right(transformed(left, to_pose), transformed(right, to_pose), coordinates)
+        return replace(connected, report=connected.report | {"source": "hemispheres", "joined_along_cut": True})
     to_ras = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
     sides = [
         sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)
@@ -326,6 +335,16 @@ def from_hemispheres(
     surface = RepairedSurface(whole, report, warnings, np.concatenate([side.is_cap for side in even]))
     is_left = np.arange(len(whole.faces)) < len(even[0].mesh.faces)
     return _two_pieces(surface, is_left, plane, pose, week, named=named)
+
+
+def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
+    """Return the closed surface of two open hemispheres with the same vertices along their cut, or None."""
+    if is_closed(left) or is_closed(right):
+        return None
+    both = merged(left, right)
+    vertices, index = np.unique(both.vertices, axis=0, return_inverse=True)
+    joined = TriangleMesh(vertices, index.reshape(-1)[both.faces])
+    return joined if is_closed(joined) else None
 
 
 def _two_pieces(

@@ -120,12 +120,10 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
     return [narrow] if shape < MIN_USUAL_NARROWNESS else []
 
 
-def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coordinates: str) -> list[str]:
-    """Return a warning if two surfaces in RAS+ are hardly the left and right hemisphere of one brain.
+def require_left_and_right(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> None:
+    """Raise InputError if the centroid of the left of two surfaces in RAS+ is not at the smaller x.
 
-    `coordinates` are those of the configuration, "ras", "lps" or "auto". InputError if the left centroid is not at the
-    smaller x, or if the volumes differ by more than `max_ratio`. Volumes of one fetus differ by a few percent, those of
-    successive weeks by 15 %; unilateral pathology goes further.
+    `coordinates` are those of the configuration, "ras", "lps" or "auto".
     """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
@@ -135,6 +133,15 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coor
             expected="left at the smaller x (RAS+)",
             remedy="Swap `left` and `right`, or set the other coordinates; not both: that exchanges front and back.",
         )
+
+
+def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coordinates: str) -> list[str]:
+    """Return a warning if two surfaces in RAS+ are hardly the left and right hemisphere of one brain.
+
+    InputError as for `require_left_and_right`, or if the volumes differ by more than `max_ratio`. Volumes of one fetus
+    differ by a few percent, those of successive weeks by 15 %; unilateral pathology goes further.
+    """
+    require_left_and_right(left, right, coordinates)
     volumes = signed_volume(left), signed_volume(right)
     ratio = max(volumes) / min(volumes)
     if ratio > max_ratio:

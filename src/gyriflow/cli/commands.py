@@ -14,6 +14,7 @@ from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
 from ..running.machine import available_cores
+from ..settings.atlas import shipped_atlases
 from ..shipped import CONFIG, DEMO, SHIPPED
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ def main() -> None:
     \b
     A brain at a later week, predicted from one scan:
       gyriflow predict LABELS --week 22.4 --until 30 --atlas crl
+      gyriflow predict LEFT RIGHT --week 22.4 --until 30 --atlas crl
     """
 
 
@@ -265,10 +267,11 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
 
 
 @main.command()
-@click.argument("labels", type=EXISTING_FILE)
+@click.argument("files", type=EXISTING_FILE, nargs=-1, required=True, metavar="LABELS|SURFACE|LEFT RIGHT")
+@click.option("--white", type=EXISTING_FILE, multiple=True, help="White surface: one for each pial surface.")
 @click.option("--week", type=float, required=True, help="Gestational week of the scan.")
 @click.option("--until", type=float, required=True, help="Gestational week to predict.")
-@click.option("--atlas", help="Atlas whose growth is used: crl, chinese, dhcp-volume, spina-bifida, or an atlas.yaml.")
+@click.option("--atlas", help=f"Atlas whose growth is used: {', '.join(shipped_atlases())}, or an atlas.yaml.")
 @scheme_option
 @click.option("--folder", type=EXISTING_DIR, help="Folder with the atlas' files. [default: download them]")
 @click.option("--image", type=EXISTING_FILE, help="T2-weighted volume of the scan.")
@@ -280,18 +283,19 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
 @cores_option
 @dry_run_option
 def predict(
-    labels: Path, week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
+    files: Sequence[Path], week: float, until: float, directory: Path, cores: int, dry_run: bool, **settings: Any
 ) -> None:
-    """Predict a brain at a later week from its tissue LABELS.
+    """Predict a brain at a later week.
 
-    It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it. The report
-    shows where the predicted surfaces and labels are. After an interruption, the same command resumes.
+    It is given as tissue LABELS, as one pial SURFACE of the whole brain, or as the pial surfaces of its LEFT and RIGHT
+    hemisphere. It grows as the brains of an atlas do. This writes gyriflow.yaml into the working directory and runs it.
+    The report shows where the predicted surfaces and labels are. After an interruption, the same command resumes.
     """
     from .init import write_prediction
 
     with TemporaryDirectory() as scratch:
         config = Path(scratch if dry_run else directory) / CONFIG
-        for line in write_prediction(config, directory / CONFIG, labels, (week, until), **settings):
+        for line in write_prediction(config, directory / CONFIG, files, (week, until), **settings):
             click.echo(line)
         code = _run(config, directory, cores, dry_run, ["--cores", str(cores)], "all", "export")
     sys.exit(code)

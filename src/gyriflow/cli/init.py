@@ -17,7 +17,7 @@ from ..settings.growth import BEFORE_GW
 from ..shipped import SHIPPED
 from ..study.loading import FOLDING_SECTIONS, load
 from ..study.series import unmatched_reason
-from .recognition import UNSET, FoundBrain, FoundScans, recognise_labels
+from .recognition import UNSET, FoundBrain, FoundScans, recognise_brain
 
 HEAD = f"""\
 # yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
@@ -93,9 +93,10 @@ def _causes(brains: Iterable[FoundBrain]) -> str:
 def write_prediction(
     path: Path,
     shown_path: Path,
-    labels: Path,
+    files: Sequence[Path],
     weeks: tuple[float, float],
     *,
+    white: Sequence[Path],
     atlas: str | None,
     folder: Path | None,
     scheme: str | None,
@@ -107,17 +108,19 @@ def write_prediction(
 ) -> Iterator[str]:
     """Write a configuration that folds a brain by the growth of an atlas; yield lines about it.
 
-    `weeks` are the week of the brain and the week to predict; `folder` has the atlas' files; `accepted` is whether its
-    licence is accepted; `ensemble` is a number of members. Paths are relative to the working directory of this process.
-    InputError if anything is missing, or if the configuration at `shown_path` exists with different content and `force`
-    is not set.
+    `files` are its label volume or pial surfaces, perhaps with `white` surfaces; `weeks` are the week of the brain and
+    the week to predict; `folder` has the atlas' files; `accepted` is whether its licence is accepted; `ensemble` is a
+    number of members. Paths are relative to the working directory of this process. InputError if anything is missing,
+    or if the configuration at `shown_path` exists with different content and `force` is not set.
     """
     if atlas is None:
         yield (
             f"warning: without --atlas, {SHIPPED_ATLAS} is used. Its brains have spina bifida aperta and are not "
             "normal; unoperated ones end at 25 GW"
         )
-    entry = recognise_labels(own_name(labels), scheme)
+    entry = recognise_brain(files, white, scheme)
+    if image and "scheme" not in entry:
+        raise InputError("--image: only labels are shown on an image", found="surfaces", remedy="Leave it out.")
     entry = {"id": entry["id"], "week": weeks[0], "population": entry["id"]} | entry
     entry |= {"image": str(own_name(image))} if image else {}
     keys = {"name": atlas or SHIPPED_ATLAS, "folder": folder and str(folder), "accept_licence": accepted}
@@ -135,7 +138,10 @@ def write_prediction(
         raise InputError("already exists with different content", path=shown_path, remedy=remedy)
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
-    yield f"{entry['id']}: {labels} ({entry['scheme']}), {span}; configuration: {shown_path}"
+    given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
+    sides = entry.get("hemispheres", {})
+    names = ", ".join(f"{side} {path}" for side, path in sides.items()) or files[0]
+    yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 
 def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:

@@ -13,11 +13,11 @@ import numpy as np
 from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES
+from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
 from ..io.files import files_in, read_json, reading
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
-from ..settings.base import did_you_mean
+from ..settings.base import did_you_mean, own_name
 from ..settings.participants import WeekNotation
 from ..settings.terms import SIDES, Side
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
@@ -418,14 +418,20 @@ def _found_brain(
     return brain
 
 
-def _require_brain(path: Path) -> None:
+def _require_brain(path: Path, *, whole: bool = False) -> None:
     # imports that label volumes need not wait for
+    from ..anatomy.plausible import MIN_NARROWNESS, narrowness
     from ..geometry.triangles import volume_ml
     from ..io.surfaces import read_surface
 
-    if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(read_surface(path)))) < WHOLE_BRAIN_ML[1]:
+    mesh = read_surface(path)
+    if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(mesh))) < WHOLE_BRAIN_ML[1]:
         expected = f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to {WHOLE_BRAIN_ML[1]:g} mL"
         raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
+    if whole and (shape := narrowness(mesh)) < MIN_NARROWNESS:
+        problem = "seems to be one hemisphere only, and atlases have whole brains"
+        found, expected = f"a shortest extent of {shape:.2f} of the longest", f"{MIN_NARROWNESS} or more"
+        raise InputError(problem, path=path, found=found, expected=expected, remedy="Give LEFT and RIGHT.")
 
 
 def _agree(week: float, named: float) -> bool:
@@ -468,6 +474,62 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
             except InputError as error:
                 causes[name] = str(error).partition(";")[0]
     return causes
+
+
+def recognise_brain(files: Sequence[Path], white: Sequence[Path], scheme: str | None) -> dict[str, Any]:
+    """Return the entry of one brain: from a label volume, one surface, or the left and the right pial surface.
+
+    There may be as many `white` surfaces as pial ones. InputError for files of other kinds, numbers or sides, and for
+    one hemisphere.
+    """
+    if any(map(is_volume, files)):
+        if len(files) > 1 or white:
+            found = " and ".join(file.name for file in (*files, *white))
+            raise InputError("one brain is expected", found=found, expected="one label volume, or surfaces alone")
+        return recognise_labels(own_name(files[0]), scheme)
+    if scheme:
+        raise InputError("--scheme: surfaces have no labels", found=scheme, remedy="Leave it out.")
+    for file in (*files, *white):
+        if format_of(file, "surface") is None:
+            expected = f"a label volume ({', '.join(VOLUME_SUFFIXES)}) or a surface ({', '.join(SURFACE_SUFFIXES)})"
+            raise InputError("is neither a label volume nor a surface", path=file, expected=expected)
+    pial = _in_order(files, "pial")
+    entry: dict[str, Any] = {"id": _scan_of(own_name(files[0]))}
+    if len(pial) == 1:
+        _require_brain(pial[0], whole=True)
+        entry["pial"] = str(pial[0])
+    else:
+        entry["hemispheres"] = dict(zip(SIDES, map(str, pial), strict=True))
+    if white and len(white) != len(files):
+        problem = f"--white: found {len(white)} surfaces for {len(files)} pial ones"
+        raise InputError(problem, expected="one for each: of the left and the right, or of the whole brain")
+    if white:
+        whites = [str(file) for file in _in_order(white, "white")]
+        entry["white"] = whites if len(whites) > 1 else whites[0]
+    return entry
+
+
+def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
+    """Return the surfaces of one layer, left before right, with resolved folders; their names may say which is which.
+
+    InputError if a name says another layer, or if it is one hemisphere, both are of one side, or there are more.
+    """
+    sides: list[Side | None] = []
+    for file in files:
+        side, named = SIDE_NAME.search(file.name), LAYER_NAME.search(FREESURFER_INPUT.sub("", file.name))
+        sides.append(None if side is None else "left" if side[1] else "right")
+        if named and bool(named[1]) != (layer == "pial"):
+            problem = f"is named as a {'pial' if named[1] else 'white'} surface"
+            remedy = "Give pial surfaces first, and white ones each after --white."
+            raise InputError(problem, path=file, expected=f"a {layer} surface", remedy=remedy)
+    if len(files) == 1 and sides[0]:
+        problem = f"is the {sides[0]} hemisphere only, and atlases have whole brains"
+        raise InputError(problem, path=files[0], expected="LEFT and RIGHT, or one surface of the whole brain")
+    if len(files) > len(SIDES) or (None not in sides and len(set(sides)) < len(sides)):
+        found = ", ".join(file.name for file in files)
+        expected = "the left and the right one, or one of the whole brain"
+        raise InputError(f"these are not the {layer} surfaces of one brain", found=found, expected=expected)
+    return [own_name(file) for file in (files if sides != ["right", "left"] else files[::-1])]
 
 
 def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:

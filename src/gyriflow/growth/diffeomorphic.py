@@ -4,6 +4,7 @@ import io
 import logging
 import time
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import SimpleITK
@@ -13,7 +14,7 @@ from scipy.ndimage import binary_dilation, map_coordinates
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.alignment import CUBE_ROTATIONS
+from ..geometry.alignment import motion
 from ..geometry.deformations import Deformation, transform_points
 from ..geometry.poses import LPS_TO_RAS
 from ..geometry.triangles import Floats
@@ -31,8 +32,15 @@ SMOOTHING_VOXELS = (2.5, 0.8)
 MAX_ROTATED_SHARE = 0.7
 """A rotated start is taken if its difference is below this share of that without rotation."""
 
-N_POINTS = 20000
+N_POINTS = 3000
 """Number of points of the cerebrum at which starts are compared."""
+
+_ANGLES = list(product(range(0, 360, 45), range(-90, 91, 45), range(0, 360, 45)))
+START_ROTATIONS: Floats = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
+START_ROTATIONS = START_ROTATIONS[np.argsort(-np.trace(START_ROTATIONS, axis1=1, axis2=2), kind="stable")]
+"""Rotations of the start, the identity first. Every rotation is within about 35 degrees of one of them."""
+REFINED_DEG = (20.0, 10.0, 5.0)
+"""Steps by which the best of them is then rotated about the three axes, in turn."""
 
 NEAR_MM = 3.0
 """Margin around the cerebrum in which brains are compared for the deformation."""
@@ -56,9 +64,9 @@ def register(earlier: Channels, later: Channels, *, smoothing: float = 1.0, thre
     """Register an earlier brain to a later one.
 
     The channels that both have are compared with the weights `WEIGHTS`: sums of squares for the affine map, normalised
-    cross-correlation for the deformation. It starts with centroids and volumes of the cerebra matched, rotated by one
-    of the cube's rotations if this fits clearly better. The result is deterministic. InputError if greedy fails;
-    `registration_quality.measure_quality` measures how good the result is. `smoothing` is a factor of
+    cross-correlation for the deformation. It starts with centroids and volumes of the cerebra matched, rotated if
+    this fits clearly better (`START_ROTATIONS`, `REFINED_DEG`). The result is deterministic. InputError if greedy
+    fails; `registration_quality.measure_quality` measures how good the result is. `smoothing` is a factor of
     `SMOOTHING_VOXELS`.
     """
     began = time.perf_counter()
@@ -115,22 +123,26 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
     index = np.argwhere(earlier.cerebrum > 0.01)
     index = index[:: max(1, len(index) // N_POINTS)]
     points = transform_points(index, earlier.affine)
-    starts, differences = [], []
-    for turn in CUBE_ROTATIONS:
-        matrix = np.eye(4)
-        matrix[:3, :3] = scale * turn
-        matrix[:3, 3] = second - matrix[:3, :3] @ first
-        at = transform_points(transform_points(points, matrix), np.linalg.inv(later.affine)).T
+
+    def start_of(turn: Floats) -> Floats:
+        return motion(scale * turn, second - scale * turn @ first)
+
+    def difference(turn: Floats) -> float:
+        at = transform_points(transform_points(points, start_of(turn)), np.linalg.inv(later.affine)).T
         squares = [
             WEIGHTS[name]
             * np.square(getattr(earlier, name)[tuple(index.T)] - map_coordinates(getattr(later, name), at, order=1))
             for name in names
         ]
-        starts.append(matrix)
-        differences.append(float(np.sum([square.mean() for square in squares])))
-    best = int(np.argmin(differences))
-    selected = best if differences[best] < MAX_ROTATED_SHARE * differences[0] else 0
-    return CUBE_ROTATIONS[selected], starts[selected]
+        return float(np.sum([square.mean() for square in squares]))
+
+    turn = min(START_ROTATIONS, key=difference)
+    for step in REFINED_DEG:
+        nearby = Rotation.from_euler("xyz", list(product((0, -step, step), repeat=3)), degrees=True)
+        turn = min(nearby.as_matrix() @ turn, key=difference)
+    if difference(turn) >= MAX_ROTATED_SHARE * difference(np.eye(3)):
+        turn = np.eye(3)
+    return turn, start_of(turn)
 
 
 def _place(brain: Channels) -> tuple[Floats, float]:

@@ -71,5 +71,9 @@ class LabelScheme(SchemeSettings):
     """Name of the scheme."""
 
 
+FILLED = LabelScheme(name="filled", cerebrum=(1, 2), cortex=(2,))
+"""Scheme of volumes filled from surfaces."""
+
+
 def _as_text(labels: list[int]) -> str:
     return ", ".join(map(str, labels))

@@ -77,7 +77,7 @@ THICKNESS = {
     "measured": f"{BRAIN}/surface/measured_thickness.shape.gii",
     "summary": f"{BRAIN}/surface/thickness.json",
 }
-MASK = f"{BRAIN}/surface/mask.nii.gz"
+FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
 VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.h5"

@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..io.volumes import LabelSource
-from ..io.yaml_files import SCHEMES
 from ..settings.brains import BrainConfig
 from ..settings.ensemble import Variation
 from ..settings.folding import VARYING
 from ..settings.runs import Run
+from ..settings.schemes import FILLED
 from ..settings.terms import MEASURED, Side
 from ..settings.varying import Varying
 from . import paths
@@ -118,8 +118,8 @@ class Brain:
 
     @property
     def registered(self) -> LabelSource:
-        """The volume for its registration: its labels, or a mask made from its surface."""
-        return self.labels or LabelSource(paths.MASK.format(brain=self.id), "auto", SCHEMES["binary"])
+        """The volume for its registration: its labels, or those that its surfaces are filled with."""
+        return self.labels or LabelSource(paths.FILLED_LABELS.format(brain=self.id), "auto", FILLED)
 
     @property
     def pial(self) -> str:

@@ -261,6 +261,33 @@ class Study:
                 scans.setdefault(brain.config.subject, []).append(brain.id)
         return {subject: ids for subject, ids in scans.items() if len(ids) > 1}
 
+    def similar_in_thickness(self, brain: Brain) -> Brain | None:
+        """Return the brain whose measured thickness fills another one's pial surface; None if none is measured.
+
+        It is the brain with labels, or else with white surfaces, that is closest in week.
+        """
+        others = [other for other in self.brains.values() if other.has_thickness and other is not brain]
+        return min(others, key=lambda other: (other.labels is None, abs(other.week - brain.week)), default=None)
+
+    @property
+    def filled(self) -> list[dict[str, Any]]:
+        """The brains that are filled to labels for the growth of runs: ids, by source and use of their cortex.
+
+        The source is "white", "measured" (on a similar brain) or "typical".
+        """
+        groups: dict[tuple[str, bool], dict[str, None]] = {}
+        followed = [
+            (simulation.start.id, simulation.shapes) for simulation in self.run_simulations if simulation.shapes
+        ]
+        for chain in (self.chains[key] for key in dict.fromkeys(followed)):
+            for pair, posed in zip(pairwise(chain.brains), chain.posed, strict=True):
+                has_cortex = all(brain.registered.scheme.cortex for brain in pair)
+                for brain in (brain for brain, is_posed in zip(pair, posed, strict=True) if is_posed):
+                    similar = "measured" if self.similar_in_thickness(brain) else "typical"
+                    source = "white" if brain.config.white_files else similar
+                    groups.setdefault((source, has_cortex), {})[brain.id] = None
+        return [{"ids": list(ids), "cortex": cortex, "by_cortex": used} for (cortex, used), ids in groups.items()]
+
     # regions, and maps at the vertices of the template
 
     def region_source(self, name: str) -> Brain:

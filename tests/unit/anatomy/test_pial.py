@@ -151,6 +151,17 @@ def test_hemispheres_are_merged_apart_and_whole(halves):
     assert smallest_gap(*pieces(surface.whole)) > 0.5
 
 
+@pytest.mark.parametrize("coordinates", ["ras", "auto"])
+def test_hemispheres_that_share_the_vertices_of_their_cut_are_joined_along_it(phantom, coordinates):
+    surface = from_hemispheres(phantom.left, phantom.right, week=24.0, coordinates=coordinates, **QUICK)
+    require_sound(surface)
+    assert (surface.report["source"], surface.report["joined_along_cut"]) == ("hemispheres", True)
+    assert signed_volume(surface.whole) == pytest.approx(signed_volume(phantom.whole), rel=0.01)
+    assert area(surface.left) == pytest.approx(area(phantom.left), rel=0.03)
+    with pytest.raises(InputError, check=Facts("left", "right", "RAS+")):
+        from_hemispheres(phantom.right, phantom.left, week=24.0, coordinates=coordinates, **QUICK)
+
+
 def test_overlapping_hemispheres_are_moved_apart(halves):
     left = TriangleMesh(halves[0].vertices - [-2.5, 0, 0], halves[0].faces)
     surface = from_hemispheres(left, halves[1], week=24.0, **QUICK)

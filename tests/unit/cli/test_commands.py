@@ -6,13 +6,16 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
+from atlas_brains import atlas_brain, atlas_halves
 from click.testing import CliRunner
 from facts import Facts
+from shapes import sphere
 
 from gyriflow.cli import check as checking
 from gyriflow.cli.check import coarse_cortices
 from gyriflow.cli.commands import main
 from gyriflow.errors import InputError
+from gyriflow.io.surfaces import write_surface
 from gyriflow.running import launch
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
@@ -165,6 +168,95 @@ def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until
     done = predicted("--week", "22.4", "--until", until, *more)
     assert (done.exit_code, done.output) == (2, Facts(*facts))
     assert not (tmp_path / "gyriflow.yaml").exists()
+
+
+@pytest.fixture(scope="module")
+def surfaces(tmp_path_factory):
+    """Surface files of the shipped brain of 24 GW and of a ball, by name."""
+    folder, (left, right) = tmp_path_factory.mktemp("surfaces"), atlas_halves()
+    meshes = {"brain": atlas_brain(), "half": left, "ball": sphere(5.0), "lh": left, "rh": right}
+    names = {name: f"{name}.pial.surf.gii" if name in ("lh", "rh") else f"{name}.stl" for name in meshes}
+    for name, mesh in meshes.items():
+        write_surface(folder / names[name], mesh)
+    write_surface(folder / "lh.white.surf.gii", left)
+    write_surface(folder / "rh.white.surf.gii", right)
+    (folder / "notes.txt").write_text("none")
+    return folder
+
+
+@pytest.fixture
+def predicted_from(monkeypatch, tmp_path, surfaces):
+    """Return the outcome of `gyriflow predict` for files of that folder, in which it stands."""
+    monkeypatch.setattr(launch, "main", lambda asked: 0)
+    monkeypatch.chdir(surfaces)
+
+    def outcome(*given):
+        arguments = ["predict", *given, "--until", "24.8", "--directory", str(tmp_path)]
+        return CliRunner().invoke(main, arguments)
+
+    return outcome
+
+
+@pytest.mark.parametrize(
+    ("files", "source"),
+    [
+        (["brain.stl"], {"pial": "brain.stl"}),
+        (
+            ["rh.pial.surf.gii", "lh.pial.surf.gii"],
+            {"hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"}},
+        ),
+        (
+            ["lh.pial.surf.gii", "rh.pial.surf.gii", "--white", "lh.white.surf.gii", "--white", "rh.white.surf.gii"],
+            {
+                "hemispheres": {"left": "lh.pial.surf.gii", "right": "rh.pial.surf.gii"},
+                "white": ["lh.white.surf.gii", "rh.white.surf.gii"],
+            },
+        ),
+    ],
+)
+def test_a_brain_is_predicted_from_its_surfaces(predicted_from, surfaces, tmp_path, files, source):
+    done = predicted_from(*files, "--week", "23.4")
+    assert (done.exit_code, done.output) == (0, Facts("23.4", "24.8 GW"))
+    section = yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())
+    (entry,) = section["brains"]
+    found = {key: entry[key] for key in entry if key in ("pial", "hemispheres", "white")}
+    plain = yaml.safe_dump(found).replace(f"{surfaces}/", "")
+    assert yaml.safe_load(plain) == source
+    study = resolve(load(section))
+    (simulation,) = study.run_simulations
+    assert [brain.week for brain in study.chains[simulation.start.id, "atlas"].later] == [23, 24, 25]
+    assert [group["ids"] for group in study.filled] == [[entry["id"]]]
+
+
+@pytest.mark.fault(87)
+@pytest.mark.parametrize(
+    ("given", "facts"),
+    [
+        (["brain.stl"], ["--week"]),
+        (["lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii", "LEFT", "RIGHT"]),
+        (["half.stl", "--week", "23"], ["half.stl", "0.5", "LEFT", "RIGHT"]),
+        (["ball.stl", "--week", "23"], ["ball.stl", "0.522 mL"]),
+        (["lh.pial.surf.gii", "lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii, lh.pial.surf.gii"]),
+        (["lh.pial.surf.gii", "rh.pial.surf.gii", "brain.stl", "--week", "23"], ["brain.stl"]),
+        (["lh.white.surf.gii", "rh.white.surf.gii", "--week", "23"], ["lh.white.surf.gii", "--white"]),
+        (["brain.stl", "--white", "brain.stl", "--white", "half.stl", "--week", "23"], ["--white", 2, 1]),
+        (["brain.stl", "--white", "lh.pial.surf.gii", "--week", "23"], ["lh.pial.surf.gii", "white"]),
+        (["notes.txt", "--week", "23"], ["notes.txt", ".nii.gz", ".stl"]),
+        (["brain.stl", "--scheme", "feta-7", "--week", "23"], ["--scheme", "feta-7"]),
+        (["brain.stl", "--image", "brain.stl", "--week", "23"], ["--image"]),
+    ],
+)
+def test_files_that_are_not_one_brain_to_predict_are_refused(predicted_from, tmp_path, given, facts):
+    done = predicted_from(*given)
+    assert (done.exit_code, done.output) == (2, Facts(*facts))
+    assert not (tmp_path / "gyriflow.yaml").exists()
+
+
+def test_labels_are_predicted_alone(predicted_from):
+    labels = str(SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz")
+    for more in (["brain.stl"], ["--white", "brain.stl"]):
+        done = predicted_from(labels, *more, "--week", "23")
+        assert (done.exit_code, done.output) == (2, Facts("parcellation.nii.gz", "brain.stl"))
 
 
 @pytest.mark.fault(36)

@@ -340,12 +340,17 @@ def test_the_methods_say_what_was_run():
         {"run": "own", "start": "a", "growth_of": "own", "parameters": led, "summary": summary},
     ]
     template, metrics = (PAGE / "methods.rst").read_text(), {"curvature_radius_mm": 3.0}
+    surface = {"ids": ["young"], "cortex": "white", "by_cortex": True}
+    atlas = {"ids": ["old", "older"], "cortex": "measured", "by_cortex": False}
     text = methods_text(
-        template, brains=brains, runs=runs, software=software, metrics=metrics,
+        template, brains=brains, runs=runs, software=software, metrics=metrics, filled=[surface, atlas],
         surface={"edge_length_mm": 0.8, "open_sulci": False}, mesh={"order": 2, "mesher": "tetgen"},
     )  # fmt: skip
     # closed sulci make areas after 29 GW lower bounds
     assert text.split("\n\n")[0] == Facts(2, 21, 24.5, "GW", 1, "spina bifida", "gyriflow 0.1", 29, "0.8 mm")
+    assert text == Facts(
+        "young, given as surfaces, was", "white and pial", "cerebrum and cortex", "old, older", "alone"
+    )
     stiff, led, own = (line for line in text.splitlines() if line.startswith("- "))
     assert stiff == Facts("*stiff*", "young", 21, "24.5 GW", 49, "12 h", 1234, "quadratic", 1500, "Pa", "2·10⁻⁷", "[4]")
     assert "{" not in stiff
@@ -353,7 +358,7 @@ def test_the_methods_say_what_was_run():
     assert not {"atlas", "population"} & set(own.split())
     alone, opened = (
         methods_text(
-            template, brains=brains[:1], runs=[], software=software, metrics=metrics,
+            template, brains=brains[:1], runs=[], software=software, metrics=metrics, filled=[],
             surface={"edge_length_mm": 1, "open_sulci": opens},
         ) for opens in (False, True)
     )  # fmt: skip
@@ -362,6 +367,7 @@ def test_the_methods_say_what_was_run():
     assert opened == Facts("Koenderink", "[1]") != Facts(29)
     assert alone == Facts(29) != Facts("slits")
     assert opened == Facts("slits")
+    assert "filled" not in opened
     assert caption_html(text).count("<li><p>") == 3 + 7
     assert "system-message" not in caption_html(text)
 

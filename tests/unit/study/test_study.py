@@ -29,7 +29,7 @@ def surface(brain):
 
 @pytest.fixture
 def files(tmp_path):
-    for name in ("labels.nii.gz", "left.gii", "right.gii", "pial.gii", "map.nii.gz"):
+    for name in ("labels.nii.gz", "left.gii", "right.gii", "pial.gii", "white.gii", "map.nii.gz"):
         (tmp_path / name).touch()
     return tmp_path
 
@@ -394,9 +394,35 @@ def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_the
     start = {"id": "own22", "week": 22, "pial": str(files / "pial.gii"), "population": "own"}
     found = study([start, *of_two()], **EXPECTED)
     assert list(found.chains["own22", "atlas"].posed) == [[True, False], [False, False], [False, False]]
-    assert found.brains["own22"].registered.path == "results/brains/own22/surface/mask.nii.gz"
-    assert found.brains["own22"].registered.scheme.name == "binary"
+    assert found.brains["own22"].registered.path == "results/brains/own22/surface/filled.nii.gz"
+    assert found.brains["own22"].registered.scheme.cortex
     assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
+
+
+@pytest.mark.parametrize("surfaces", ["start", "atlas", "both"])
+def test_brains_without_labels_are_filled_with_a_cortex_that_is_their_own_or_measured_on_a_similar_brain(
+    of_two, files, surfaces
+):
+    names = {"start": ["own22"], "atlas": ["b22", "b23", "b24", "b25"], "both": ["own22", "b22", "b23", "b24", "b25"]}
+
+    def given(brain, **more):
+        if brain["id"] not in names[surfaces]:
+            return brain
+        return {key: brain[key] for key in ("id", "week", "population")} | {"pial": str(files / "pial.gii")} | more
+
+    settings = EXPECTED | {"growth": {"matched_surfaces": False}}
+    brains = of_two(22, atlas=(22, 23, 24, 25))
+    found = study(map(given, brains), **settings)
+    assert found.chains["own22", "atlas"].later_weeks == [22, 23, 24]
+    source = "typical" if surfaces == "both" else "measured"
+    ids = [name for name in names[surfaces] if name != "b25"]
+    assert found.filled == [{"ids": ids, "cortex": source, "by_cortex": True}]
+    similar = {found.similar_in_thickness(found.brains[name]) for name in ids}
+    expected = {"start": "b22", "atlas": "own22", "both": None}[surfaces]
+    assert {brain and brain.id for brain in similar} == {expected}
+    with_white = study([given(brain, white=str(files / "white.gii")) for brain in brains], **settings)
+    assert [group["cortex"] for group in with_white.filled] == ["white"]
+    assert study(of_two(22), **EXPECTED).filled == []
 
 
 def test_a_brain_is_predicted_where_no_later_brain_that_it_is_compared_with_was_read(of_two):

@@ -1,0 +1,95 @@
+"""Labels filled from surfaces of known shape, and their registration with a brain of labels in another pose."""
+
+import numpy as np
+import pytest
+from atlas_brains import atlas_labels
+from scipy.linalg import polar
+from shapes import cerebrum_surface, ellipsoid, inner, moved, octasphere, rigid, sphere
+
+from gyriflow.anatomy.filled import filled_labels
+from gyriflow.anatomy.fissure import split
+from gyriflow.geometry.alignment import angle_deg
+from gyriflow.geometry.deformations import carry, transform_points
+from gyriflow.geometry.matching import nearest_on
+from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed, volume_ml
+from gyriflow.growth.channels import channels
+from gyriflow.growth.diffeomorphic import register
+from gyriflow.io.yaml_files import SCHEMES
+from gyriflow.settings.schemes import FILLED
+
+HALF_AXES = np.array([22.0, 28.0, 24.0])
+CORTEX_MM = 2.5
+
+
+def millilitres(labels, affine):
+    """Return the volumes of cortex and of the tissue inside."""
+    return [(labels == label).sum() * affine[0, 0] ** 3 / 1000 for label in (2, 1)]
+
+
+@pytest.mark.parametrize("has_white", [True, False])
+def test_cortex_and_inside_have_the_volumes_between_and_within_known_surfaces(has_white):
+    whole = ellipsoid(HALF_AXES, 4)
+    white = inner(whole, CORTEX_MM)
+    # its triangles may be in either order
+    whites = [flipped(white)] if has_white else []
+    more = {} if has_white else {"thickness_mm": CORTEX_MM}
+    cortex, inside = millilitres(*filled_labels(whole, split(whole, 0.0), 0.0, whites=whites, voxel_mm=1.0, **more))
+    assert inside == pytest.approx(volume_ml(white), rel=0.02)
+    assert cortex == pytest.approx(volume_ml(whole) - volume_ml(white), rel=0.04)
+
+
+def test_halves_are_joined_at_the_midline_where_they_nearly_touch_and_caps_have_no_cortex():
+    whole = octasphere(20.0, 4)
+    halves = [TriangleMesh(part.vertices, part.faces) for part in split(whole, 0.0)]
+    caps = [TriangleMesh(part.vertices * [0.0, 1.0, 1.0], part.faces[:, ::-1]) for part in halves]
+
+    def filled(gap_mm):
+        shifts = (-gap_mm / 2, gap_mm / 2)
+        sides = [moved(half, shift) for half, shift in zip(halves, shifts, strict=True)]
+        closed = [moved(cap, shift) for cap, shift in zip(caps, shifts, strict=True)]
+        return filled_labels(merged(*sides, *closed), sides, 0.0, thickness_mm=CORTEX_MM, voxel_mm=1.0)
+
+    (labels, affine), near, far = filled(0.0), filled(1.0), filled(6.0)
+    core = 4 / 3 * np.pi * (20.0 - CORTEX_MM) ** 3 / 1000
+    assert millilitres(labels, affine)[1] == pytest.approx(core, rel=0.02)
+    # the slit of a millimetre becomes tissue inside, with cortex at its rim only
+    rim = 0.1 * np.pi * (2.0**2 - 1.75**2)
+    assert millilitres(*near)[1] == pytest.approx(core + 0.1 * np.pi * 1.75**2, rel=0.02)
+    assert millilitres(*near)[0] == pytest.approx(millilitres(labels, affine)[0] + rim, rel=0.03)
+    # a wide gap stays, and the caps beside it are bare
+    volume, grid = far
+    index = np.rint(transform_points(np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.linalg.inv(grid))).astype(int)
+    assert volume[tuple(index.T)].tolist() == [0, 1]
+    assert sum(millilitres(*far)) == pytest.approx(volume_ml(whole), rel=0.02)
+
+
+def test_there_is_no_cortex_where_white_and_pial_surfaces_coincide():
+    whole = sphere(20.0, 4)
+    bare = whole.vertices[:, 2] < 0
+    depth = np.where(bare, 0.1, CORTEX_MM)
+    white = TriangleMesh(whole.vertices * (1 - depth / 20.0)[:, None], whole.faces)
+    labels, affine = filled_labels(whole, [whole], 0.0, whites=[white], voxel_mm=1.0)
+    z = transform_points(np.argwhere(labels == 2), affine)[:, 2]
+    assert (z > -1.5).all()
+    assert (z > 2.0).mean() > 0.8
+
+
+@pytest.mark.parametrize("has_cortex", [True, False])
+def test_a_filled_brain_registers_with_labels_in_an_oblique_pose(has_cortex):
+    surface = cerebrum_surface(*atlas_labels(22))
+    filled, affine = filled_labels(surface, split(surface, 0.0), 0.0, voxel_mm=1.6)
+    scheme, (labels, grid) = SCHEMES["spina-bifida-atlas"], atlas_labels(23)
+    pose = rigid(50.0, -35.0, 70.0, shift=(30.0, -9.0, 4.0))
+    cortex = scheme.cortex if has_cortex else ()
+    brains = [
+        channels(filled, affine, cerebrum=FILLED.cerebrum, cortex=FILLED.cortex),
+        channels(labels, pose @ grid, cerebrum=scheme.cerebrum, cortex=cortex),
+    ]
+    found = register(*brains)
+    assert found.channels == (("cerebrum", "cortex") if has_cortex else ("cerebrum",))
+    turn, _ = polar(found.deformation.matrix[:3, :3])
+    assert angle_deg(turn @ pose[:3, :3].T) < 6.0
+    later = transformed(cerebrum_surface(labels, grid), pose)
+    carried = carry(found.deformation, surface.vertices)
+    # voxels are 1.6 mm wide
+    assert nearest_on(carried, later)[0].mean() < 1.0
