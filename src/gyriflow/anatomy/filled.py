@@ -36,7 +36,7 @@ def filled_labels(
     `whole` is the closed surface; `sides` are its hemispheres, open where they were cut or capped at the midline. All
     surfaces are in the same pose. Cortex lies between the `sides` and the `whites`, or else within `thickness_mm` of
     the `sides`. Cuts, and places where white and pial surfaces coincide, have no cortex. Hemispheres are joined where
-    their gap at the fissure is as narrow as that which opens a fissure of labels, since labels touch there.
+    their gap at the fissure is no wider than the gap that opens a fissure of labels, since labels touch there.
     """
     mask, affine = surface_mask(whole, voxel_mm)
     inside = mask > 0
