@@ -3,10 +3,10 @@
 from dataclasses import asdict
 
 from gyriflow.growth.channels import channels, perturb_labels
-from gyriflow.growth.diffeomorphic import register
-from gyriflow.growth.registration_quality import measure_quality, require_good
+from gyriflow.growth.registration_quality import register_and_measure, require_good
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_values
+from gyriflow.settings.schemes import FILLED
 from gyriflow.step import step
 
 files, params, names = snakemake.input, snakemake.params, snakemake.wildcards
@@ -17,8 +17,9 @@ with step(snakemake.log[0], *files.brains):
         found = perturb_labels(volume.labels, params.seed, brain) if params.seed else volume.labels
         intensity = read_values(image, labels.affine_from, "grey values") if with_images else None
         brains.append(channels(found, volume.affine, cerebrum=scheme.cerebrum, cortex=scheme.cortex, image=intensity))
-    found = register(*brains, smoothing=params.smoothing, threads=snakemake.threads)
-    quality = measure_quality(*brains, found.deformation)
+    is_filled = any(labels.scheme == FILLED for labels in params.brains)
+    settings = {"smoothing": params.smoothing, "threads": snakemake.threads}
+    found, quality = register_and_measure(*brains, is_filled=is_filled, **settings)
     # one member of an ensemble must not end the study
     require_good(quality, pair=f"{names.earlier} to {names.later}", only_warn=params.is_varied)
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}

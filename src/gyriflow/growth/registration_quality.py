@@ -1,7 +1,7 @@
 """Quality of a registration: overlap, folding of the map, and displacement at its rim."""
 
 import logging
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..geometry.deformations import Deformation, carry, determinants, transform_points
 from ..geometry.triangles import Floats
 from .channels import CEREBRUM_BIT, CORTEX_BIT, Channels
+from .diffeomorphic import Registration, register
 
 log = logging.getLogger(__name__)
 
@@ -66,6 +67,24 @@ def measure_quality(earlier: Channels, later: Channels, deformation: Deformation
         rim_mm=float(np.quantile(lengths[rim], 0.95)),
         inside_mm=float(np.quantile(map_coordinates(lengths, index.T, order=1, mode="nearest"), 0.95)),
     )
+
+
+def register_and_measure(
+    earlier: Channels, later: Channels, *, is_filled: bool, smoothing: float = 1.0, threads: int = 1
+) -> tuple[Registration, RegistrationQuality]:
+    """Register two brains by `register` and measure the quality.
+
+    If the cortex of one `is_filled` from surfaces, it may be far from that of labels, which are coarse or of another
+    kind. If both overlap too little, the brains are registered without cortex, with a warning.
+    """
+    found = register(earlier, later, smoothing=smoothing, threads=threads)
+    quality = measure_quality(earlier, later, found.deformation)
+    if not (is_filled and quality.dice_cortex < MIN_DICE["cortex"]):
+        return found, quality
+    overlap = f"Dice {quality.dice_cortex:.2f}, expected {MIN_DICE['cortex']:.2f} or more"
+    log.warning("the cortex filled from surfaces is not that of the labels (%s): registered without cortex", overlap)
+    brains = [replace(brain, cortex=None) for brain in (earlier, later)]
+    return register_and_measure(*brains, is_filled=False, smoothing=smoothing, threads=threads)
 
 
 def require_good(quality: RegistrationQuality, *, pair: str, only_warn: bool = False) -> None:

@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 from atlas_brains import atlas_labels
+from facts import Facts
 from scipy.linalg import polar
-from shapes import cerebrum_surface, ellipsoid, inner, moved, octasphere, rigid, sphere
+from shapes import cerebrum_surface, ellipsoid, inner, moved, octasphere, phantom, rigid, sphere
 
 from gyriflow.anatomy.filled import filled_labels
 from gyriflow.anatomy.fissure import split
+from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.deformations import carry, transform_points
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed, volume_ml
 from gyriflow.growth.channels import channels
-from gyriflow.growth.diffeomorphic import register
+from gyriflow.growth.registration_quality import register_and_measure, require_good
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import FILLED
 
@@ -74,22 +76,37 @@ def test_there_is_no_cortex_where_white_and_pial_surfaces_coincide():
     assert (z > 2.0).mean() > 0.8
 
 
-@pytest.mark.parametrize("has_cortex", [True, False])
-def test_a_filled_brain_registers_with_labels_in_an_oblique_pose(has_cortex):
-    surface = cerebrum_surface(*atlas_labels(22))
-    filled, affine = filled_labels(surface, split(surface, 0.0), 0.0, voxel_mm=1.6)
-    scheme, (labels, grid) = SCHEMES["spina-bifida-atlas"], atlas_labels(23)
+@pytest.mark.parametrize(
+    ("brain_of", "has_cortex", "compared"),
+    # the cortex of the shipped brains is thinner than these voxels
+    [
+        (phantom, True, ("cerebrum", "cortex")),
+        (atlas_labels, False, ("cerebrum",)),
+        (atlas_labels, True, ("cerebrum",)),
+    ],
+)
+def test_a_filled_brain_registers_with_labels_in_an_oblique_pose_by_what_both_have(
+    caplog, brain_of, has_cortex, compared
+):
+    surface, (labels, grid) = cerebrum_surface(*brain_of(24.0)), brain_of(25.0)
+    voxel, x = np.abs(grid[:3, :3]).max(), surface.vertices[:, 0].mean()
+    filled, affine = filled_labels(surface, split(surface, x), x, voxel_mm=voxel)
     pose = rigid(50.0, -35.0, 70.0, shift=(30.0, -9.0, 4.0))
-    cortex = scheme.cortex if has_cortex else ()
+    scheme = SCHEMES["spina-bifida-atlas"]
     brains = [
         channels(filled, affine, cerebrum=FILLED.cerebrum, cortex=FILLED.cortex),
-        channels(labels, pose @ grid, cerebrum=scheme.cerebrum, cortex=cortex),
+        channels(labels, pose @ grid, cerebrum=scheme.cerebrum, cortex=scheme.cortex if has_cortex else ()),
     ]
-    found = register(*brains)
-    assert found.channels == (("cerebrum", "cortex") if has_cortex else ("cerebrum",))
+    found, quality = register_and_measure(*brains, is_filled=True)
+    require_good(quality, pair="24 to 25")
+    assert found.channels == compared
+    assert caplog.messages == [Facts("0.60")] * (has_cortex and compared == ("cerebrum",))
     turn, _ = polar(found.deformation.matrix[:3, :3])
     assert angle_deg(turn @ pose[:3, :3].T) < 6.0
     later = transformed(cerebrum_surface(labels, grid), pose)
-    carried = carry(found.deformation, surface.vertices)
-    # voxels are 1.6 mm wide
-    assert nearest_on(carried, later)[0].mean() < 1.0
+    assert nearest_on(carry(found.deformation, surface.vertices), later)[0].mean() < 0.6 * voxel
+    if has_cortex and len(compared) == 1:
+        # two brains of labels would be refused
+        _, quality = register_and_measure(*brains, is_filled=False)
+        with pytest.raises(InputError, check=Facts("cortex", 0.6)):
+            require_good(quality, pair="24 to 25")
