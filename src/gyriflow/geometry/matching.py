@@ -162,17 +162,16 @@ def match_points(points: Floats, normals: Floats, mesh: TriangleMesh) -> Match:
 def match_layers(points: Floats, normals: Floats, inner: Floats, mesh: TriangleMesh, inner_of_mesh: Floats) -> Match:
     """Match (n, 3) points with unit normals to a surface by their places and by those of tissue below them.
 
-    `inner` (n, 3) and `inner_of_mesh`, at the vertices of the mesh, are points of that tissue: they tell the banks of a
-    sulcus from each other, and its bottom from its lips, also where one surface has no sulcus yet. A match has the
-    smallest sum of both squared distances, among the match by normals, the vertices of the mesh and the middles of its
-    edges.
+    `inner` (n, 3) and `inner_of_mesh`, at the vertices of the mesh, are points of that tissue: they distinguish the
+    banks of a sulcus, and its bottom from its lips, also where one surface has no sulcus yet. A match has the smallest
+    sum of both squared distances, among the match by normals, the vertices of the mesh and the middles of its edges.
     """
     match = match_points(points, normals, mesh)
-    apart = [values_at(match, mesh.vertices) - points, values_at(match, inner_of_mesh) - inner]
+    misfit = [values_at(match, mesh.vertices) - points, values_at(match, inner_of_mesh) - inner]
     ends = np.concatenate([np.repeat(np.arange(len(mesh.vertices))[:, None], 2, axis=1), edges(mesh)[0]])
     places = np.hstack([mesh.vertices[ends].mean(axis=1), inner_of_mesh[ends].mean(axis=1)])
     distance, nearest = cKDTree(places).query(np.hstack([points, inner]))
-    better = distance < np.linalg.norm(np.hstack(apart), axis=1)
+    better = distance < np.linalg.norm(np.hstack(misfit), axis=1)
     rows, nearest = np.flatnonzero(better), nearest[better]
     match.corners[rows], match.weights[rows] = ends[nearest][:, [0, 1, 1]], [0.5, 0.5, 0.0]
     match.distance_mm[rows] = np.linalg.norm(places[nearest, :3] - points[rows], axis=1)

@@ -22,7 +22,7 @@ from .matched_surfaces import follow_surfaces
 log = logging.getLogger(__name__)
 
 INNER_MM = 2.0
-"""Depth below a surface of the tissue that tells the banks of a sulcus from each other: about that of the cortex."""
+"""Depth below a surface of the tissue that distinguishes the banks of a sulcus: about that of the cortex."""
 PULL_MM = (4.0, 2.5, 1.5, 1.0)
 """Smoothing (SD, mm) of the pull towards a surface, round by round."""
 PULL_TOL = 1e-3
@@ -116,7 +116,7 @@ def carry_sharply(
     Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
     week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
 
-    With `open_sulci` the surfaces have slits that registration by labels does not know. Then points are matched by the
+    With `open_sulci` the surfaces have slits that registration by labels does not show. Then points are matched by the
     tissue below them, too, and a body is drawn to its surface twice.
 
     The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
