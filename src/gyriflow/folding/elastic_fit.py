@@ -51,15 +51,19 @@ depth of tissue. Stiff springs over the whole way take more iterations and press
 SOFT_MM = 4.0
 """Radius around an inverted element or crossing face on the path within which springs stay soft; it grows with each
 attempt."""
+SOFTER = 4.0
+"""Factor by which springs are softened if no solution is found with them."""
 MAX_DRAWS = 3
 """Attempts to draw the boundary to its goals with no such element or face on the path."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
-MAX_HALVINGS = 5
-"""Largest number of times that a step which fails is halved."""
-SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=30)
+MAX_LEFT_MM = 1.0
+"""Largest distance, as a root mean square, at which a body may stay from a shape."""
+MAX_HALVINGS, MAX_DRAW_HALVINGS = 5, 1
+"""Largest number of times that a step which fails is halved, and one that only draws the boundary."""
+SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=15)
 """Loose tolerances: the next step starts from where the body is."""
 
 
@@ -135,8 +139,9 @@ class ElasticFit:
     def follow(self, shape: Floats) -> Floats:
         """Move the body to near a shape (n, 3) in mm, which may have inverted elements; return its (n, 3) positions.
 
-        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. SolverError
-        with the place where it cannot go on.
+        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. Where it
+        cannot go on it stays, with a warning, or SolverError with the place if its boundary is still more than
+        `MAX_LEFT_MM` from that of the shape (root mean square).
         """
         boundary = self.boundary
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
@@ -147,7 +152,14 @@ class ElasticFit:
         for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left
             strain = log_growth(self.positions_mm, self._stretches, displacement, SMOOTHING_MM)
-            self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
+            try:
+                self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
+            except SolverError as error:
+                misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
+                if misfit_mm > MAX_LEFT_MM:
+                    raise
+                log.warning("the body comes within %.2f mm of a shape and no further: %s", misfit_mm, error)
+                break
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats:
@@ -155,30 +167,28 @@ class ElasticFit:
 
         `before` are the last two shapes (n, 3) at most, if any. The path from them must have no inverted elements and
         no crossing faces: where it has, the boundary is drawn less, and faults left after the last attempt are warned
-        of. A body that cannot be drawn stays as it is.
+        of. Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
-        lengths = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
+        lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
         for attempt in range(1, MAX_DRAWS + 1):
-            self.positions_mm = start
+            self.positions_mm, problem = start, ""
             try:
-                self._step(transform_points(goals, motion), lengths, None, MAX_HALVINGS)
+                self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
             except SolverError as error:
-                self.positions_mm = start
-                log.warning("the body is not drawn to a surface: %s", error)
-                break
+                self.positions_mm, problem = start, f"the body is not drawn to a surface: {error}"
+                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
+                continue
             faults = self._faults_since(before) if before else np.empty((0, 3))
             if not len(faults):
                 break
+            place = np.round(faults[0], 1).tolist()
+            problem = f"{len(faults)} elements or faces are inverted or cross on the way to a shape, near {place} mm"
             distance, _ = cKDTree(faults).query(self.boundary.vertices)
             lengths[distance < attempt * SOFT_MM] = SPRING_LENGTH_MM
-        else:
-            log.warning(
-                "%d elements or faces are inverted or cross on the way to a shape, near %s mm",
-                len(faults),
-                np.round(faults[0], 1).tolist(),
-            )
+        if problem:
+            log.warning("%s", problem)
         return self._move(np.linalg.inv(motion))
 
     def _faults_since(self, before: Sequence[Floats]) -> Floats:

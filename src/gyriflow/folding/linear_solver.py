@@ -144,7 +144,7 @@ def positive_inverses(matrices: Floats) -> Floats:
 
 
 class LinearSolver:
-    """Solver of the linear systems of a problem; a solve fails after `max_iterations`.
+    """Solver of the linear systems of a problem; a solve ends after `max_iterations`.
 
     It keeps the preconditioner and the last shift: they affect how a direction is found, not the solution of a step.
     """
@@ -184,7 +184,8 @@ class LinearSolver:
             reason, direction = self._run(tangent, residual)
             tangent.shift_diagonal(0.0)
             iterations += direction.iterations
-            if reason > 0:
+            # conjugate gradients that end early have a descent direction as well (Dembo and Steihaug 1983)
+            if reason > 0 or reason == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT:
                 self._level = level
                 return replace(direction, iterations=iterations, rung=SHIFTED if level else PLAIN, convex=level == 0)
             if reason not in INDEFINITE:

@@ -84,3 +84,6 @@ def test_a_shape_that_cannot_be_reached_is_refused_with_its_place(monkeypatch):
     monkeypatch.setattr(elastic_fit, "MAX_HALVINGS", 1)
     with pytest.raises(SolverError, check=Facts("det F", "element", "mm")):
         ElasticFit(BODY).follow(BODY.vertices * [1.6, 0.6, 1.0])
+    # close to the shape, the body stays where it is
+    found = ElasticFit(BODY).follow(BODY.vertices * [1.02, 0.98, 1.0])
+    assert (volumes_between(found, BODY.tets) > 0).all()
