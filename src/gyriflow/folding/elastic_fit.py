@@ -63,8 +63,8 @@ MAX_LEFT_MM = 1.0
 """Largest distance, as a root mean square, at which a body may stay from a shape."""
 MAX_HALVINGS, MAX_DRAW_HALVINGS = 5, 1
 """Largest number of times that a step which fails is halved, and one that only draws the boundary."""
-SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=15)
-"""Loose tolerances: the next step starts from where the body is."""
+SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=4, max_krylov=500)
+"""Loose tolerances and low limits: the next step starts from where the body is, and a failed one is made smaller."""
 
 
 class Springs:
