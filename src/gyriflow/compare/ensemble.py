@@ -1,10 +1,11 @@
 """Intervals and spread of an ensemble: the members of a run, with uncertain inputs varied."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
+from scipy.stats import norm, t
 
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
@@ -19,19 +20,46 @@ SULCUS, GYRUS = -0.375, 0.375
 Koenderink & van Doorn 1992."""
 
 
-def prediction_interval(values: Sequence[float] | Floats, level: float = LEVEL) -> tuple[float, float]:
+TESTED = ("area", "volume")
+"""The metrics of which the error of predictions is known from tests."""
+
+
+def prediction_interval(
+    values: Sequence[float] | Floats, level: float = LEVEL, method_sd: float = 0.0
+) -> tuple[float, float]:
     """Return the two-sided prediction interval for one further value of a normal sample.
 
-    It is mean ± t s √(1 + 1/n) with Student's t of n − 1 degrees of freedom; NaN for fewer than two values.
+    It is mean ± √(t² s² (1 + 1/n) + z² m²) with Student's t of n − 1 degrees of freedom, the normal quantile z, and the
+    standard deviation m of an error that all values share, `method_sd`; NaN for fewer than two values.
     """
     n = len(values)
     if n < 2:
         return np.nan, np.nan
-    half = t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n)
+    upper = (1 + level) / 2
+    half = np.hypot(t.ppf(upper, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n), norm.ppf(upper) * method_sd)
     return float(np.mean(values) - half), float(np.mean(values) + half)
 
 
-def interval_table(run: pd.DataFrame, members: pd.DataFrame, observed: pd.DataFrame) -> pd.DataFrame:
+def method_errors(tests: Sequence[Mapping[str, Any]], horizon_gw: float) -> dict[str, float]:
+    """Return the root mean square error of predictions by horizon for each of `TESTED`, as a fraction.
+
+    `tests` are the rows of `norms/predictions.yaml`. The error is linear between tested horizons, from none at 0, and
+    constant beyond the last.
+    """
+    rows = pd.DataFrame(tests).query("model == 'run'")
+    errors = {}
+    for metric in TESTED:
+        squares = (rows[f"{metric}_error"] ** 2).groupby(rows["horizon"]).mean()
+        errors[metric] = float(np.interp(horizon_gw, [0.0, *squares.index], [0.0, *np.sqrt(squares)]))
+    return errors
+
+
+def interval_table(
+    run: pd.DataFrame,
+    members: pd.DataFrame,
+    observed: pd.DataFrame,
+    tests: Sequence[Mapping[str, Any]] = (),
+) -> pd.DataFrame:
     """Return the intervals of whole brains by week and metric.
 
     Parameters
@@ -39,23 +67,28 @@ def interval_table(run: pd.DataFrame, members: pd.DataFrame, observed: pd.DataFr
     run, members, observed
         Metrics with columns week, hemisphere, metric, value, unit; of the run, of all its members, and of the observed
         brains of its weeks. `observed` may be empty.
+    tests
+        Of a prediction, the tests of `method_errors`.
 
     Returns
     -------
     DataFrame
-        Columns week, metric, unit, run (its value), members (number of values), mean, sd, low, high, observed (NaN
-        without a brain) and contains_observed. A member that did not reach a week has no value there.
+        Columns week, metric, unit, run (its value), members (number of values), mean, sd, method_sd (of `tests`, NaN if
+        the metric was not tested), low, high, observed (NaN without a brain) and contains_observed. A member that did
+        not reach a week has no value there.
     """
     keys = ["week", "metric"]
     own, others, brains = (
         table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
     )
-    values = others.groupby(keys)["value"]
-    found = pd.DataFrame({"members": values.count(), "mean": values.mean(), "sd": values.std()})
-    # groups are in the order of the index
-    ends = np.array([prediction_interval(group.to_numpy()) for _, group in values]).reshape(-1, 2)
-    found["low"], found["high"] = ends.T
-    table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(found.reset_index(), "left", keys)
+    rows, start = [], own["week"].min()
+    for (week, metric), group in others.groupby(keys)["value"]:
+        error = method_errors(tests, week - start).get(str(metric), np.nan) if len(tests) else np.nan
+        method_sd = error * group.mean()
+        low, high = prediction_interval(group.to_numpy(), method_sd=np.nan_to_num(method_sd))
+        statistics = {"members": len(group), "mean": group.mean(), "sd": group.std(), "method_sd": method_sd}
+        rows.append({"week": week, "metric": metric, **statistics, "low": low, "high": high})
+    table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(pd.DataFrame(rows), "left", keys)
     table = table.merge(brains.groupby(keys)["value"].first().rename("observed").reset_index(), "left", keys)
     inside = table["observed"].between(table["low"], table["high"]).astype("boolean")
     return table.assign(

@@ -6,7 +6,7 @@ import pytest
 from scripts import run_script
 from shapes import rigid, sphere
 
-from gyriflow.compare.ensemble import ensemble_maps, interval_table, prediction_interval
+from gyriflow.compare.ensemble import ensemble_maps, interval_table, method_errors, prediction_interval
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_table, write_table
@@ -50,6 +50,22 @@ def test_intervals_are_of_the_members_that_reached_a_week_and_say_whether_they_c
     assert found.loc[("volume", 24.0), ["low", "high"]].tolist() == [10, 10]
 
 
+def test_tested_errors_of_predictions_widen_intervals_with_the_horizon():
+    rows = [("run", 2.0, 0.03), ("run", 2.0, -0.04), ("run", 4.0, 0.1), ("scaled", 2.0, 9.0)]
+    tests = [{"model": model, "horizon": h, "area_error": e, "volume_error": 0.0} for model, h, e in rows]
+    found = {horizon: method_errors(tests, horizon)["area"] for horizon in (0.0, 1.0, 2.0, 4.0, 9.0)}
+    two = np.sqrt((0.03**2 + 0.04**2) / 2)
+    assert found == pytest.approx({0.0: 0, 1.0: two / 2, 2.0: two, 4.0: 0.1, 9.0: 0.1})
+    run = pd.concat([metrics(24.0, 100), metrics(28.0, 140)])
+    members = pd.concat([metrics(28.0, area) for area in (139, 140, 141)])
+    wide, narrow = (interval_table(run, members, run[:0], given).set_index(["metric", "week"]) for given in (tests, []))
+    # t of two degrees of freedom, and the normal distribution
+    half = np.hypot(2.9200 * np.sqrt(4 / 3), 1.6449 * 14.0)
+    assert wide.loc[("area", 28.0), ["low", "high"]].tolist() == pytest.approx([140 - half, 140 + half], rel=1e-4)
+    assert wide.loc[("volume", 28.0), "high"] == narrow.loc[("volume", 28.0), "high"] == 10
+    assert np.isnan(narrow.loc[("area", 28.0), "method_sd"])
+
+
 def test_spread_is_that_of_places_after_rigid_alignment():
     mesh = sphere(20.0, 3)
     far = mesh.vertices[:, 2] > 15
@@ -73,7 +89,7 @@ def test_spread_is_that_of_places_after_rigid_alignment():
 def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path):
     for name, area in (("run", 100), ("one", 99), ("two", 101)):
         write_table(tmp_path / f"{name}.csv", metrics(24.0, area))
-    inputs = {"run": ["run.csv"], "members": ["one.csv", "two.csv"], "observed": []}
+    inputs = {"run": ["run.csv"], "members": ["one.csv", "two.csv"], "observed": [], "accuracy": []}
     run_script("ensemble.py", tmp_path, inputs, {0: "found.csv"})
     assert read_table(tmp_path / "found.csv")["contains_observed"].isna().all()
     surfaces = {"run": 20.0, "one": 21.0, "two": 19.0}
