@@ -236,9 +236,10 @@ def test_missing_tissues_are_named_and_a_missing_fissure_is_cut(study):
     found, plain = study.report("holoprosencephaly"), study.report("plain")
     assert found["volume_mL"] == pytest.approx(cerebrum_ml(odd_brains.holoprosencephaly(LABELS, AFFINE)), rel=0.01)
     area = found["area_cm2"]
-    assert area["left"] == pytest.approx(area["right"], rel=0.03)
+    # in front, each side is what is nearer to its own tissue
+    assert area["left"] == pytest.approx(area["right"], rel=0.05)
     # the walls of the fissure in front are not there
-    assert area["whole"] / plain["area_cm2"]["whole"] == pytest.approx(0.94, abs=0.02)
+    assert area["whole"] / plain["area_cm2"]["whole"] == pytest.approx(0.93, abs=0.02)
 
 
 @pytest.mark.fault(48, 52)

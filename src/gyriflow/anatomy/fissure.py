@@ -22,6 +22,7 @@ from ..geometry.triangles import (
     TriangleMesh,
     area_vectors,
     corners,
+    edges,
     face_areas,
     face_components,
     mean_edge_length,
@@ -518,6 +519,17 @@ def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMes
         found = f"{int(left.sum())} of {len(left)} faces on the left"
         raise InputError(problem, found=found, expected="two hemispheres")
     return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
+
+
+def cut_middle(left: TriangleMesh, right: TriangleMesh) -> float:
+    """Return the mean x in mm of the cut between hemispheres, or of the gap between them if both are closed."""
+    borders = []
+    for side in (left, right):
+        pairs, counts = edges(side)
+        borders.append(side.vertices[np.unique(pairs[counts == 1]), 0])
+    if cut := [border for border in borders if len(border)]:
+        return float(np.mean(np.concatenate(cut)))
+    return float((left.vertices[:, 0].max() + right.vertices[:, 0].min()) / 2)
 
 
 def smallest_gap(left: TriangleMesh, right: TriangleMesh) -> float:

@@ -45,6 +45,7 @@ from .fissure import (
     FISSURE_MM,
     Fissure,
     MidPlane,
+    cut_middle,
     cut_share,
     cut_sides,
     fissure_between,
@@ -469,6 +470,9 @@ def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pos
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
+    if not left.vertices[:, 0].mean() < fissure_x < right.vertices[:, 0].mean():
+        doubts.append("the mid-plane is not between the unequal hemispheres: the middle of their cut is used")
+        fissure_x = cut_middle(left, right)
     if plane.fissure_points == 0:
         doubts.append("no fissure was found between facing walls: the plane of mirror symmetry is used")
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
