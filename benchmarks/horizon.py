@@ -23,8 +23,8 @@ import yaml
 
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
-from gyriflow.settings.atlas import ATLASES
 from gyriflow.settings.terms import SIDES
+from gyriflow.shipped import ATLASES
 from gyriflow.study.paths import ENSEMBLE, pial_of, white_of
 from workflow import call
 

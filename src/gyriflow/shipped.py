@@ -8,5 +8,11 @@ INSTALLED = PACKAGE / "shipped"
 SHIPPED = INSTALLED if INSTALLED.is_dir() else PACKAGE.parents[1]
 """The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config` and `profiles`."""
 DEMO = SHIPPED / "config" / "config.yaml"
+ATLASES = SHIPPED / "atlases"
 CONFIG = "gyriflow.yaml"
 """Name of the default configuration."""
+
+
+def shipped_atlases() -> list[str]:
+    """Return the names of the atlases that come with gyriflow."""
+    return sorted(path.parent.name for path in ATLASES.glob("*/atlas.yaml"))

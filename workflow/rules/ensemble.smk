@@ -27,9 +27,7 @@ rule ensemble:
             brains[0].measurement for brains in simulation_of(w).observed_brains.values()
         ),
         # the tested errors of predictions
-        accuracy=lambda w: (
-            f"{workflow.basedir}/norms/predictions.yaml" if simulation_of(w).is_atlas_prediction else []
-        ),
+        accuracy=lambda w: PREDICTION_TESTS if simulation_of(w).is_atlas_prediction else [],
         # all members at once, not one after the other as `reaches` asks for them
         summaries=lambda w: [member.file(FOLDING["summary"]) for member in ensemble_of(w)[1]],
     output:

@@ -100,11 +100,6 @@ def chain_of(wildcards):
     return study.chains[wildcards.brain, wildcards.origin]
 
 
-def is_own_growth(wildcards):
-    """Return whether targets are those of the start's own later brains."""
-    return wildcards.origin.partition(".")[0] == "self"
-
-
 # shapes of a start brain's mesh in later weeks, for runs that grow towards them
 rule targets:
     input:
@@ -115,7 +110,7 @@ rule targets:
         surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
         reports=lambda w: [brain.report for brain in chain_of(w).later],
         # norms of another study, whose volumes the curve of an atlas follows as well
-        norms=lambda w: [] if is_own_growth(w) else CONFIG.metrics.norms or [],
+        norms=lambda w: CONFIG.metrics.norms if CONFIG.metrics.norms and chain_of(w).origin == "atlas" else [],
     output:
         TARGETS,
     log:
@@ -135,7 +130,7 @@ rule targets:
         stated_weeks=lambda w: chain_of(w).later_weeks,
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
-        is_own_growth=is_own_growth,
+        is_own_growth=lambda w: chain_of(w).origin == "self",
         open_sulci=CONFIG.opens_sulci,
         by_size=CONFIG.growth.atlas_ages == "size",
         variation=lambda w: chain_of(w).variation,

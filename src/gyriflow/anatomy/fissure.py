@@ -456,7 +456,7 @@ def _links(first: Ints, second: Ints, size: int) -> sparse.csr_matrix:
 
 
 def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floats) -> tuple[Mask, list[str]]:
-    """Return the (m,) mask of the faces of each hemisphere's largest piece, and warnings of what is left out.
+    """Return the (m,) mask of the faces of each hemisphere's largest piece, and warnings of the pieces left out.
 
     `sides` has the (m,) mask of each hemisphere's faces; `to_file` (4, 4) leads to the coordinates of places in
     messages. InputError if more than `MAX_LEFT_OUT` of a hemisphere's area would be left out.

@@ -14,8 +14,7 @@ from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
 from ..running.machine import available_cores
-from ..settings.atlas import shipped_atlases
-from ..shipped import CONFIG, DEMO, SHIPPED
+from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
 if TYPE_CHECKING:
     from .recognition import FoundScans

@@ -13,15 +13,13 @@ from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 
 QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
 """The metrics of whole brains that have intervals."""
+TESTED = ("area", "volume")
+"""Those whose prediction error is known from tests."""
 LEVEL = 0.9
 """Coverage of the prediction interval for one further member."""
 SULCUS, GYRUS = -0.375, 0.375
-"""Shape index up to which a vertex counts as sulcus, and from which on as gyrus: the limits of rut and ridge of
-Koenderink & van Doorn 1992."""
-
-
-TESTED = ("area", "volume")
-"""The metrics of which the error of predictions is known from tests."""
+"""Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
+1992."""
 
 
 def prediction_interval(
@@ -78,13 +76,13 @@ def interval_table(
         not reach a week has no value there.
     """
     keys = ["week", "metric"]
-    own, others, brains = (
+    own, varied, brains = (
         table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
     )
     rows, start = [], own["week"].min()
-    for (week, metric), group in others.groupby(keys)["value"]:
-        error = method_errors(tests, week - start).get(str(metric), np.nan) if len(tests) else np.nan
-        method_sd = error * group.mean()
+    errors = {week: method_errors(tests, week - start) if tests else {} for week in own["week"].unique()}
+    for (week, metric), group in varied.groupby(keys)["value"]:
+        method_sd = errors[week].get(str(metric), np.nan) * group.mean()
         low, high = prediction_interval(group.to_numpy(), method_sd=np.nan_to_num(method_sd))
         statistics = {"members": len(group), "mean": group.mean(), "sd": group.std(), "method_sd": method_sd}
         rows.append({"week": week, "metric": metric, **statistics, "low": low, "high": high})
@@ -109,9 +107,8 @@ def ensemble_maps(
     -------
     dict
         position_sd_mm, the root mean square distance of the members from their mean position, with n − 1, NaN for
-        fewer than two; and
-        sulcus_probability and gyrus_probability, the shares of run and members in which the vertex is sulcus
-        or gyrus.
+        fewer than two; and sulcus_probability and gyrus_probability, the shares of run and members in which the
+        vertex is sulcus or gyrus.
     """
     areas = vertex_areas(run)
     motions = [rigid_fit(member.vertices, run.vertices, areas) for member in members]

@@ -364,8 +364,8 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
         )
         if is_better
     ]
-    simpler = f" On average the atlas' own brain was {' and '.join(better)}; it is given beside the prediction."
-    simpler = simpler if better else ""
+    words = " and ".join(better)
+    simpler = f" On average the atlas' own brain was {words}; it is given beside the prediction." if better else ""
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
         f"This is a prediction, not a scan. In tests over {horizon:g} weeks, the mean distance from the observed brain "

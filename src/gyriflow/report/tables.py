@@ -266,7 +266,7 @@ def predicted_table(
         columns[head] = of_brain(rows, "value", *key)
         if len(texts := of_brain(scores, "text", *key)):
             columns[f"{head}: centile (90 % interval), z"] = texts
-        if intervals is not None and key[0] == "brain" and key[1] != MEASURED:
+        if intervals is not None and key[1] == prediction["run"]:
             last = intervals[intervals["week"] == prediction["week"]].assign(name=_named).set_index("name")
             ends = zip(last["low"], last["high"], strict=True)
             columns["90 % interval of the ensemble"] = pd.Series([f"{a:.4g} to {b:.4g}" for a, b in ends], last.index)

@@ -8,12 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from ..shipped import SHIPPED
+from ..shipped import ATLASES, shipped_atlases
 from .base import KeyProblem, Settings, did_you_mean, located, refused
 from .terms import AffineSource, Coordinates
 from .varying import AnyWeek
 
-ATLASES = SHIPPED / "atlases"
 """Folder of the atlases that come with gyriflow, each in a folder of its own."""
 SULCI = ATLASES / "spina-bifida"
 """The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
@@ -156,11 +155,6 @@ class Atlas(Settings):
     def brain_id(self, series: str, week: float) -> str:
         """Return the id of a brain: `NAME-SERIES-WEEK`, or `NAME-WEEK` where the atlas has one series."""
         return "-".join([self.name, *([series] if len(self.series) > 1 else []), f"{week:g}"])
-
-
-def shipped_atlases() -> list[str]:
-    """Return the names of the atlases that come with gyriflow."""
-    return sorted(path.parent.name for path in ATLASES.glob("*/atlas.yaml"))
 
 
 # in a study

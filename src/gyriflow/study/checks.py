@@ -112,6 +112,7 @@ def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProble
 def runs(config: Config) -> Iterator[KeyProblem]:
     """Yield problems between the settings of each run and its start brains."""
     by_id = {brain.id: brain for brain in config.brains}
+    of_sweeps = {member for sweep in config.studies.items() for member, _ in variants(*sweep)}
     for name, run in config.runs.items():
         brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
         weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
@@ -120,7 +121,7 @@ def runs(config: Config) -> Iterator[KeyProblem]:
             for problem in value_problems(run, week, {}, called):
                 yield KeyProblem(problem.text, _place(name, problem.key, config))
         for member in members_of(name, run):
-            if member in config.runs or any(member in dict(variants(*sweep)) for sweep in config.studies.items()):
+            if member in config.runs or member in of_sweeps:
                 yield KeyProblem(f"is the name of a member of the ensemble of {name}; rename it", ("runs", member))
         for key in VARYING if len(brains) > 1 else ():
             value = getattr(run, key)

@@ -18,6 +18,8 @@ PLACE = "results/{where}"
 """The metrics of a brain, measured or simulated."""
 PUBLISHED = str(SHIPPED / "workflow" / "published" / "fetalfoldsim.yaml")
 """Values reported by the paper."""
+PREDICTION_TESTS = str(SHIPPED / "norms" / "predictions.yaml")
+"""Accuracy of predictions of brains with a later scan."""
 
 
 def file_of(pattern: str, **names: str | float) -> str:

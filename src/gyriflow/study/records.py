@@ -158,10 +158,11 @@ class Chain:
     `variation` is that of a member of an ensemble.
     """
 
+    origin: Origin
     brains: tuple[Brain, ...]
     correspondences: tuple[str, ...]
     posed: tuple[list[bool], ...]
-    further_weeks: tuple[float, ...]
+    further_weeks: tuple[float, ...] = ()
     variation: Variation | None = None
 
     @property
@@ -248,6 +249,11 @@ class Simulation:
         if self.shapes is None:
             return []
         return paths.TARGETS.format(brain=self.start.id, origin=chain_name(self.shapes, self.run, self.member_of))
+
+    @property
+    def atlas_surface(self) -> str:
+        """The file with the atlas' own brain beside the last week of a prediction."""
+        return self.file(paths.ATLAS_BRAIN, week=self.weeks[-1])
 
     @property
     def has_growth_maps(self) -> bool:

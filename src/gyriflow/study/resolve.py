@@ -19,11 +19,9 @@ from ..settings.terms import SIDES
 from .atlases import known_checksums, used_atlases
 from .paths import CURVES
 from .records import Brain, CalibrationRuns, Chain, Origin, Simulation, Sweep, chain_name
-from .series import Series, series_of, several_subjects
+from .series import UNVARIED, Series, series_of, several_subjects
 from .study import Study
 
-UNVARIED = (1.0, 0)
-"""Factor of the smoothing, and seed of the perturbed labels, of the registrations of runs."""
 MAX_BEYOND_ATLAS_GW = 0.5
 """How far the growth of an atlas is extrapolated for members of an ensemble that are older than stated."""
 Chains = Mapping[tuple[str, str], Chain]
@@ -250,63 +248,71 @@ def _chains(plan: Sequence[_Planned], series: Series, brains: Sequence[Brain]) -
         ends[planned.start] = max(planned.settings.end_week, ends.get(planned.start, 0.0))
     chains: dict[tuple[str, str], Chain] = {}
     for start, end in ends.items():
-        chains[start.id, "self"] = _chain(_own_chain(start, end, series), series)
-        further = [week for week in _later_observed_weeks(start, brains) if week <= end]
+        chains[start.id, "self"] = _chain("self", _own_chain(start, end, series), series)
         atlases = series.from_other_populations(start)
         names = atlases if len(atlases) == 1 else []
-        chains[start.id, "atlas"] = _chain(_atlas_chain(start, start.week, end, names, series), series, further)
+        chain = _chain("atlas", _atlas_chain(start, start.week, end, names, series), series)
+        observed = _later_observed_weeks(start, brains)
+        further = tuple(week for week in observed if week <= end and week not in chain.later_weeks)
+        chains[start.id, "atlas"] = replace(chain, further_weeks=further)
     for planned in plan:
-        if (variation := planned.variation) is None or planned.chain is None:
-            continue
-        start, end = planned.start, planned.settings.end_week
-        if planned.shapes == "self":
-            # ages of one series have the same error
-            chain_brains, further = _own_chain(start, end, series), []
-            variation = replace(variation, age_shift_gw=0.0)
-            start_variation = atlas_variation = variation.registration_smoothing, variation.seed
-        else:
-            names = series.from_other_populations(start, all_atlases=True)
-            names = [name for name in names if _covers(series.brains[name], start.week, end)]
-            name, round_of_atlases = variation.number % max(len(names), 1), variation.number // max(len(names), 1)
-            atlas_weeks = [brain.week for brain in series.brains[names[name]]] if names else [start.week, end]
-            # the age of the whole run is shifted, as far as the atlas goes, or a little further
-            low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
-            variation = replace(variation, age_shift_gw=round(min(max(variation.age_shift_gw, low), high), 2))
-            week, end_week = start.week + variation.age_shift_gw, end + variation.age_shift_gw
-            further = sorted({*(w for w in _later_observed_weeks(start, brains) if w <= end), end})
-            chain_brains = _atlas_chain(start, week, end_week, names[name : name + 1], series)
-            start_variation = variation.registration_smoothing, variation.seed
-            # one of two, so that members share the registrations between the atlas' brains
-            atlas_variation = (SMOOTHING_RANGE[1], 0) if round_of_atlases % 2 else UNVARIED
-        chain = _chain(chain_brains, series, further, start_variation, atlas_variation)
-        if planned.shapes == "self" and chain.correspondences == chains[start.id, "self"].correspondences:
+        if planned.variation is not None and planned.chain is not None:
+            chains[planned.chain] = _varied_chain(planned, planned.variation, series, brains)
+    return chains
+
+
+def _varied_chain(planned: _Planned, variation: Variation, series: Series, brains: Sequence[Brain]) -> Chain:
+    """Return the chain of a member of an ensemble. InputError if it is that of its run."""
+    start, end = planned.start, planned.settings.end_week
+    varied = variation.registration_smoothing, variation.seed
+    if planned.shapes == "self":
+        chain = _chain("self", _own_chain(start, end, series), series, varied, varied)
+        if chain.later and chain == _chain("self", chain.brains, series):
             raise InputError(
                 f"the members of the ensemble of run {planned.member_of} would be equal: the surfaces of "
                 f"{start.id} and its later brains are matched by their vertices, so there are no registrations to vary",
                 remedy="Remove ensemble, or set growth.matched_surfaces to false.",
             )
-        chains[planned.chain] = replace(chain, further_weeks=tuple(further), variation=variation)
-    return chains
+        # ages of one series have the same error
+        return replace(chain, variation=replace(variation, age_shift_gw=0.0))
+    atlases = series.from_other_populations(start, all_atlases=True)
+    names = [name for name in atlases if _covers(series.brains[name], start.week, end)]
+    if not names:
+        # the run itself is refused
+        return _chain("atlas", [start], series)
+    round_of_atlases, number = divmod(variation.number, len(names))
+    atlas_weeks = [brain.week for brain in series.brains[names[number]]]
+    # the age of the whole run is shifted, as far as the atlas goes, or a little further
+    low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
+    shift = round(min(max(variation.age_shift_gw, low), high), 2)
+    chain_brains = _atlas_chain(start, start.week + shift, end + shift, names[number : number + 1], series)
+    # one of two, so that members share the registrations between the atlas' brains
+    between_atlas = (SMOOTHING_RANGE[1], 0) if round_of_atlases % 2 else UNVARIED
+    further = sorted({*(week for week in _later_observed_weeks(start, brains) if week <= end), end})
+    return replace(
+        _chain("atlas", chain_brains, series, varied, between_atlas),
+        further_weeks=tuple(further),
+        variation=replace(variation, age_shift_gw=shift),
+    )
 
 
 def _chain(
+    origin: Origin,
     brains: Sequence[Brain],
     series: Series,
-    further_weeks: Iterable[float] = (),
     first_variation: tuple[float, int] = UNVARIED,
     later_variation: tuple[float, int] = UNVARIED,
 ) -> Chain:
     """Return a chain, with smoothing and seed of its first registration and of the later ones."""
-    variations = [first_variation, *[later_variation] * (len(brains) - 2)]
-    chain_weeks = {brain.week for brain in brains[1:]}
+    pairs = list(pairwise(brains))
+    variations = [first_variation, *[later_variation] * (len(pairs) - 1)][: len(pairs)]
     return Chain(
+        origin=origin,
         brains=tuple(brains),
         correspondences=tuple(
-            series.correspondence(*pair, *variation)
-            for pair, variation in zip(pairwise(brains), variations, strict=False)
+            series.correspondence(*pair, variation) for pair, variation in zip(pairs, variations, strict=True)
         ),
-        posed=tuple(series.posed(*pair) for pair in pairwise(brains)),
-        further_weeks=tuple(week for week in further_weeks if week not in chain_weeks),
+        posed=tuple(series.posed(*pair) for pair in pairs),
     )
 
 

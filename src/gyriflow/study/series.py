@@ -12,6 +12,9 @@ from .atlases import UsedAtlas
 from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
 
+UNVARIED = (1.0, 0)
+"""Factor of the smoothing and seed of the perturbed labels of registrations, but for those of ensembles."""
+
 
 @dataclass(frozen=True)
 class Series:
@@ -68,13 +71,16 @@ class Series:
         """Return whether brains have surfaces with the same vertices."""
         return any({brain.id for brain in brains} <= ids for ids in self.matched.values())
 
-    def correspondence(self, earlier: Brain, later: Brain, smoothing: float = 1.0, seed: int = 0) -> str:
+    def correspondence(self, earlier: Brain, later: Brain, variation: tuple[float, int] = UNVARIED) -> str:
         """Return the file with the correspondence of two brains, by matched vertices or by registration.
 
-        A registration may have a factor of its smoothing, and a seed for perturbed labels.
+        `variation` is the factor of a registration's smoothing, and the seed of its perturbed labels.
         """
-        file = REGISTERED if (smoothing, seed) == (1.0, 0) else VARIED_REGISTRATION
-        file = MATCHED if self.are_matched(earlier, later) else file
+        if self.are_matched(earlier, later):
+            file = MATCHED
+        else:
+            file = REGISTERED if variation == UNVARIED else VARIED_REGISTRATION
+        smoothing, seed = variation
         return file.format(earlier=earlier.id, later=later.id, smoothing=smoothing, seed=seed)
 
     def posed(self, *pair: Brain) -> list[bool]:

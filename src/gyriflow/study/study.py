@@ -364,6 +364,6 @@ class Study:
             "population": atlas_brain.population,
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
             "surfaces": [*last.parts.values()],
-            "atlas_surface": simulation.file(paths.ATLAS_BRAIN, week=last.week),
+            "atlas_surface": simulation.atlas_surface,
             "labels": labels_file("results/export", brain, exported) if brain.volume else None,
         }

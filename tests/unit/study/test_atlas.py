@@ -9,7 +9,8 @@ from facts import Facts
 from gyriflow.errors import InputError
 from gyriflow.io.downloads import require_checksums, sha256_of
 from gyriflow.io.yaml_files import read_yaml
-from gyriflow.settings.atlas import ATLASES, Atlas, shipped_atlases
+from gyriflow.settings.atlas import Atlas
+from gyriflow.shipped import ATLASES, shipped_atlases
 from gyriflow.study import resolve
 from gyriflow.study.atlases import known_checksums, retrieval_note, used_atlases
 from gyriflow.study.loading import load

@@ -341,6 +341,10 @@ def test_members_that_would_be_equal_are_refused(tmp_path):
     write_surface(tmp_path / "pial.surf.gii", sphere(30.0, 2))
     with pytest.raises(InputError, check=Facts("s21", "ensemble", "growth.matched_surfaces")):
         resolve(load(raw | {"folding": {"end_week": 22}}, tmp_path))
+    # whatever the weeks of another run
+    further = both_kinds(tmp_path, (21, 22, 23)) | {"runs": raw["runs"] | {"b": {"growth": "shapes", "end_week": 23}}}
+    with pytest.raises(InputError, check=Facts("s21", "ensemble", "growth.matched_surfaces")):
+        resolve(load(further | {"folding": {"end_week": 22}}, tmp_path))
 
 
 def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
