@@ -350,7 +350,9 @@ def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine
     shows = sheet & (distance(~brain) < reach)
     # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
     wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
-    hidden = sheet & (distance(wide) > MIN_VISIBLE_MM)
+    # nor is tissue that crosses a fissure which shows around it
+    crosses = brain & (np.abs(side_mm) < 0.5 * size.min())
+    hidden = sheet & (crosses | (distance(wide) > MIN_VISIBLE_MM))
     is_right = side_mm > 0
     touching = [ndimage.binary_dilation(core & part) & core & ~part for part in (is_right, ~is_right)]
     number, _ = ndimage.label(touching[0] | touching[1], OUTSIDE)

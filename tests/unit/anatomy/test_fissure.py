@@ -8,7 +8,7 @@ from phantoms import CENTRE_MM
 from scipy import ndimage
 from shapes import cerebrum_surface, ellipsoid, phantom, rigid, sheet, sphere
 
-from gyriflow.anatomy.extraction import isosurface, smooth_mask
+from gyriflow.anatomy.extraction import handles, isosurface, smooth_mask
 from gyriflow.anatomy.fissure import (
     MidPlane,
     cut_share,
@@ -149,6 +149,17 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     taken = (field > 0.5) & (wide <= 0.5)
     assert bool(taken[18:23, 15:25, 17:24].any()) == bool(open_voxels)
     assert not (wide[20, 20, 17:24] > 0.5).any()
+
+
+def test_tissue_that_crosses_a_fissure_is_opened():
+    brain, core, affine = block(1)
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    brain[20, 18:21, 25] = True
+    side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
+    hidden = hidden_fissure(side_mm, brain, core, affine)
+    wide = open_fissure(brain.astype(np.float32), affine, side_mm, ndimage.distance_transform_edt(~hidden, sampling=0.9))
+    assert (handles(brain), handles(wide > 0.5)) == (1, 0)
+    assert (brain & (wide <= 0.5))[:, :, 17:].sum() == 3
 
 
 @pytest.mark.parametrize("sided", [False, True])
