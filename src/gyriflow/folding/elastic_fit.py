@@ -53,7 +53,7 @@ SOFT_MM = 4.0
 attempt."""
 SOFTER = 4.0
 """Factor by which springs are softened if no solution is found with them."""
-MAX_DRAWS = 3
+MAX_DRAWS = 2
 """Attempts to draw the boundary to its goals with no such element or face on the path."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""

@@ -29,6 +29,8 @@ PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
 """The same on a body that is close to the surface, and before it on one that is to open sulci."""
+MAX_OPENING_DRAWS, OPENED_MM = 4, 0.06
+"""Draws of a body that is to open sulci, until its goals are this far away (root mean square)."""
 REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
 MAX_MISFIT_MM = 0.25
@@ -161,7 +163,11 @@ def carry_sharply(
             if body is not None:
                 body.follow(shape)
                 if target is not None and open_sulci:
-                    body.draw(fitted(body.boundary, target, OPENING_PULL_MM))
+                    for _ in range(MAX_OPENING_DRAWS):
+                        goals = fitted(body.boundary, target, OPENING_PULL_MM)
+                        if np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)) < OPENED_MM:
+                            break
+                        body.draw(goals)
                 goals = moved if target is None else fitted(body.boundary, target, FINAL_PULL_MM)
                 shape = body.draw(goals, before=positions[-2:])
                 if target is not None:
