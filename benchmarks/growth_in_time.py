@@ -5,8 +5,8 @@
 MESH, PARAMS and MAPS are `mesh/brain.xdmf` of a brain, and `params.yaml` and `folding/maps.h5` of a run with growth
 towards shapes from it. The run is made with each number of steps a week up to `--end-week`. Reported are the stress
 rate of the last step (median of the elements, von Mises, Pa per week) and, from each number of steps to the
-next, relative differences (L2, weighted by volume) of the stress rate and of the logarithm of growth, and the largest
-difference of positions. The last line is one JSON object.
+next, without rigid motion, relative differences (L2, weighted by volume) of the stress rate and of the logarithm of
+growth, and the largest difference of positions. The last line is one JSON object.
 """
 
 import argparse
@@ -21,6 +21,8 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding, advance
 from gyriflow.folding.stress import unpacked
 from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.alignment import rigid_fit
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, linear_pieces, signed_volumes
 from gyriflow.geometry.triangles import Floats
@@ -74,8 +76,12 @@ def main() -> None:
         if before is not None:
             end = TetrahedralMesh(found["positions"], mesh.tets)
             sizes = {"growth": vertex_sizes(end.vertices, pieces), "stress": signed_volumes(end)}
-            row |= {f"{name}_difference": relative_difference(before[name], found[name], sizes[name]) for name in sizes}
-            row["position_difference_mm"] = float(np.abs(found["positions"] - before["positions"]).max())
+            # an unsupported body may turn as a whole
+            motion = rigid_fit(before["positions"], found["positions"], sizes["growth"])
+            places, turn = transform_points(before["positions"], motion), motion[:3, :3]
+            turned = before | {"growth": turn @ before["growth"] @ turn.T}
+            row |= {f"{name}_difference": relative_difference(turned[name], found[name], sizes[name]) for name in sizes}
+            row["position_difference_mm"] = float(np.linalg.norm(found["positions"] - places, axis=1).max())
         rows.append(row)
         print(row, flush=True)
         before = found
