@@ -67,6 +67,8 @@ STALK_VOXEL_MM = 0.8
 MAX_CUT_MM = 12.0
 # margin around a surface that is rebuilt
 MARGIN_VOXELS = 6
+# filling more than this to remove handles gives a warning
+MAX_FILLED_MM3 = 100.0
 # a larger relative change of volume by smoothing gives a warning
 VOLUME_TOL = 0.01
 # with a larger loss, smoothing has removed structures, and moving the whole surface cannot restore them
@@ -411,11 +413,14 @@ def surface_of_mask(
     before, grid = original or (simple, affine)
     smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL)
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
-    repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
+    added_mm3 = added * float(abs(np.linalg.det(affine[:3, :3])))
+    repaired_mm3 = volume_mm3 + added_mm3
     mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))
     moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
     smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
     warnings = list(even.warnings)
+    if added_mm3 > MAX_FILLED_MM3:
+        warnings.append(f"gaps of {added_mm3:.0f} mm³ were filled, since tissue bridges them: is a sulcus closed?")
     if abs(change := smoothing["volume_change"]) > VOLUME_TOL:
         warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: use finer voxels")
     return RepairedSurface(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)

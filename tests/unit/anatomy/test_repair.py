@@ -7,7 +7,7 @@ import pytest
 from facts import Facts
 from shapes import box, moved, sphere, torus
 
-from gyriflow.anatomy.repair import clean, make_even, pieces, rebuild, sound_pieces
+from gyriflow.anatomy.repair import clean, make_even, pieces, rebuild, sound_pieces, surface_of_mask
 from gyriflow.errors import MeshError
 from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.remeshing import in_meshlab, pymeshlab, remesh, self_intersecting_faces
@@ -187,6 +187,15 @@ def test_overlapping_balls_are_made_one_surface():
     cap = np.pi * 4.0**2 * (3 * RADIUS - 4.0) / 3
     assert signed_volume(one) == pytest.approx(2 * VOLUME - 2 * cap, rel=0.02)
     assert report["handles_left"] == 0
+
+
+def test_a_warning_tells_of_a_large_gap_that_was_filled():
+    # a hole of 5 × 60 mm² through a plate
+    mask = np.pad(np.ones((24, 70, 12), dtype=bool), 4)
+    mask[14:19, 9:69] = False
+    surface = surface_of_mask(mask.astype(np.float32), np.eye(4), float(mask.sum()), 2.0)
+    assert surface.report["topology"]["tunnels_filled"] == 1
+    assert [warning for warning in surface.warnings if "filled" in warning] == [Facts("364 mm³")]
 
 
 @pytest.mark.fault(21)
