@@ -62,7 +62,7 @@ rule study_records:
         method={
             "brains": [brain for brain in study.brain_descriptions if brain["id"] in study.brains],
             "filled": study.filled,
-            "surface": surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci},
+            "surface": surface_settings("edge_length_mm", "open_sulci"),
             "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
             "metrics": CONFIG.metrics.model_dump(mode="json", include={"curvature_radius_mm"}),
         },

@@ -36,7 +36,7 @@ def pial_settings(wildcards):
         return {}
     if not brain.labels:
         return surface_settings("edge_length_mm", "max_hole_mm")
-    return surface_settings("edge_length_mm") | {"open_sulci": CONFIG.opens_sulci}
+    return surface_settings("edge_length_mm", "open_sulci")
 
 
 # a simple shape instead of a brain

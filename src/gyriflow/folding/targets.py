@@ -30,11 +30,11 @@ from .stress import packed, unpacked
 from .stretches import Stretches
 from .tissue import Tissue
 
-SMOOTHING_MM = 0.75
+SMOOTHING_MM = 0.4
 """Standard deviation of the spatial smoothing of growth."""
 SMOOTHING_TOL = 1e-3
 """Relative tolerance of smoothing; feedback makes up for the error."""
-FEEDBACK_GW = 0.5
+FEEDBACK_GW = 0.2
 """Time constant with which growth takes the brain back to its path."""
 PARTS_OF_PATH = (0.25, 0.5, 0.75)
 """Fractions of the path between two shapes at which it is checked."""

@@ -72,13 +72,6 @@ class Config(Settings):
 
     @property
     def measured_only(self) -> "Config":
-        """This configuration without simulations, and with the surfaces that it has with them."""
-        surface = self.surface.model_copy(update={"open_sulci": self.opens_sulci})
+        """This configuration without simulations."""
         nothing: dict[str, Any] = {"start": None, "folding": None, "runs": {}, "studies": {}, "calibrate": None}
-        return self.model_copy(update={**nothing, "surface": surface})
-
-    @property
-    def opens_sulci(self) -> bool:
-        """Whether fused sulci of all brains are opened; by default in studies without runs."""
-        opens = self.surface.open_sulci
-        return not self.runs if opens is None else opens
+        return self.model_copy(update=nothing)

@@ -19,9 +19,8 @@ class SurfaceSettings(Settings):
     asymmetric: bool = False
     """Whether hemispheres may differ in size and shape, as with unilateral pathology. Otherwise such a pair is refused
     as belonging to two brains."""
-    open_sulci: bool | None = None
-    """Whether fused sulci of all brains are opened by slits, if the labels have cortex and white matter. `null` opens
-    them in studies without `runs` only."""
+    open_sulci: bool = True
+    """Whether fused sulci of all brains are opened by slits, if the labels have cortex and white matter."""
 
 
 class MeshSettings(Settings):

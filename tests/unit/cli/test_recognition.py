@@ -302,8 +302,5 @@ def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):
     assert (len(study.brains), study.run_simulations, study.norm_reference) == (2, [], ["sub-01_ses-1", "sub-01_ses-2"])
     # of a configuration with runs, nothing is folded either
     runs = {"start": "first", "folding": {"end_week": 24}}
-    folded, opened = (load(written | runs | more, tmp_path) for more in ({}, {"surface": {"open_sulci": True}}))
+    folded = load(written | runs, tmp_path)
     assert (len(resolve(folded).run_simulations), resolve(folded.measured_only).run_simulations) == (1, [])
-    # surfaces stay as they are for the runs, which have fused sulci unless these are opened
-    assert [config.opens_sulci for config in (study.config, folded, folded.measured_only)] == [True, False, False]
-    assert [config.opens_sulci for config in (opened, opened.measured_only)] == [True, True]
