@@ -1,12 +1,12 @@
-"""How far do targets and run of a brain reach its observed later surfaces? Area, gyrification index, distance, r.
+"""Compare the targets and the run of a brain with its observed later surfaces.
 
     ./run python benchmarks/explained.py FOLDER RUN BRAIN OBSERVED [--weeks 26 28 30]
 
 FOLDER is that of a study in which the brain BRAIN has been folded in the run RUN by its own growth; OBSERVED is the
-name of the brains of later weeks, such as crl-{week:g}. For each week and each of the observed brain, target and run:
-area (cm²), area over that of the hulls of both hemispheres, mean distance of the observed surface from this one after
-rigid alignment (mm), r of the shape index (of the observed brain: of the week before), and crossing faces. The last
-line is one JSON object.
+pattern of the ids of observed brains, such as crl-{week:g}: one for each week that is compared, and for the one before.
+For each week and each of the observed brain, that of the week before, target and run: area (cm²), gyrification index by
+hulls, mean distance of the observed surface from this one after rigid alignment (mm), r of the shape index (scaled to
+the observed volume), and crossing faces. The last line is one JSON object.
 """
 
 import argparse
@@ -17,25 +17,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import ConvexHull
 
 from gyriflow.anatomy.fissure import cut_sides, nearer_left
 from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import align, prepare_for_comparison
 from gyriflow.geometry.matching import crossing_faces, nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, area, area_cm2, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, area_cm2, convex_hull, vertex_areas
 from gyriflow.io.frames import read_positions, read_weeks
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.metrics.gyrification import gyrification_index, pieces_over
 from gyriflow.settings.terms import SIDES
 from gyriflow.study.paths import FOLDING, MESH, PIAL, TARGETS
-
-
-def hull_index(sides: list[TriangleMesh]) -> float:
-    """Return the area of hemispheres over that of their convex hulls; cuts at the midline do not count in the first."""
-    return sum(map(area, sides)) / sum(float(ConvexHull(side.vertices).area) for side in sides)
 
 
 def main() -> None:
@@ -64,17 +59,21 @@ def main() -> None:
         observed, *sides = surfaces(arguments.observed.format(week=week))
         folds = prepare_for_comparison(observed, observed)
         places = {"target": targets[week], "run": read_positions(frames, week)}
-        models = {name: align(TriangleMesh(at[used], boundary.faces), observed) for name, at in places.items()}
-        compared = {"observed": surfaces(arguments.observed.format(week=before))[0], **models}
-        for name, surface in compared.items():
-            shape = observed if name == "observed" else surface
+        models = {name: TriangleMesh(at[used], boundary.faces) for name, at in places.items()}
+        compared: dict[str, tuple[TriangleMesh, list[TriangleMesh]]] = {"observed": (observed, sides)}
+        earlier, *earlier_sides = surfaces(arguments.observed.format(week=before))
+        compared["week_before"] = earlier, earlier_sides
+        compared |= {name: (surface, list(cut_sides(surface, left))) for name, surface in models.items()}
+        for name, (surface, halves) in compared.items():
             values, _ = interpolate_measures(prepare_for_comparison(surface, observed), folds)
-            distance, _, _ = nearest_on(observed.vertices, shape)
-            row = {"week": week, "shape": name, "area_cm2": area_cm2(shape)}
-            row["hull_index"] = hull_index(sides if name == "observed" else list(cut_sides(surface, left)))
+            distance, _, _ = nearest_on(observed.vertices, align(surface, observed))
+            row: dict[str, Any] = {"week": week, "shape": name, "area_cm2": area_cm2(surface)}
+            row["gyrification_index"] = gyrification_index(
+                halves, [pieces_over(convex_hull(half), half) for half in halves]
+            )
             row["distance_mm"] = float(np.average(distance, weights=vertex_areas(observed)))
             row["r_shape_index"] = correlation(folds.shape_index, values["shape_index"], folds.areas)
-            rows.append(row | {"crossing_faces": crossing_faces(shape)})
+            rows.append(row | {"crossing_faces": crossing_faces(surface)})
     print(pd.DataFrame(rows).to_string(index=False, float_format="%.3f"))
     print(json.dumps({"rows": rows}))
 

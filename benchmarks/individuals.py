@@ -10,10 +10,13 @@ size replaces it.
 
 The start brains are predicted with the growth of their atlas, without the synthetic later brains, and rigidly aligned
 with these. Models are the `run`, the `atlas`' own brain of the week scaled to the predicted volume and, for values of
-DIFFERENCE_SMOOTHING_MM and FADING_GW, the run's target, e.g. `8 mm 1 GW`. The model with the best r on the individuals
-with odd seeds is reported on those with even seeds. The last line is one JSON object: `scores`, rows with `grown_by`,
-`persistence`, `individual`, `horizon` (GW), `model`, `distance_mm`, `r_shape_index`. With `--ensemble N`, `coverage`
-says how often the 90 % intervals of N members contain the later brain's area, volume, gyrification index and depth.
+DIFFERENCE_SMOOTHING_MM and FADING_GW, the predicted shape before a body follows it, at stated weeks: e.g. `8 mm 1 GW`,
+or `0 mm` without fading. The values with the best r on the individuals with odd seeds are reported on those with even
+seeds. The map of an individual depends on its kind and seed only.
+
+The last line is one JSON object: `scores`, rows with `grown_by`, `persistence`, `individual`, `horizon` (GW), `model`,
+`distance_mm`, `r_shape_index`. With `--ensemble N`, `coverage` says how often the 90 % intervals of N members contain
+the later brain's area, volume, gyrification index and depth.
 """
 
 import argparse
@@ -56,7 +59,7 @@ METRICS = "results/brains/{brain}/metrics/metrics.csv"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # a coarse mesh of a detailed surface has flat elements
-MESH_SETTINGS |= {"max_surface_distance_mm": 0.5, "min_radius_ratio": 0.005}
+MESH_SETTINGS |= {"max_surface_distance_mm": 0.5, "min_radius_ratio": 0.001}
 INDIVIDUALS = ["shape-1-1", "sulci-1-2", "shape-2-2", "sulci-2-1", "shape-4-1", "shape-4-2"]
 
 
@@ -169,9 +172,12 @@ def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int], *, fold
     return rows
 
 
-def report_chosen(scores: pd.DataFrame) -> None:
-    """Print the model that is best for odd seeds, and its scores for even seeds."""
+def print_chosen(scores: pd.DataFrame) -> None:
+    """Print the values that are best for odd seeds, and their scores for even seeds."""
     odd = scores["individual"].str.split("-").str[-1].astype(int) % 2 == 1
+    if odd.all() or not odd.any():
+        print("all seeds are odd or all are even: no values are chosen")
+        return
     grid = scores["model"].str.endswith(" GW")
     means = scores[odd & grid].groupby("model")[["r_shape_index", "distance_mm"]].mean()
     best = means["r_shape_index"].idxmax()
@@ -183,8 +189,8 @@ def report_chosen(scores: pd.DataFrame) -> None:
     print(table.to_string(float_format="%.3f"))
 
 
-def study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespace) -> None:
-    """Make the individuals of an atlas and all that is compared in a folder."""
+def run_study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespace) -> None:
+    """Deform an atlas' labels into individuals, and run the workflow for the files that are compared."""
     weeks, series = sorted(arguments.weeks), read_keys(ATLASES / atlas / "atlas.yaml")["series"]["normative"]
     start, scheme, growing = weeks[0], series["scheme"], list(range(weeks[0], weeks[-1] + 1))
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +212,6 @@ def study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespace) 
         "brains": brains,
         "growth": {"brains": {"atlas": chain}},
         "start": starts,
-        "surface": {"open_sulci": True},
         "mesh": MESH_SETTINGS,
         "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 10, "step_s": 172800, "ranks": 1},
         "runs": {"expected": {"ensemble": arguments.ensemble}},
@@ -227,7 +232,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument(
-        "--atlas", nargs=2, action="append", required=True, metavar=("NAME", "FILES"), help="an atlas and its files"
+        "--atlas",
+        nargs=2,
+        action="append",
+        required=True,
+        metavar=("NAME", "FILES"),
+        help="atlas with a normative series",
     )
     parser.add_argument("--accept-licence", action="store_true", help="accept the licences of the atlases")
     parser.add_argument("--individuals", nargs="+", metavar="KIND-SIZE-SEED", default=INDIVIDUALS)
@@ -241,7 +251,7 @@ def main() -> None:
     weeks, rows, covered = sorted(arguments.weeks), [], []
     for atlas, files in arguments.atlas:
         folder = arguments.folder.resolve() / atlas
-        study(folder, atlas, Path(files).resolve(), arguments)
+        run_study(folder, atlas, Path(files).resolve(), arguments)
         score = partial(scores_of, folder, atlas=atlas, weeks=weeks, folded=not arguments.no_folding)
         with ProcessPoolExecutor(arguments.cores) as pool:
             rows += [row for found in pool.map(score, arguments.individuals) for row in found]
@@ -251,7 +261,7 @@ def main() -> None:
     for value in ("distance_mm", "r_shape_index"):
         table = scores.pivot_table(value, ["grown_by", "persistence", "individual", "horizon"], "model")
         print(value, table.to_string(float_format="%.3f"), sep="\n")
-    report_chosen(scores)
+    print_chosen(scores)
     print(json.dumps({"scores": rows, "coverage": covered}))
 
 

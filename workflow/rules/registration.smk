@@ -131,7 +131,7 @@ rule targets:
         further_weeks=lambda w: chain_of(w).further_weeks,
         posed=lambda w: chain_of(w).posed,
         is_own_growth=lambda w: chain_of(w).origin == "self",
-        open_sulci=CONFIG.surface.open_sulci,
+        opens_sulci=CONFIG.surface.open_sulci,
         by_size=CONFIG.growth.atlas_ages == "size",
         variation=lambda w: chain_of(w).variation,
     script:

@@ -27,12 +27,15 @@ with step(snakemake.log[0]):
         )
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
+    # labels whose sulci stay fused have none to open; surfaces are taken as they are
+    opened = [read_json(path).get("sulci", {"sheets": 1}).get("sheets") for path in files.reports]
+    open_sulci = params.opens_sulci and any(opened)
     ages, variation = None, params.variation
     if params.is_own_growth:
         weeks, baselines = [params.start_week, *params.weeks], {}
-        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh), open_sulci=params.open_sulci)
+        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
     else:
-        options = {"make_body": ElasticFit, "by_size": params.by_size, "open_sulci": params.open_sulci}
+        options = {"make_body": ElasticFit, "by_size": params.by_size, "open_sulci": open_sulci}
         if files.norms:
             options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.stated_weeks)
         if variation:

@@ -333,9 +333,10 @@ def _signed_distance(mask: Mask, size: Floats) -> Floats:
 def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine: Floats) -> Mask:
     """Return the voxels of the surface between the hemispheres that cortex hides, in two or three layers.
 
-    `side_mm` is the result of `side_distance`, `brain` the (i, j, k) mask with all gaps that its labels show, `core`
-    the tissue inside the cortex. The hidden fissure ends above the tissue that joins the hemispheres (corpus callosum,
-    deep grey matter, ventricles). Small contacts of the core elsewhere are errors of the labels.
+    Tissue that crosses a visible fissure is included. `side_mm` is the result of `side_distance`, `brain` the (i, j, k)
+    mask with all gaps that its labels show, `core` the tissue inside the cortex. The hidden fissure ends above the
+    tissue that joins the hemispheres (corpus callosum, deep grey matter, ventricles). Small contacts of the core
+    elsewhere are errors of the labels.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # not whole voxels, which rounding would include or not
@@ -350,8 +351,8 @@ def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine
     shows = sheet & (distance(~brain) < reach)
     # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
     wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
-    # nor is tissue that crosses a fissure which shows around it
-    crosses = brain & (np.abs(side_mm) < 0.5 * size.min())
+    # tissue that crosses a visible fissure is an error of the labels, and is opened, too
+    crosses = brain & (np.abs(side_mm) < 0.6 * size.min())
     hidden = sheet & (crosses | (distance(wide) > MIN_VISIBLE_MM))
     is_right = side_mm > 0
     touching = [ndimage.binary_dilation(core & part) & core & ~part for part in (is_right, ~is_right)]

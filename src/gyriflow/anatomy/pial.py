@@ -79,7 +79,15 @@ from .plausible import (
     require_whole,
 )
 from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
-from .repair import RepairedSurface, make_pieces_sound, pieces, require_sound, sound_pieces, surface_of_mask
+from .repair import (
+    RepairedSurface,
+    filled_warning,
+    make_pieces_sound,
+    pieces,
+    require_sound,
+    sound_pieces,
+    surface_of_mask,
+)
 from .sulci import open_fused_sulci
 
 log = logging.getLogger(__name__)
@@ -90,6 +98,7 @@ MIN_AXIS_COSINE = 0.7
 MAX_USUAL_ASYMMETRY = 0.03
 # largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
 MAX_AREA_RATIO = 15.0
+NOT_OPENED = "fused sulci were not opened: {}"
 # voxels of this size are fine enough to determine the pose by shape
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
@@ -183,8 +192,8 @@ def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, 
     warnings = list(volume.warnings)
     report, original, taken_ml = {"scheme": scheme.name, **cerebrum.report}, (field, affine), 0.0
     if open_sulci:
-        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme)
-        warnings += logged(_fused_sulci_warning(report))
+        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme)
+        warnings += logged(doubts)
     taken = taken_ml / ML_PER_MM3
     even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, original=original)
     require_single_hemisphere(even.mesh)
@@ -215,8 +224,8 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
     if scheme.cortex:
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
-        field, affine, taken_ml, report["sulci"] = _with_sulci(field, affine, cerebrum, scheme, side_mm)
-        warnings += logged(_fused_sulci_warning(report))
+        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme, side_mm)
+        warnings += logged(doubts)
         opened_ml += taken_ml
     volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
     even = surface_of_mask(
@@ -235,24 +244,22 @@ def _with_sulci(
     cerebrum: Cerebrum,
     scheme: LabelScheme,
     side_mm: NDArray[np.float32] | None = None,
-) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any]]:
-    """Open fused sulci; return the field, its affine, the volume removed (mL), and a report."""
+) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any], list[str]]:
+    """Open fused sulci; return the field, its affine, the volume removed (mL), a report, and warnings."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        return field, affine, 0.0, {"stays_fused": "the labels have no white matter"}
+        reason = "the labels have no white matter"
+        return field, affine, 0.0, {"stays_fused": reason}, [NOT_OPENED.format(reason)]
     # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     if not report.get("sheets"):
-        return field, affine, 0.0, report
+        reason = report.get("stays_fused")
+        return field, affine, 0.0, report, [NOT_OPENED.format(reason)] if reason else []
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-    return opened, fine, report["opened_mL"] - gained_ml, {**report, "repaired_before": repaired}
-
-
-def _fused_sulci_warning(report: Mapping[str, Any]) -> list[str]:
-    reason = report["sulci"].get("stays_fused")
-    return [f"fused sulci were not opened: {reason}"] if reason else []
+    report |= {"repaired_before": repaired}
+    return opened, fine, report["opened_mL"] - gained_ml, report, filled_warning(repaired, affine)
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:

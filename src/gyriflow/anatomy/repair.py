@@ -4,6 +4,7 @@ Every repair is counted.
 """
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -67,7 +68,7 @@ STALK_VOXEL_MM = 0.8
 MAX_CUT_MM = 12.0
 # margin around a surface that is rebuilt
 MARGIN_VOXELS = 6
-# filling more than this to remove handles gives a warning
+# a warning is given if closing handles adds more than this
 MAX_FILLED_MM3 = 100.0
 # a larger relative change of volume by smoothing gives a warning
 VOLUME_TOL = 0.01
@@ -413,17 +414,22 @@ def surface_of_mask(
     before, grid = original or (simple, affine)
     smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL)
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
-    added_mm3 = added * float(abs(np.linalg.det(affine[:3, :3])))
-    repaired_mm3 = volume_mm3 + added_mm3
+    repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
     mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))
     moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
     smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
-    warnings = list(even.warnings)
-    if added_mm3 > MAX_FILLED_MM3:
-        warnings.append(f"gaps of {added_mm3:.0f} mm³ were filled, since tissue bridges them: is a sulcus closed?")
+    warnings = [*even.warnings, *filled_warning(topology, affine)]
     if abs(change := smoothing["volume_change"]) > VOLUME_TOL:
         warnings.append(f"smoothing changed the volume by {100 * change:.1f} %: use finer voxels")
     return RepairedSurface(mesh, {"topology": topology, **even.report, "smoothing": smoothing}, warnings)
+
+
+def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
+    """Return a warning if closing handles has added much tissue, from the report of `make_simple`."""
+    added_mm3 = topology["voxels_filled_in_tunnels"] * float(abs(np.linalg.det(affine[:3, :3])))
+    if added_mm3 <= MAX_FILLED_MM3:
+        return []
+    return [f"closing handles added {added_mm3:.0f} mm³ of tissue: check that no sulcus or fissure was closed there"]
 
 
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:

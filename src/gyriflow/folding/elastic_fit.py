@@ -49,8 +49,7 @@ CLOSE_SPRING_LENGTH_MM = 0.2
 """Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
 depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
 SOFT_MM = 4.0
-"""Radius around an inverted element or crossing face on the path within which springs stay soft; it grows with each
-attempt."""
+"""Radius around an inverted element or crossing face on the path within which springs stay soft."""
 SOFTER = 4.0
 """Factor by which springs are softened if no solution is found with them."""
 MAX_DRAWS = 2
@@ -172,7 +171,7 @@ class ElasticFit:
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
-        for attempt in range(1, MAX_DRAWS + 1):
+        for _ in range(MAX_DRAWS):
             self.positions_mm, problem = start, ""
             try:
                 self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
@@ -186,7 +185,7 @@ class ElasticFit:
             place = np.round(faults[0], 1).tolist()
             problem = f"{len(faults)} elements or faces are inverted or cross on the way to a shape, near {place} mm"
             distance, _ = cKDTree(faults).query(self.boundary.vertices)
-            lengths[distance < attempt * SOFT_MM] = SPRING_LENGTH_MM
+            lengths[distance < SOFT_MM] = SPRING_LENGTH_MM
         if problem:
             log.warning("%s", problem)
         return self._move(np.linalg.inv(motion))

@@ -28,9 +28,9 @@ PULL_MM = (4.0, 2.5, 1.5, 1.0)
 PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
-"""The same on a body that is close to the surface, and before it on one that is to open sulci."""
+"""The same for the last draw of a body, and for the draws before it with open sulci."""
 MAX_OPENING_DRAWS, OPENED_MM = 4, 0.06
-"""Draws of a body that is to open sulci, until its goals are this far away (root mean square)."""
+"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
 REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
 MAX_MISFIT_MM = 0.25
@@ -119,7 +119,7 @@ def carry_sharply(
     week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
 
     With `open_sulci` the surfaces have slits that registration by labels does not show. Then points are matched by the
-    tissue below them, too, and a body is drawn to its surface twice.
+    tissue below them, too, and a body is drawn to its surface several times.
 
     The mesh belongs to the first brain, `pairs` lead from each brain to the next, and `surfaces` are the pial surfaces
     of the later brains, all in the spaces of these correspondences. Without surfaces nothing is fitted.
@@ -165,9 +165,12 @@ def carry_sharply(
                 if target is not None and open_sulci:
                     for _ in range(MAX_OPENING_DRAWS):
                         goals = fitted(body.boundary, target, OPENING_PULL_MM)
-                        if np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)) < OPENED_MM:
+                        before = body.boundary.vertices
+                        if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
                             break
                         body.draw(goals)
+                        if np.allclose(body.boundary.vertices, before, atol=1e-6):
+                            break
                 goals = moved if target is None else fitted(body.boundary, target, FINAL_PULL_MM)
                 shape = body.draw(goals, before=positions[-2:])
                 if target is not None:
