@@ -6,12 +6,12 @@ from pathlib import Path
 import pandas as pd
 
 EXPECTED = {
-    ("reference", 27): {"area_cm2": 173.1, "volume_ml": 106.9, "r_shape_index": 0.464},
-    ("reference", 29): {"area_cm2": 214.2, "volume_ml": 131.1, "r_shape_index": 0.271},
-    ("measured", 27): {"area_cm2": 181.3, "volume_ml": 125.8, "r_shape_index": 0.935},
-    ("measured", 29): {"area_cm2": 245.0, "volume_ml": 181.8, "r_shape_index": 0.940},
+    ("reference", 27): {"area_cm2": 174.0, "volume_ml": 106.6, "r_shape_index": 0.455},
+    ("reference", 29): {"area_cm2": 215.5, "volume_ml": 130.7, "r_shape_index": 0.274},
+    ("measured", 27): {"area_cm2": 182.2, "volume_ml": 125.6, "r_shape_index": 0.958},
+    ("measured", 29): {"area_cm2": 247.8, "volume_ml": 181.5, "r_shape_index": 0.957},
 }
-REAL = {27: {"real_area_cm2": 182.0, "real_volume_ml": 125.8}, 29: {"real_area_cm2": 249.7, "real_volume_ml": 181.9}}
+REAL = {27: {"real_area_cm2": 183.2, "real_volume_ml": 125.8}, 29: {"real_area_cm2": 250.7, "real_volume_ml": 181.9}}
 RELATIVE, ABSOLUTE_R = 0.01, 0.03
 
 
