@@ -352,7 +352,7 @@ def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine
     # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
     wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
     # tissue that crosses a visible fissure is an error of the labels, and is opened, too
-    crosses = brain & (np.abs(side_mm) < 0.6 * size.min())
+    crosses = brain & (np.abs(side_mm) < 0.45 * size.min())
     hidden = sheet & (crosses | (distance(wide) > MIN_VISIBLE_MM))
     is_right = side_mm > 0
     touching = [ndimage.binary_dilation(core & part) & core & ~part for part in (is_right, ~is_right)]
