@@ -6,7 +6,8 @@ CRL and CHINESE are the folders with the labels of these two atlases, which are 
 has its own study in FOLDER; the same command continues after an interruption. Growth is measured on all weeks of an
 atlas; the prediction is compared with every second week of the other atlas. The last line is one JSON object, which
 `--write` also writes as YAML: for each start, horizon (GW) and model, the columns of `results/study/prediction.csv`
-listed in `NUMBERS`. With `--ensemble N`, `coverage` is the share of later brains within the intervals of N members.
+listed in `NUMBERS`, and for runs errors of `FOLDING`. With `--ensemble N`, `coverage` is the share of later brains
+within the intervals of N members.
 
 `--surfaces` predicts the same start brain once more from its pial surfaces, and from its pial and white surfaces, which
 gyriflow made from its labels; rows then have `given`.
@@ -16,6 +17,7 @@ gyriflow made from its labels; rows then have `given`.
 
 import argparse
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,17 +27,20 @@ from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import ATLASES
-from gyriflow.study.paths import ENSEMBLE, pial_of, white_of
+from gyriflow.study.paths import BRAIN, ENSEMBLE, WEEK, file_of, measures_in, pial_of, white_of
+from gyriflow.study.paths import RUN as FOLDED
 from workflow import call
 
 WEEKS = (22, 34)
 GROWN_BY = {"crl": "chinese", "chinese": "crl"}
 MODELS = ("run", "target", "atlas", "atlas_deformed", "scaled")
 NUMBERS = {"distance_mm": 3, "r_shape_index": 3, "area_error": 4, "volume_error": 4}
+FOLDING = ("gyrification_index", "mean_sulcal_depth")
 RUN = "predicted"
+MEASURED, SIMULATED = (measures_in(folder)["metrics"] for folder in (f"{BRAIN}/metrics", f"{FOLDED}/metrics/{WEEK}"))
 HEAD = """\
 # Accuracy of predictions for brains with a later scan, by horizon (weeks): distance between the surfaces, r of the
-# shape index, errors of area and volume as fractions of the observed brain's. Written by benchmarks/horizon.py.
+# shape index, errors of area, volume and folding as fractions of the observed brain's. By benchmarks/horizon.py.
 """
 NOTE = (
     "Volumes of both atlases jump between 24 and 25 GW, and no smooth curve of size meets the brains around it. "
@@ -85,15 +90,31 @@ def with_surfaces(config: dict[str, Any], folder: Path, start: str, cores: int) 
 
 
 def rows(folder: Path, start: str) -> list[dict[str, Any]]:
-    """Return the numbers of a finished study, rounded; of start brains given in several ways, as what."""
+    """Return the numbers of a finished study, rounded; of start brains given in several ways, as what.
+
+    Those of runs have errors of folding, too.
+    """
     table = read_table(folder / "results" / "study" / "prediction.csv").sort_values("horizon", kind="stable")
     given = {brain: brain.split("-")[2:] for brain in table["start"]}
     return [
         {"start": start, "horizon": float(row["horizon"]), "model": row["model"]}
         | ({"given": (given[row["start"]] or ["labels"])[0]} if any(given.values()) else {})
         | {name: round(float(row[name]), digits) for name, digits in NUMBERS.items()}
+        | (folding_errors(folder, row["start"], start, row["week"]) if row["model"] == "run" else {})
         for row in table[table["model"].isin(MODELS)].to_dict("records")
     ]
+
+
+def metrics_of(brain: str, observed: str, week: float) -> list[str]:
+    """Return the files with the metrics of a predicted brain at a week and of the observed one."""
+    return [file_of(MEASURED, brain=f"{observed}-{week:g}"), file_of(SIMULATED, run=RUN, brain=brain, week=week)]
+
+
+def folding_errors(folder: Path, brain: str, observed: str, week: float) -> dict[str, float]:
+    """Return the errors of a prediction's folding, as fractions of the observed brain's."""
+    tables = [read_table(folder / path) for path in metrics_of(brain, observed, week)]
+    real, found = (table[table["hemisphere"] == "whole"].set_index("metric")["value"] for table in tables)
+    return {f"{metric}_error": round(float(found[metric] / real[metric] - 1), 4) for metric in FOLDING}
 
 
 def main() -> None:
@@ -118,7 +139,10 @@ def main() -> None:
         config = study(start, folders, range(first, last + 1), arguments.edge, arguments.ensemble)
         if arguments.surfaces:
             config = with_surfaces(config, folder / "surfaces", start, arguments.cores)
+        brains = config["start"] if arguments.surfaces else [config["start"]]
         files = ["results/study/prediction.csv"]
+        for brain, week in product(brains, range(first + 2, last + 1, 2)):
+            files += metrics_of(brain, start, week)
         intervals = ENSEMBLE.format(run=RUN, brain=f"{start}-{first}")
         call(folder, config, arguments.cores, *files, *([intervals] if arguments.ensemble else []))
         found += rows(folder, start)

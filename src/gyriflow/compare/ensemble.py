@@ -13,8 +13,6 @@ from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 
 QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
 """The metrics of whole brains that have intervals."""
-TESTED = ("area", "volume")
-"""Those whose prediction error is known from tests."""
 LEVEL = 0.9
 """Coverage of the prediction interval for one further member."""
 SULCUS, GYRUS = -0.375, 0.375
@@ -39,15 +37,17 @@ def prediction_interval(
 
 
 def method_errors(tests: Sequence[Mapping[str, Any]], horizon_gw: float) -> dict[str, float]:
-    """Return the root mean square error of predictions by horizon for each of `TESTED`, as a fraction.
+    """Return the root mean square error of predictions at a horizon for each metric that was tested, as a fraction.
 
     `tests` are the rows of `norms/predictions.yaml`. The error is linear between tested horizons, from none at 0, and
     constant beyond the last.
     """
     rows = pd.DataFrame(tests).query("model == 'run'")
     errors = {}
-    for metric in TESTED:
-        squares = (rows[f"{metric}_error"] ** 2).groupby(rows["horizon"]).mean()
+    for metric in QUANTITIES:
+        if f"{metric}_error" not in rows:
+            continue
+        squares = (rows[f"{metric}_error"] ** 2).groupby(rows["horizon"]).mean().dropna()
         errors[metric] = float(np.interp(horizon_gw, [0.0, *squares.index], [0.0, *np.sqrt(squares)]))
     return errors
 

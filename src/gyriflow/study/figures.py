@@ -400,8 +400,7 @@ INTERVALS = Kind(
     caption=(
         "Run *{run}* (line) and the 90 % prediction interval for one further member of its ensemble (band). Members "
         "differ in registrations, in labels and, for predictions, in age, atlas and persistence of individual "
-        "differences. Stars: observed brains. The band of area and volume of predictions includes their errors in "
-        "tests; other bands do not, and contained the later brain's value in only 17 % of tests (docs/science.md)."
+        "differences. Stars: observed brains. Bands of predictions include the errors of such predictions in tests."
     ),
 )
 POSITION_SPREAD = Kind(

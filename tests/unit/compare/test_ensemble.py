@@ -56,6 +56,9 @@ def test_tested_errors_of_predictions_widen_intervals_with_the_horizon():
     found = {horizon: method_errors(tests, horizon)["area"] for horizon in (0.0, 1.0, 2.0, 4.0, 9.0)}
     two = np.sqrt((0.03**2 + 0.04**2) / 2)
     assert found == pytest.approx({0.0: 0, 1.0: two / 2, 2.0: two, 4.0: 0.1, 9.0: 0.1})
+    # a metric that was tested in some of the brains only
+    tests[0] |= {"gyrification_index_error": 0.02}
+    assert method_errors(tests, 2.0) == pytest.approx({"area": two, "volume": 0.0, "gyrification_index": 0.02})
     run = pd.concat([metrics(24.0, 100), metrics(28.0, 140)])
     members = pd.concat([metrics(28.0, area) for area in (139, 140, 141)])
     wide, narrow = (interval_table(run, members, run[:0], given).set_index(["metric", "week"]) for given in (tests, []))
