@@ -98,7 +98,8 @@ MIN_AXIS_COSINE = 0.7
 MAX_USUAL_ASYMMETRY = 0.03
 # largest ratio of the hemispheres' areas; with 4 % of the volume it is about 10
 MAX_AREA_RATIO = 15.0
-NOT_OPENED = "fused sulci were not opened: {}"
+# up to this week labels of 0.8 mm close no sulci: CRL has the same area with fused and opened ones
+FUSED_AFTER_GW = 26.0
 # voxels of this size are fine enough to determine the pose by shape
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
@@ -193,7 +194,7 @@ def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, 
     report, original, taken_ml = {"scheme": scheme.name, **cerebrum.report}, (field, affine), 0.0
     if open_sulci:
         field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme)
-        warnings += logged(doubts)
+        warnings += logged([*doubts, *_fused_sulci_warning(report, volume.week)])
     taken = taken_ml / ML_PER_MM3
     even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, original=original)
     require_single_hemisphere(even.mesh)
@@ -225,7 +226,7 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
         field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme, side_mm)
-        warnings += logged(doubts)
+        warnings += logged([*doubts, *_fused_sulci_warning(report, volume.week)])
         opened_ml += taken_ml
     volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
     even = surface_of_mask(
@@ -247,19 +248,22 @@ def _with_sulci(
 ) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any], list[str]]:
     """Open fused sulci; return the field, its affine, the volume removed (mL), a report, and warnings."""
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        reason = "the labels have no white matter"
-        return field, affine, 0.0, {"stays_fused": reason}, [NOT_OPENED.format(reason)]
+        return field, affine, 0.0, {"stays_fused": "the labels have no white matter"}, []
     # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     if not report.get("sheets"):
-        reason = report.get("stays_fused")
-        return field, affine, 0.0, report, [NOT_OPENED.format(reason)] if reason else []
+        return field, affine, 0.0, report, []
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     report |= {"repaired_before": repaired}
     return opened, fine, report["opened_mL"] - gained_ml, report, filled_warning(repaired, affine)
+
+
+def _fused_sulci_warning(report: Mapping[str, Any], week: float) -> list[str]:
+    reason = report["sulci"].get("stays_fused")
+    return [f"fused sulci were not opened: {reason}"] if reason and week > FUSED_AFTER_GW else []
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:

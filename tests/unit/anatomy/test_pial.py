@@ -91,6 +91,15 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
     assert np.degrees(np.arccos(normal[0])) < 1.0
 
 
+def test_sulci_that_stay_fused_are_warned_of_at_ages_at_which_labels_close_them(volume):
+    labels, affine = volume
+    mask = np.isin(labels, ATLAS.cerebrum).astype(np.int32)
+    for week, number in ((24.0, 0), (27.0, 1)):
+        surface = from_labels(mask, affine, SCHEMES["binary"], week=week, open_sulci=True, **QUICK)
+        assert surface.report["sulci"] == {"stays_fused": "the labels have no white matter"}
+        assert len([warning for warning in surface.report["warnings"] if "not opened" in warning]) == number
+
+
 @pytest.mark.fault(3)
 def test_storage_order_makes_no_difference(volume, phantom):
     labels, affine = volume
