@@ -66,6 +66,8 @@ TILT = 1e-3
 MIN_VISIBLE_MM = 3.0
 # a contact of the tissue inside the cortex joins the hemispheres if it has this share of the largest contact's size
 MIN_JOINT = 0.1
+# tissue that crosses a visible fissure over a smaller area is an error of the labels
+MAX_BRIDGE_MM2 = 10.0
 # width to which a fissure hidden by cortex is opened
 FISSURE_MM = 1.5
 # thickness of the cortex left on the tissue that connects the hemispheres
@@ -330,13 +332,15 @@ def _signed_distance(mask: Mask, size: Floats) -> Floats:
     return np.asarray(inside - outside - 0.5 * size.mean() * np.where(mask, 1.0, -1.0))
 
 
-def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine: Floats) -> Mask:
+def hidden_fissure(
+    side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine: Floats, *, bridges: bool = False
+) -> Mask:
     """Return the voxels of the surface between the hemispheres that cortex hides, in two or three layers.
 
-    Tissue that crosses a visible fissure is included. `side_mm` is the result of `side_distance`, `brain` the (i, j, k)
-    mask with all gaps that its labels show, `core` the tissue inside the cortex. The hidden fissure ends above the
-    tissue that joins the hemispheres (corpus callosum, deep grey matter, ventricles). Small contacts of the core
-    elsewhere are errors of the labels.
+    `side_mm` is the result of `side_distance`, `brain` the (i, j, k) mask with all gaps that its labels show, `core`
+    the tissue inside the cortex. The hidden fissure ends above the tissue that joins the hemispheres (corpus callosum,
+    deep grey matter, ventricles). Small contacts of the core elsewhere are errors of the labels. With `bridges`, bits
+    of tissue that cross a visible fissure are included.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # not whole voxels, which rounding would include or not
@@ -351,9 +355,11 @@ def hidden_fissure(side_mm: NDArray[np.float32], brain: Mask, core: Mask, affine
     shows = sheet & (distance(~brain) < reach)
     # small gaps between touching walls are not a fissure, and would leave tunnels when it is opened
     wide = shows & (distance(sheet & ~shows) > MIN_VISIBLE_MM)
-    # tissue that crosses a visible fissure is an error of the labels, and is opened, too
-    crosses = brain & (np.abs(side_mm) < 0.45 * size.min())
-    hidden = sheet & (crosses | (distance(wide) > MIN_VISIBLE_MM))
+    hidden = sheet & (distance(wide) > MIN_VISIBLE_MM)
+    if bridges:
+        number, _ = ndimage.label(brain & ~hidden & (np.abs(side_mm) < 0.45 * size.min()), OUTSIDE)
+        sizes_mm2 = np.bincount(number.ravel()) * float(np.prod(size)) / size.min()
+        hidden |= (number > 0) & (sizes_mm2 <= MAX_BRIDGE_MM2)[number]
     is_right = side_mm > 0
     touching = [ndimage.binary_dilation(core & part) & core & ~part for part in (is_right, ~is_right)]
     number, _ = ndimage.label(touching[0] | touching[1], OUTSIDE)

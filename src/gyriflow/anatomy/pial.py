@@ -33,6 +33,7 @@ from .extraction import (
     LEVEL,
     Floats,
     Mask,
+    handles,
     isosurface,
     main_parts,
     make_simple,
@@ -221,7 +222,12 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
     # a hidden fissure is opened as a whole, down to the tissue that joins the hemispheres
     hidden = hidden_fissure(side_mm, field > LEVEL, core, affine) if scheme.cortex else np.zeros_like(mask)
     if hidden.any():
-        field, affine, opened_ml = _with_fissure(field, affine, side_mm, hidden)
+        opened = _with_fissure(field, affine, side_mm, hidden)
+        if handles(opened[0] > LEVEL):
+            # tissue that crosses the fissure makes tunnels of it, and closing these would close the fissure
+            hidden = hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=True)
+            opened = _with_fissure(field, affine, side_mm, hidden)
+        field, affine, opened_ml = opened
     if scheme.cortex:
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:

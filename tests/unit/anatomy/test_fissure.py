@@ -156,7 +156,7 @@ def test_tissue_that_crosses_a_fissure_is_opened():
     walls = isosurface(smooth_mask(core, 1.0), affine)
     brain[20, 18:21, 25] = True
     side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
-    hidden = hidden_fissure(side_mm, brain, core, affine)
+    hidden = hidden_fissure(side_mm, brain, core, affine, bridges=True)
     to_hidden = ndimage.distance_transform_edt(~hidden, sampling=0.9)
     opened = open_fissure(brain.astype(np.float32), affine, side_mm, to_hidden) > 0.5
     assert (handles(brain), handles(opened)) == (1, 0)
