@@ -9,6 +9,7 @@ SHIPPED = INSTALLED if INSTALLED.is_dir() else PACKAGE.parents[1]
 """The folder with the Snakefile, `workflow`, `atlases`, `schemes`, `norms`, `config` and `profiles`."""
 DEMO = SHIPPED / "config" / "config.yaml"
 ATLASES = SHIPPED / "atlases"
+"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
 CONFIG = "gyriflow.yaml"
 """Name of the default configuration."""
 

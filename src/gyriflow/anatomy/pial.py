@@ -194,8 +194,8 @@ def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, 
     warnings = list(volume.warnings)
     report, original, taken_ml = {"scheme": scheme.name, **cerebrum.report}, (field, affine), 0.0
     if open_sulci:
-        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme)
-        warnings += logged([*doubts, *_fused_sulci_warning(report, volume.week)])
+        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, volume)
+        warnings += logged(doubts)
     taken = taken_ml / ML_PER_MM3
     even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, original=original)
     require_single_hemisphere(even.mesh)
@@ -231,8 +231,8 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
     if scheme.cortex:
         report["fissure_opened_mL"] = opened_ml
     if open_sulci:
-        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, cerebrum, scheme, side_mm)
-        warnings += logged([*doubts, *_fused_sulci_warning(report, volume.week)])
+        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, volume, side_mm)
+        warnings += logged(doubts)
         opened_ml += taken_ml
     volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
     even = surface_of_mask(
@@ -248,27 +248,27 @@ def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool)
 def _with_sulci(
     field: NDArray[np.float32],
     affine: Floats,
-    cerebrum: Cerebrum,
-    scheme: LabelScheme,
+    volume: _Volume,
     side_mm: NDArray[np.float32] | None = None,
 ) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any], list[str]]:
     """Open fused sulci; return the field, its affine, the volume removed (mL), a report, and warnings."""
+    cerebrum, scheme = volume.cerebrum, volume.scheme
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        return field, affine, 0.0, {"stays_fused": "the labels have no white matter"}, []
+        reason = "the labels have no white matter"
+        return field, affine, 0.0, {"stays_fused": reason}, _fused_sulci_warning(reason, volume.week)
     # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     if not report.get("sheets"):
-        return field, affine, 0.0, report, []
+        return field, affine, 0.0, report, _fused_sulci_warning(report.get("stays_fused"), volume.week)
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     report |= {"repaired_before": repaired}
     return opened, fine, report["opened_mL"] - gained_ml, report, filled_warning(repaired, affine)
 
 
-def _fused_sulci_warning(report: Mapping[str, Any], week: float) -> list[str]:
-    reason = report["sulci"].get("stays_fused")
+def _fused_sulci_warning(reason: str | None, week: float) -> list[str]:
     return [f"fused sulci were not opened: {reason}"] if reason and week > FUSED_AFTER_GW else []
 
 

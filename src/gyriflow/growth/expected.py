@@ -135,6 +135,17 @@ def carry_sharply(
         # a surface that is matched by its vertices is the goal itself
         return moving.vertices if target is None else fit_onto_surface(moving, target[0], pull_mm, target[1])
 
+    def draw_near(body: FittedBody, target: Target) -> None:
+        """Draw a body towards a surface until it is close or stays as it is."""
+        for _ in range(MAX_OPENING_DRAWS):
+            before = body.boundary.vertices
+            goals = fitted(body.boundary, target, OPENING_PULL_MM)
+            if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
+                return
+            body.draw(goals)
+            if np.allclose(body.boundary.vertices, before, atol=1e-6):
+                return
+
     def tissue_below(number: int, pair: Deformation) -> Floats:
         """Return the (n, 3) places, after a pair, of the tissue below the boundary before it."""
         before = TriangleMesh(positions[-1][used], boundary.faces)
@@ -163,14 +174,7 @@ def carry_sharply(
             if body is not None:
                 body.follow(shape)
                 if target is not None and open_sulci:
-                    for _ in range(MAX_OPENING_DRAWS):
-                        goals = fitted(body.boundary, target, OPENING_PULL_MM)
-                        before = body.boundary.vertices
-                        if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
-                            break
-                        body.draw(goals)
-                        if np.allclose(body.boundary.vertices, before, atol=1e-6):
-                            break
+                    draw_near(body, target)
                 goals = moved if target is None else fitted(body.boundary, target, FINAL_PULL_MM)
                 shape = body.draw(goals, before=positions[-2:])
                 if target is not None:

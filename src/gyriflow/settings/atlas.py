@@ -13,7 +13,6 @@ from .base import KeyProblem, Settings, did_you_mean, located, refused
 from .terms import AffineSource, Coordinates
 from .varying import AnyWeek
 
-"""Folder of the atlases that come with gyriflow, each in a folder of its own."""
 SULCI = ATLASES / "spina-bifida"
 """The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""
 DOWNLOADS = Path("resources", "atlases")

@@ -252,7 +252,7 @@ class Simulation:
 
     @property
     def atlas_surface(self) -> str:
-        """The file with the atlas' own brain beside the last week of a prediction."""
+        """The file with the atlas' own brain in the last week of a prediction."""
         return self.file(paths.ATLAS_BRAIN, week=self.weeks[-1])
 
     @property
