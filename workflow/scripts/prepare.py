@@ -17,7 +17,7 @@ from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
 with step(snakemake.log[0]):
-    mesh, maps, sizes = read_tetrahedral_mesh(files.mesh), {}, {}
+    mesh, maps, sizes, stops = read_tetrahedral_mesh(files.mesh), {}, {}, []
     facets, pose = boundary_faces(mesh)[0], read_pose(files.surface)
     for name, source in params.maps.items():
         path = ", ".join(source["map"])
@@ -31,11 +31,12 @@ with step(snakemake.log[0]):
         on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
     if files.targets:
         targets = read_weekly_shapes(files.targets)
-        weekly = targets.weeks.tolist()
-        sizes = {name: dict(zip(weekly, values.tolist(), strict=True)) for name, values in targets.sizes.items()}
-        maps |= target_maps(targets.weeks[1:], targets.positions[1:])
+        passed, stops = targets.passed, targets.stops
+        weekly = targets.weeks[passed].tolist()
+        sizes = {name: dict(zip(weekly, values[passed].tolist(), strict=True)) for name, values in targets.sizes.items()}
+        maps |= target_maps(weekly[1:], targets.positions[passed[1:]])
     curves = read_table(files.curves) if files.curves else None
-    inputs = params.settings, params.weeks, read_json(files.surface), sizes, curves, params.series
+    inputs = params.settings, params.weeks, read_json(files.surface), sizes, stops, curves, params.series
     write_yaml(output.params, parameters := run_parameters(*inputs))
     if maps:
         write_maps(output.maps, maps)

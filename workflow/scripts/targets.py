@@ -1,4 +1,4 @@
-"""Write the targets of a start brain: the shapes of its mesh in later weeks."""
+"""Write the targets of a start brain from its own series: the shapes of its mesh in later weeks."""
 
 from itertools import pairwise
 
@@ -6,12 +6,11 @@ import numpy as np
 
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.growth.expected import carry_sharply, predict_shapes, sizes_of
+from gyriflow.growth.series_shapes import follow_series, sizes_of
 from gyriflow.io.files import read_json
 from gyriflow.io.registrations import WeeklyShapes, read_correspondence, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.metrics.norms import cohort_from_plain
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -30,18 +29,7 @@ with step(snakemake.log[0]):
     # labels whose sulci stay fused have none to open; surfaces are taken as they are
     opened = [read_json(path).get("sulci", {"sheets": 1}).get("sheets") for path in files.reports]
     open_sulci = params.opens_sulci and any(opened)
-    ages, variation = None, params.variation
-    if params.is_own_growth:
-        weeks, baselines = [params.start_week, *params.weeks], {}
-        positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
-    else:
-        options = {"make_body": ElasticFit, "by_size": params.by_size, "open_sulci": open_sulci}
-        if files.norms:
-            options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.stated_weeks)
-        if variation:
-            options |= {"smoothing_mm": variation.difference_smoothing_mm, "fading_gw": variation.fading_gw}
-        inputs = (params.start_week, pairs, surfaces, params.weeks, params.further_weeks)
-        weeks, positions, baselines, ages = predict_shapes(mesh, *inputs, **options)
-    sizes, table = sizes_of(mesh, positions), ages.table() if ages else None
-    targets = WeeklyShapes(np.array(weeks), positions, sizes, baselines, table)
-    write_weekly_shapes(snakemake.output[0], targets)
+    found = follow_series(mesh, params.weeks, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
+    sizes = sizes_of(mesh, found.positions)
+    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, stops=found.stops, tets=mesh.tets)
+    write_weekly_shapes(snakemake.output[0], shapes)

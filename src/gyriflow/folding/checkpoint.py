@@ -22,7 +22,7 @@ from ..settings.varying import Maps
 
 SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
 """Subpackages and modules with the code that determines the results of a run."""
-ARRAYS = ("positions", "last", "before_last", "stretch", "volume", "log_growth")
+ARRAYS = ("positions", "last", "before_last", "stretch", "volume", "growth")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +45,9 @@ class State:
         Elastic volume ratio (m, q) at the end of the last step, if this alone is kept.
     correction
         Feedback of the last step to growth by sizes (`StepGrowth.correction`).
-    log_growth, log_growth_s
-        Logarithm (6, n) of growth since the last output week, in axes that turn with the tissue, unless growth is by
-        rates, and the time since then.
+    growth, growth_s
+        Deformation (m, 3, 3) of the elements by growth since the last output week, unless growth is by rates, and the
+        time since then.
     rows
         The step table so far.
     """
@@ -63,8 +63,8 @@ class State:
     stretch: Floats | None = None
     volume: Floats | None = None
     correction: Sequence[float] | None = None
-    log_growth: Floats | None = None
-    log_growth_s: float = 0.0
+    growth: Floats | None = None
+    growth_s: float = 0.0
     rows: tuple[dict, ...] = field(default=())
 
     @classmethod
@@ -94,7 +94,7 @@ class State:
         stretch: Floats | None = None,
         volume: Floats | None = None,
         correction: Sequence[float] | None = None,
-        log_growth: Floats | None = None,
+        growth: Floats | None = None,
     ) -> "State":
         """Return the state after an accepted step with its displacement (n, 3) in m.
 
@@ -112,8 +112,8 @@ class State:
             stretch=stretch,
             volume=volume,
             correction=correction,
-            log_growth=log_growth,
-            log_growth_s=self.log_growth_s + step_s,
+            growth=growth,
+            growth_s=self.growth_s + step_s,
             rows=(*self.rows, row),
         )
 

@@ -39,7 +39,12 @@ that is too soft lets them come so near that Newton's method stagnates."""
 MAX_STIFFENING = 32.0
 """Largest stiffness of the barrier, as a multiple of the initial one."""
 MAX_GAP_FRACTION = 0.999
-"""Largest contact distance as a fraction of the smallest gap at the start of a run."""
+"""Largest contact distance as a fraction of the small gap at the start of a run (`small_gap_mm`)."""
+FEW_VERTICES, FEW_SHARE, MAX_FEW_SHARE = 12, 0.001, 0.02
+"""Number of vertices, at least those around one, that may be nearer than the rest and do not set the distance: this
+number or this share of all, and at most the last share."""
+FEW_BELOW = 0.25
+"""Factor by which these must be nearer than the rest."""
 NEIGHBOUR_EDGES = 3
 """Vertices that so few edges connect are neighbours. Neighbours on small faces are nearer to each other than the
 contact distance, but no gap is between them."""
@@ -81,8 +86,8 @@ class SelfContact:
     Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
     distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
-    below the smallest gap at the start of the run, neighbours aside: a body that does not grow must not move, except
-    where neighbours on thin triangles are nearer to each other. `stiffens` is for runs with stress memory. MeshError
+    below the small gap at the start of the run, neighbours aside: a body that does not grow must not move, except where
+    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory. MeshError
     where the surface crosses itself at the start.
     """
 
@@ -112,13 +117,15 @@ class SelfContact:
                 remedy="Repair the surface, or mesh with a smaller mesh.envelope_mm.",
             )
         if distance_mm is None:
-            gap = domain.comm.allreduce(self._smallest_gap_mm(self._search.near(start)), op=MPI.MIN)
+            gaps = np.full(len(start), np.inf)
+            self._lower_gaps(gaps, self._search.near(start))
+            gaps = -domain.comm.allreduce(-gaps, op=MPI.MAX)
             # round-off must not make a pair of surface elements exactly at the limit
-            self._max_mm = MAX_GAP_FRACTION * gap
+            self._max_mm = MAX_GAP_FRACTION * small_gap_mm(gaps)
             self.begin_step()
 
-    def _smallest_gap_mm(self, near: NearPairs) -> float:
-        """Return the smallest distance between a rank's pairs that are not neighbours, infinite without any."""
+    def _lower_gaps(self, gaps: Floats, near: NearPairs) -> None:
+        """Lower the gap (n,) of each vertex to the smallest of a rank's pairs with it that are not neighbours."""
         corners = near.vertices_of_pairs()
         rows = near.part.vertices[np.unique(np.concatenate([[], *corners])).astype(int)]
         count = len(self._rest)
@@ -127,14 +134,12 @@ class SelfContact:
         around = links[rows]
         for _ in range(NEIGHBOUR_EDGES * EDGES_PER_SPACING[self.domain.order] - 1):
             around = around @ links
-        smallest = np.inf
         for i, vertices in enumerate(corners):
             numbers = near.part.vertices[vertices]
             if (around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0).any():
                 pair = near.pairs[i]
                 at = pair.dof(near.part_positions, near.mesh.edges, near.mesh.faces)
-                smallest = min(smallest, float(np.sqrt(pair.compute_distance(at))))
-        return smallest
+                gaps[numbers] = np.minimum(gaps[numbers], np.sqrt(pair.compute_distance(at)))
 
     def begin_step(self) -> None:
         """Start from the current positions; set the barrier by edge lengths and the smallest gap there."""
@@ -221,6 +226,16 @@ class SelfContact:
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values
+
+
+def small_gap_mm(gaps: Floats) -> float:
+    """Return the gap that limits the contact distance, from those (n,) of all vertices, infinite where none is near.
+
+    It is the smallest, unless few vertices are nearer than a quarter of the gap of the next one: then it is that
+    quarter. These few are pressed apart in the first step.
+    """
+    few = int(min(max(FEW_VERTICES, FEW_SHARE * len(gaps)), MAX_FEW_SHARE * len(gaps)))
+    return max(float(gaps.min()), FEW_BELOW * float(np.partition(gaps, few)[few]))
 
 
 def stiffening(gap: float) -> float:

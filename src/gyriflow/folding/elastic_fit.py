@@ -3,12 +3,14 @@
 A shape made by carrying vertices along a registration may turn elements inside out, or move one bank of a sulcus
 through the other. Here the body itself does the fitting: it takes the smoothed stretch of that shape as growth, springs
 draw its boundary there, and elasticity and the contact barrier keep elements positive and folds apart. It is the same
-solver as that of a simulation; the reference is updated after each step, so stress does not accumulate.
+solver as that of a simulation; the reference is updated after each step, so stress does not accumulate. The states that
+the body passes through are valid, too: where the straight way to a shape is not, some of them lie between.
 """
 
 import logging
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -19,6 +21,8 @@ from scipy.spatial import cKDTree
 from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
+from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
+from ..geometry.jacobians import EDGES, SLOPES, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
@@ -31,9 +35,8 @@ from .domain import Domain
 from .linear_solver import NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, residual_floor
 from .problem import NonlinearProblem
-from .stress import unpacked
-from .stretches import Stretches
-from .targets import PARTS_OF_PATH, inverse_exponential, log_growth, path_through
+from .stress import packed, unpacked
+from .stretches import deformation_gradients, log_stretch
 from .tissue import Elements
 from .zones import Zones
 
@@ -48,12 +51,20 @@ SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTH_MM = 0.2
 """Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
 depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
-SOFT_MM = 4.0
-"""Radius around an inverted element or crossing face on the path within which springs stay soft."""
 SOFTER = 4.0
 """Factor by which springs are softened if no solution is found with them."""
 MAX_DRAWS = 2
-"""Attempts to draw the boundary to its goals with no such element or face on the path."""
+"""Attempts to draw the boundary to its goals."""
+PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
+"""Fractions of a straight way at which faces are checked for crossings."""
+UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0), 2.0
+"""Lengths over which a displacement is smoothed around faults, and the distance from these, as a multiple of them."""
+MIN_VOLUME_ON_WAY = 0.2
+"""Fraction of an element's volume that it should keep on the way from one shape to the next."""
+STRAIGHTENING_ROUNDS = 4
+"""Rounds in which nodes on the edges of invalid curved elements are moved halfway, at last fully, to the middle."""
+MAX_LOG_STRETCH = 0.3
+"""Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STRAIN_PER_STEP = 0.1
@@ -109,16 +120,18 @@ class Springs:
 class ElasticFit:
     """A brain's mesh that is drawn to one shape after the other, on one process.
 
-    `positions_mm` (n, 3) are those of its vertices now. Quadratic elements are fitted as their linear pieces.
-    MeshError if the boundary of the mesh crosses itself.
+    `positions_mm` (n, 3) are those of its vertices now. Quadratic elements are fitted as their linear pieces and then
+    straightened where they would fold over. MeshError if the boundary of the mesh crosses itself.
     """
 
     def __init__(self, mesh: TetrahedralMesh) -> None:
-        pieces = linear_pieces(mesh)
+        pieces, self._tets = linear_pieces(mesh), mesh.tets
+        self._passed: list[Floats] = []
+        self._moved_straight = False
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces, self._stretches = pieces, Stretches(pieces, len(mesh.vertices))
+        self._pieces = pieces
         facets = self._used[self._surface.faces]
         whole = np.ones(len(mesh.vertices))
         zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
@@ -146,11 +159,16 @@ class ElasticFit:
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
         goal = transform_points(shape, motion)
         ratio = signed_volume(TriangleMesh(goal[self._used], boundary.faces)) / signed_volume(boundary)
-        steps = max(1, math.ceil(abs(math.log(max(ratio, 1e-3))) / 3 / STRAIN_PER_STEP))
+        logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
+        # of the whole, and of nine elements in ten
+        strain = max(abs(math.log(max(ratio, 1e-3))), float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9))) / 3
+        steps = max(1, math.ceil(strain / STRAIN_PER_STEP))
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
         for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left
-            strain = log_growth(self.positions_mm, self._stretches, displacement, SMOOTHING_MM)
+            logs = log_stretch(self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH)
+            integrals = integrals_at_vertices(self.positions_mm, self._pieces, packed(logs))
+            strain = smooth_integrals(self.positions_mm, self._pieces, integrals, SMOOTHING_MM)
             try:
                 self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
             except SolverError as error:
@@ -159,54 +177,144 @@ class ElasticFit:
                     raise
                 log.warning("the body comes within %.2f mm of a shape and no further: %s", misfit_mm, error)
                 break
+        self._straighten()
         return self._move(np.linalg.inv(motion))
 
-    def draw(self, goals: Floats, before: Sequence[Floats] = ()) -> Floats:
+    def draw(self, goals: Floats) -> Floats:
         """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
-        `before` are the last two shapes (n, 3) at most, if any. The path from them must have no inverted elements and
-        no crossing faces: where it has, the boundary is drawn less, and faults left after the last attempt are warned
-        of. Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is.
+        Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is, with a
+        warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
         lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
         for _ in range(MAX_DRAWS):
-            self.positions_mm, problem = start, ""
             try:
                 self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
-            except SolverError as error:
-                self.positions_mm, problem = start, f"the body is not drawn to a surface: {error}"
-                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
-                continue
-            faults = self._faults_since(before) if before else np.empty((0, 3))
-            if not len(faults):
                 break
-            place = np.round(faults[0], 1).tolist()
-            problem = f"{len(faults)} elements or faces are inverted or cross on the way to a shape, near {place} mm"
-            distance, _ = cKDTree(faults).query(self.boundary.vertices)
-            lengths[distance < SOFT_MM] = SPRING_LENGTH_MM
-        if problem:
-            log.warning("%s", problem)
+            except SolverError as error:
+                self.positions_mm, problem = start, str(error)
+                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
+        else:
+            log.warning("the body is not drawn to a surface: %s", problem)
+        self._straighten()
         return self._move(np.linalg.inv(motion))
 
-    def _faults_since(self, before: Sequence[Floats]) -> Floats:
-        """Return the (k, 3) places of inverted elements and crossing faces on the path from the last shapes."""
-        now, places = self.positions_mm, [np.empty((0, 3))]
-        path = path_through(range(len(before) + 1), [*before, now], self._pieces)
-        for part in PARTS_OF_PATH:
-            on_way = path(len(before) - 1 + part)
-            inverted = self._pieces[volumes_between(on_way, self._pieces) <= 0]
-            crossing = faces_that_cross(TriangleMesh(on_way[self._used], self._surface.faces))
-            places += [now[inverted].mean(axis=1), self.boundary.vertices[self._surface.faces[crossing]].mean(axis=1)]
+    def move_to(self, shape: Floats) -> Floats:
+        """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n, 3) positions in mm.
+
+        Where elements would be inverted or faces cross on the straight way, the displacement is smoothed around them,
+        over lengths that increase; the body follows the shape, and is drawn to it, if faults remain.
+        """
+        motion = self._fit(shape, self.positions_mm)
+        untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion))
+        if not len(faults):
+            self.positions_mm, self._moved_straight = untangled, True
+            return self._move(np.linalg.inv(motion))
+        log.info("%d faults remain on the way to a shape: the body follows it", len(faults))
+        self.follow(shape)
+        return self.draw(shape[self._used])
+
+    def _untangled(self, before: Floats, after: Floats) -> tuple[Floats, Floats]:
+        """Return the aligned shape `after`, changed around faults on the straight way to it, and those that remain.
+
+        Elements that lose most of their volume count as faults in the first round only.
+        """
+        sizes, displacement, least = vertex_sizes(before, self._pieces), after - before, MIN_VOLUME_ON_WAY
+        for length in UNTANGLING_MM:
+            faults = self._faults_between(before, before + displacement, least)
+            if not len(faults):
+                break
+            distance, _ = cKDTree(faults).query(before)
+            near = np.exp(-((distance / (UNTANGLING_REACH * length)) ** 2))[:, None]
+            smooth = smooth_integrals(before, self._pieces, sizes[:, None] * displacement, length)
+            displacement, least = displacement + near * (smooth - displacement), 0.0
+        else:
+            faults = self._faults_between(before, before + displacement)
+        return before + displacement, faults
+
+    def way_from(self, before: Floats) -> list[tuple[float, Floats]]:
+        """Return the shapes (n, 3) to pass on the way from an earlier shape to that of now, and the fraction of each.
+
+        There are none where no element is inverted and no faces cross on the straight way, if need be after a change of
+        the shape of now around the faults. Else they are states that the body has passed through since this was last
+        called; elements and faces with faults between two of them that follow each other are warned of.
+        """
+        passed, self._passed = self._passed, []
+        if self._moved_straight:
+            return []
+        motion = self._fit(self.positions_mm, before)
+        places, stops = self._stops(before, transform_points(self.positions_mm, motion), passed)
+        self.positions_mm = transform_points(places, np.linalg.inv(motion))
+        chain = [before, *stops, places]
+        lengths = [self._distance(first, second) for first, second in pairwise(chain)]
+        parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
+        return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
+
+    def _stops(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
+        """Return the shape `after`, changed around faults, and the shapes to pass before it."""
+        untangled, faults = self._untangled(before, after)
+        if len(faults) and len(passed):
+            ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
+            i = int(np.argmin(ways))
+            stop, first = self._stops(before, transform_points(passed[i], self._fit(passed[i], before)), passed[:i])
+            last, second = self._stops(stop, after, passed[i + 1 :])
+            return last, [*first, stop, *second]
+        if len(faults):
+            place, text = np.round(faults[0], 1).tolist(), "%d elements or faces are inverted or cross near %s mm on the way"
+            log.warning(text, len(faults), place)
+        return untangled, []
+
+    def _faults_between(self, before: Floats, after: Floats, least: float = 0.0) -> Floats:
+        """Return the (k, 3) places before, of elements that are inverted and faces that cross on the straight way."""
+        inverted = inverted_on_the_way(before, after, self._tets, least)
+        places, faces = [before[self._tets[inverted]].mean(axis=1)], self._used[self._surface.faces]
+        for part in PARTS_OF_WAY:
+            surface = TriangleMesh(((1 - part) * before + part * after)[self._used], self._surface.faces)
+            places.append(before[faces[faces_that_cross(surface)]].mean(axis=1))
         return np.concatenate(places)
+
+    def _fit(self, shape: Floats, onto: Floats) -> Floats:
+        # with the weights of the path (`paths.path_through`)
+        return rigid_fit(shape, onto, vertex_sizes(onto, self._pieces))
+
+    def _distance(self, first: Floats, second: Floats) -> float:
+        """Return how far all but a hundredth of the boundary moves between two shapes, without rigid motion."""
+        moves = transform_points(second, self._fit(second, first)) - first
+        return float(np.quantile(np.linalg.norm(moves[self._used], axis=1), 0.99))
+
+    def _gradients(self, goal: Floats) -> Floats:
+        return deformation_gradients(self.positions_mm, goal, self._pieces, SLOPES[None])[:, 0]
+
+    def _straighten(self) -> None:
+        """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""
+        if self._tets is self._pieces:
+            return
+        places = self.positions_mm.copy()
+        for left in reversed(range(STRAIGHTENING_ROUNDS)):
+            bad = lower_bounds(places, self._tets) <= 0
+            if not bad.any():
+                self.positions_mm = places
+                return
+            middles, ends = self._tets[bad][:, 4:], self._tets[bad][:, EDGES]
+            straight = places[ends].mean(axis=2)
+            places[middles] = straight if left == 0 else (straight + places[middles]) / 2
+        bad = lower_bounds(places, self._tets) <= 0
+        if bad.any() or (volumes_between(places, self._pieces) <= 0).any():
+            raise SolverError(
+                "a shape cannot be reached with curved elements that are valid",
+                found=f"{int(bad.sum())} elements fold over",
+                remedy="Mesh with smaller elements (mesh.surface_edge_mm) or linear ones (mesh.order: 1).",
+            )
+        self.positions_mm = places
 
     def _move(self, motion: NDArray) -> Floats:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
     def _step(self, goals: Floats, lengths: Floats, strain: Floats | None, halvings: int) -> None:
-        domain, problem = self._domain, self._problem
+        domain, problem, self._moved_straight = self._domain, self._problem, False
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
         self._springs.draw_to(goals, vertex_areas(self.boundary), lengths)
@@ -231,3 +339,12 @@ class ElasticFit:
             self._step(goals, lengths, half, halvings - 1)
             return
         self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M
+        self._passed.append(self.positions_mm)
+
+
+def inverse_exponential(logs: Floats) -> Floats:
+    """Return exp(−L) of small (..., 3, 3) matrices to fourth order in L: to 1e-7 for growth of a tenth."""
+    result = np.eye(3) - logs / 4
+    for order in (3, 2, 1):
+        result = np.eye(3) - logs @ result / order
+    return result

@@ -13,7 +13,7 @@ from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
-from .tissue import Tissue
+from .tissue import Elements, Tissue
 from .zones import Zones
 
 GROWTH_TOL = 1e-10
@@ -36,9 +36,10 @@ class Size:
 class GrowthInputs:
     """Inputs of growth that are constant through a run.
 
-    The mesh as (p, 4) linear tetrahedra between its vertices, and the run's zones and maps at these.
+    The mesh's elements, the (p, 4) linear tetrahedra between their vertices, and the run's zones and maps at these.
     """
 
+    tets: NDArray[np.int64]
     pieces: NDArray[np.int64]
     zones: Zones
     maps: Maps
@@ -46,7 +47,7 @@ class GrowthInputs:
     @classmethod
     def of(cls, mesh: TetrahedralMesh, zones: Zones, maps: Maps) -> "GrowthInputs":
         """Return the inputs for a mesh."""
-        return cls(linear_pieces(mesh), zones, maps)
+        return cls(mesh.tets, linear_pieces(mesh), zones, maps)
 
     def size(self, positions_mm: Floats) -> Size:
         """Return the size of the brain, for (n, 3) positions of all vertices."""
@@ -88,15 +89,17 @@ class StepGrowth(ABC):
     def inverse(self, tissue: Tissue) -> Floats:
         """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
-    def logarithm(self) -> Floats | None:
-        """Return ln G (6, n) at all vertices, None if growth is by the rates of the parameters."""
+    def deformation(self, elements: Elements) -> Floats | None:
+        """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of a rank's elements; None if by rates."""
         return None
 
-    def added_to(self, log_growth: Floats | None, displacement_mm: Floats) -> Floats | None:
-        """Return the sum (6, n) of a growth before this step, if any, and of this step's growth.
+    def mean_deformation(self, elements: Elements) -> Floats | None:
+        """Return the mean (c, 3, 3) of `deformation` over each element, None if growth is by rates."""
+        deformation = self.deformation(elements)
+        return None if deformation is None else np.einsum("q,cqij->cij", elements.points.weights, deformation)
 
-        Its axes turn with the tissue in the step's displacement (n, 3). None if growth is by rates.
-        """
+    def guess(self, fixed: NDArray[np.bool_]) -> Floats | None:
+        """Return the displacement (n, 3) in m of a free body, zero where it is fixed (n, 3); None if unknown."""
         return None
 
     def correction(self, after: Size) -> tuple[float, ...] | None:

@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import StorageError
+from ..geometry.diffusion import integrals_at_vertices, smooth_integrals
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
 from ..units import week_tag
-from .growth import increments_at
+from .growth import GrowthInputs, increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus
-from .stress import unpacked
+from .stress import packed, unpacked
+from .stretches import log_stretch
 from .zones import Zones
 
 log = logging.getLogger(__name__)
@@ -26,6 +28,8 @@ FRAMES = "frames.h5"
 STEPS = "steps.csv"
 SUMMARY = "summary.json"
 ZONES = "zones.json"
+GROWTH_SMOOTHING_MM = 0.4
+"""Length over which the map of growth towards shapes is smoothed; growth itself is not."""
 
 
 def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
@@ -88,8 +92,8 @@ def layer_fields(
 ) -> dict[str, NDArray]:
     """Return the fields of a shape at its vertices, for names of the parameter `fields`.
 
-    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is computed from its logarithm (6,
-    n) if given, else from the rates of the parameters.
+    Positions are (n, 3) in mm. The names of the arrays contain their units. Growth is computed from its logarithm (n,
+    6) if given, else from the rates of the parameters.
     """
     search = PialSearch(positions_mm, zones.cortex_facets)
     distance = search.distance(positions_mm)
@@ -116,13 +120,24 @@ def layer_fields(
     return {name: values for key in names if key in fields for name, values in fields[key].items()}
 
 
+def log_growth_at_vertices(positions_mm: Floats, inputs: GrowthInputs, growth: Floats) -> Floats:
+    """Return the logarithm (n, 6) of growth at (n, 3) positions, from the deformation (m, 3, 3) of elements by growth.
+
+    It is smoothed over `GROWTH_SMOOTHING_MM`, and its axes are those of the tissue as it is now.
+    """
+    logs = packed(log_stretch(growth, left=True))
+    logs = np.repeat(logs, len(inputs.pieces) // len(logs), axis=0)
+    integrals = integrals_at_vertices(positions_mm, inputs.pieces, logs)
+    return smooth_integrals(positions_mm, inputs.pieces, integrals, GROWTH_SMOOTHING_MM)
+
+
 def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
-    """Return tangential and radial growth and its main direction, from the logarithm (6, n) and unit normals (n, 3).
+    """Return tangential and radial growth and its main direction, from the logarithm (n, 6) and unit normals (n, 3).
 
     The main direction is the tangential one of largest growth; the length of its vector is the difference to the growth
     across it.
     """
-    tensors, radial = unpacked(log_growth.T), normals[:, :, None] * normals[:, None, :]
+    tensors, radial = unpacked(log_growth), normals[:, :, None] * normals[:, None, :]
     tangential = np.eye(3) - radial
     # the first eigenvector is the normal, with −1
     values, axes = np.linalg.eigh(tangential @ tensors @ tangential - radial)

@@ -13,7 +13,7 @@ import pandas as pd
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.tetrahedra import TetrahedralMesh, radius_ratios
+from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh, radius_ratios
 from ..geometry.triangles import Floats
 from ..io.files import write_json, write_table
 from ..io.frames import join_frames, read_positions, write_frame
@@ -21,9 +21,11 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, peak_memory_mib, print_line, progress_line, warn
+from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, log_growth_at_vertices
+from .output import peak_memory_mib, print_line, progress_line, warn
 from .simulation import Folding, advance
 from .steering import missed_curves
+from .targets import missed_targets, shrinkage_note
 from .zones import Zones
 
 
@@ -81,6 +83,8 @@ def run(
         write_table(out / STEPS, pd.DataFrame(list(state.rows)))
         write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)
+        if note := shrinkage_note(state.rows):
+            print_line(note)
         if diverged is not None:
             warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
         ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
@@ -94,7 +98,7 @@ def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_dive
     """
     p, rank = folding.parameters, folding.domain.comm.rank
     resumed_after, resumed = len(state.rows), time.monotonic()
-    for week in p.output_weeks[1:]:
+    for week_before, week in pairwise(p.output_weeks):
         until = seconds_to(week, p)
         while state.time_s < until * (1 - 1e-12):
             try:
@@ -107,8 +111,11 @@ def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_dive
             if arrived:
                 state = save_frame(folding, state, week, folder)
             if rank == 0:
-                if arrived and (missed := missed_curves(state.rows[-1])):
-                    warn(missed)
+                if arrived:
+                    since = [row for row in state.rows if row["week"] > week_before]
+                    quality = quality_warning(folding, state, week)
+                    for warning in filter(None, (missed_curves(state.rows[-1]), *missed_targets(since), quality)):
+                        warn(warning)
                 write_checkpoint(folder / "state.h5", key, state)
                 report_step(state, p, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
     return state, None
@@ -119,17 +126,17 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
     pressure, elements = folding.fields.contact_pressure(names, solved), folding.fields.elements(names, solved)
     # a mean over the steps since the last frame; before the first step, the growth of that step
-    log_growth = solved.growth.logarithm()
-    if state.log_growth is not None:
-        log_growth = state.log_growth * (p.step_s / state.log_growth_s)
+    growth = folding.grown(state, solved.growth) if state.growth is None else state.growth
+    steps = state.growth_s / p.step_s or 1.0
     if folding.domain.comm.rank == 0:
         fields = {"positions": state.positions * MM_PER_M}
         if "displacement" in names:
             fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
-        rates = solved.growth.parameters
-        fields |= layer_fields(fields["positions"], folding.zones, rates, folding.maps, week, names, log_growth)
+        rates, positions = solved.growth.parameters, fields["positions"]
+        logs = None if growth is None else log_growth_at_vertices(positions, folding.inputs, growth) / steps
+        fields |= layer_fields(positions, folding.zones, rates, folding.maps, week, names, logs)
         write_frame(frame_path(folder, week), week, fields | pressure, elements)
-    return replace(state, log_growth=None, log_growth_s=0.0)
+    return replace(state, growth=None, growth_s=0.0)
 
 
 def report_step(state: State, parameters: FoldingParameters, seconds_per_step: float) -> None:
@@ -156,10 +163,26 @@ def low_radius_ratio(mesh: TetrahedralMesh, positions: Floats) -> float:
     return float(np.quantile(radius_ratios(TetrahedralMesh(positions, mesh.tets)), 0.01))
 
 
+def quality_warning(folding: Folding, state: State, week: float) -> str:
+    """Return a warning if elements have become flatter than a mesh may be at the start, else an empty text."""
+    before, ratios = (
+        radius_ratios(TetrahedralMesh(positions * MM_PER_M, folding.inputs.tets))
+        for positions in (folding.start, state.positions)
+    )
+    flat = int((ratios < min(MIN_RADIUS_RATIO, float(before.min()))).sum())
+    if not flat:
+        return ""
+    return (
+        f"at GW {week:g} {flat} elements are flatter than a mesh may be at the start (radius ratio {ratios.min():.3f} of "
+        f"{MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
+    )
+
+
 def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:
     """Return the state to resume from, or None, and a message for the user.
 
-    A checkpoint is used only if the frames of all output weeks that it has passed exist.
+    A checkpoint is used only if the frames of all output weeks that it has passed exist, and if growth towards shapes,
+    whose mean is written, has been added up since one of them.
     """
     state, message = read_checkpoint(folder / "state.h5", key)
     if state is None:
@@ -168,6 +191,9 @@ def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[S
     passed = [week for week in parameters.output_weeks if seconds_to(week, parameters) <= state.time_s * (1 + 1e-12)]
     if not all(frame_path(folder, week).exists() for week in passed):
         return None, f"the checkpoint {folder} lacks frames of some output weeks: not used, the run starts again"
+    since = state.time_s - state.growth_s
+    if parameters.targets and min(abs(seconds_to(week, parameters) - since) for week in passed) > 1e-6 * since:
+        return None, f"the checkpoint {folder} is of a run with other output weeks: not used, the run starts again"
     within = tuple(row for row in state.rows if seconds_to(row["week"], parameters) <= end_s * (1 + 1e-9))
     return replace(state, rows=within), message
 

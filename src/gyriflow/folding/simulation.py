@@ -7,12 +7,11 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.diffusion import Share
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.varying import Maps, value_at, value_range
+from ..settings.varying import WEEK_RANGE, Maps, value_at, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact
@@ -63,7 +62,8 @@ class Folding:
             remembers_stress=p.stress_memory_gw > 0,
             keeps_volume=p.keeps_volume_only,
         )
-        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, p.start_week, p.end_week)[1]
+        # of all weeks, so that it does not depend on the end of the run
+        stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
             barrier = STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm
@@ -72,8 +72,7 @@ class Folding:
         newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
         self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
-        share = Share(comm.rank, comm.size, self.domain.sum_over_ranks)
-        self.model = growth_model(p, self.inputs, mesh.vertices, share)
+        self.model = growth_model(p, self.inputs, mesh.vertices, comm.allreduce)
         self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
         self.fields = StepFields(self.problem, self.contact, zones, p)
         self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
@@ -86,7 +85,9 @@ class Folding:
         """
         began = time.monotonic()
         tissue, growth = self.begin(state, step_s)
-        solution = self.solver.solve(*[self.domain.local(guess) for guess in state.initial_guesses(step_s)])
+        free = growth.guess(self.zones.fixed)
+        guesses = state.initial_guesses(step_s) if free is None else [free, *state.initial_guesses(step_s)]
+        solution = self.solver.solve(*map(self.domain.local, guesses))
         u = solution.displacement
         displacement = self.domain.gather(u[: self.domain.n_owned])
         positions = state.positions + displacement
@@ -110,8 +111,8 @@ class Folding:
             "rung": RUNGS[solution.rung],
         }
         self.solved = SolvedStep(u, step_s, growth)
-        log_growth = growth.added_to(state.log_growth, displacement * MM_PER_M)
-        after = state.after(displacement, step_s, row, stretch, volume, growth.correction(size), log_growth)
+        grown = self.grown(state, growth)
+        after = state.after(displacement, step_s, row, stretch, volume, growth.correction(size), grown)
         row["seconds"] = time.monotonic() - began
         return after
 
@@ -132,6 +133,14 @@ class Folding:
         volume = None if state.volume is None else state.volume[domain.tet_of_cell]
         self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part, volume)
         return tissue, growth
+
+    def grown(self, state: State, growth: StepGrowth) -> Floats | None:
+        """Return the deformation (m, 3, 3) of all elements by growth before a step and in it, None if it is by rates."""
+        mean = growth.mean_deformation(self.elements)
+        if mean is None:
+            return None
+        grown = self.domain.gather_cells(mean)
+        return grown if state.growth is None else grown @ state.growth
 
     def _stretch(self, state: State, step_s: float) -> Floats | None:
         if state.stretch is None:

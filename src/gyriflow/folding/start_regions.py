@@ -14,7 +14,9 @@ from ..settings.varying import Maps
 from .checks import refuse_impossible
 from .growth import GrowthInputs, StepStart
 from .growth_models import growth_model
-from .output import layer_fields
+from .output import layer_fields, log_growth_at_vertices
+from .points import IntegrationPoints
+from .tissue import Elements
 from .zones import cell_tags, facet_tags, zones_of_run
 
 
@@ -32,10 +34,14 @@ def start_regions(
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    model = growth_model(parameters, GrowthInputs.of(mesh, zones, maps), mesh.vertices)
-    growth = model(StepStart(mesh.vertices, 0.0, parameters.step_s))
-    at_start = parameters.start_week, REGION_FIELDS, growth.logarithm()
-    fields = layer_fields(mesh.vertices, zones, growth.parameters, maps, *at_start)
+    inputs = GrowthInputs.of(mesh, zones, maps)
+    growth = growth_model(parameters, inputs, mesh.vertices)(StepStart(mesh.vertices, 0.0, parameters.step_s))
+    points = IntegrationPoints.exact_to_degree(mesh.order)
+    grown = growth.mean_deformation(Elements(mesh.tets, np.arange(len(mesh.vertices)), points))
+    logs = None if grown is None else log_growth_at_vertices(mesh.vertices, inputs, grown)
+    fields = layer_fields(
+        mesh.vertices, zones, growth.parameters, maps, parameters.start_week, REGION_FIELDS, log_growth=logs
+    )
     if parameters.side is None:
         on_left = left_faces(TriangleMesh(mesh.vertices, zones.facets))
     else:

@@ -17,6 +17,7 @@ from .contact import SelfContact
 from .growth import StepGrowth
 from .layers import PialSearch
 from .problem import NonlinearProblem
+from .stretches import deformation_gradients
 from .zones import Zones
 
 
@@ -86,17 +87,6 @@ class StepFields:
         kept = {name: values for name, values in fields.items() if name in self._kept}
         rates = {name: values for name, values in fields.items() if name not in self._kept}
         return kept | {f"{name}_per_gw": values * (SECONDS_PER_GW / step_s) for name, values in rates.items()}
-
-
-def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:
-    """Return the (c, q, 3, 3) deformation gradients F = ∂x_after/∂x_before of tetrahedra at points inside them.
-
-    Positions of the nodes are (k, 3) in one unit, `cells` (c, n) their indices; the elements have a volume before.
-    `slopes` (q, n, 3) are the gradients of the nodes' shape functions in the regular element, at the points.
-    """
-    # the transposed maps from the regular element: those after = those before · Fᵀ
-    first, second = (np.matmul(slopes.transpose(0, 2, 1), x[cells][:, None]) for x in (before, after))
-    return np.asarray(np.linalg.solve(first, second), dtype=np.float64).swapaxes(-1, -2)
 
 
 def pressure(stress: Floats) -> Floats:

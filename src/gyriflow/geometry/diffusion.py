@@ -1,7 +1,6 @@
 """Smoothing and harmonic continuation of values along a surface or a solid mesh, not across sulci."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import igl
 import numpy as np
@@ -11,24 +10,10 @@ from scipy import sparse
 from .tetrahedra import volumes_between
 from .triangles import Floats, TriangleMesh, face_areas
 
+SMOOTH_TOL = 1e-3
+"""Relative tolerance of smoothing in one step."""
 STEPS = 8
 """Number of implicit steps; their product has the Gaussian's variance and almost its shape."""
-
-
-@dataclass(frozen=True)
-class Share:
-    """The share of one MPI process, number `rank` of `ranks`; `summed` adds up the arrays of all processes."""
-
-    rank: int = 0
-    ranks: int = 1
-    summed: Callable[[Floats], Floats] = np.asarray
-
-    def of(self, count: int) -> slice:
-        """Return the slice of `count` items that belongs to this process."""
-        return slice(count * self.rank // self.ranks, count * (self.rank + 1) // self.ranks)
-
-
-ALONE = Share()
 
 
 def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
@@ -62,6 +47,24 @@ def diffuse(
     for _ in range(STEPS):
         smooth = conjugate_gradients(matrix, mass[:, None] * smooth, smooth, tolerance)
     return smooth.reshape(values.shape)
+
+
+def integrals_at_vertices(vertices: Floats, cells: NDArray[np.integer], values: Floats) -> Floats:
+    """Return the (n, k) integrals around the vertices of the (m, k) values of cells: equal parts of the cells' own."""
+    shares = values * (cell_sizes(vertices, cells) / cells.shape[1])[:, None]
+    columns = [np.bincount(cells.ravel(), np.repeat(column, cells.shape[1]), len(vertices)) for column in shares.T]
+    return np.stack(columns, axis=1)
+
+
+def smooth_integrals(vertices: Floats, cells: NDArray[np.integer], integrals: Floats, length_mm: float) -> Floats:
+    """Return (n, k) smooth values at the vertices from their integrals around them, by one implicit step of diffusion.
+
+    The step has longer tails than a Gaussian of the standard deviation `length_mm`. Its relative error is `SMOOTH_TOL`.
+    """
+    sizes = vertex_sizes(vertices, cells)
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    matrix = sparse.csr_matrix(sparse.diags(sizes) + length_mm**2 / 2 * stiffness_matrix(vertices, cells))
+    return conjugate_gradients(matrix, integrals, integrals / sizes[:, None], SMOOTH_TOL)
 
 
 def harmonic_continuation(

@@ -114,3 +114,45 @@ def _subdivided_bounds(whole: Floats, depth: int) -> Floats:
     if depth > 1 and undecided.any():
         bounds[undecided] = _subdivided_bounds(parts[undecided], depth - 1)
     return np.asarray(bounds.min(axis=1))
+
+
+def inverted_on_the_way(
+    before: Floats, after: Floats, tets: NDArray[np.integer], least: float = 0.0
+) -> NDArray[np.bool_]:
+    """Return whether each (m, 4) or (m, 10) element is inverted anywhere on the straight way of its vertices.
+
+    The volume of a linear element is a cubic of the way. It is positive if all Bernstein coefficients are; else the
+    roots of the cubic decide. With `least` it must stay above that fraction of the volume before. A quadratic element is
+    checked by bounds (`lower_bounds`) at the quarters of the way.
+    """
+    if tets.shape[1] == len(NODES):
+        on_way = (before + part * (after - before) for part in (0.25, 0.5, 0.75, 1.0))
+        return np.any([lower_bounds(places, tets) <= 0 for places in on_way], axis=0)
+    inverted = np.zeros(len(tets), dtype=bool)
+    for chunk in chunks(len(tets)):
+        first, last = (np.take(x, tets[chunk, 1:], axis=0) - x[tets[chunk, :1]] for x in (before, after))
+        # rows of one end, with one or two of the other
+        mixed = [np.where(np.isin(range(3), rows)[:, None], last, first) for rows in ((0,), (1,), (2,))]
+        opposite = [np.where(np.isin(range(3), rows)[:, None], first, last) for rows in ((0,), (1,), (2,))]
+        bernstein_values = np.stack(
+            [
+                determinants(first),
+                sum(map(determinants, mixed)) / 3,
+                sum(map(determinants, opposite)) / 3,
+                determinants(last),
+            ],
+            axis=1,
+        )
+        bernstein_values -= least * np.maximum(bernstein_values[:, :1], 0.0)
+        undecided = np.flatnonzero(bernstein_values.min(axis=1) <= 0)
+        inverted[chunk.start + undecided] = [_has_root(*values) for values in bernstein_values[undecided]]
+    return inverted
+
+
+def _has_root(a: float, b: float, c: float, d: float) -> bool:
+    """Return whether the cubic with these Bernstein coefficients on [0, 1] is anywhere zero or negative there."""
+    if min(a, d) <= 0:
+        return True
+    roots = np.roots([d - 3 * c + 3 * b - a, 3 * (c - 2 * b + a), 3 * (b - a), a])
+    real = roots.real[np.abs(roots.imag) < 1e-9]
+    return bool(((real >= 0) & (real <= 1)).any())

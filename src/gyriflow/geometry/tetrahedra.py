@@ -14,6 +14,8 @@ from .triangles import Floats, Ints, TriangleMesh, frozen
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
 NODES_OF_ORDER = {1: 4, 2: 10}
+MIN_RADIUS_RATIO = 0.02
+"""Least accepted quality of an element (`radius_ratios`)."""
 # the face opposite to each corner, counter-clockwise from outside; and its four triangles if its edges have nodes: at
 # its corners in turn, and between the nodes
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))

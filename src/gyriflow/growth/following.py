@@ -64,18 +64,19 @@ def run_parameters(
     weeks: Sequence[float],
     surface: Mapping[str, Any],
     target_sizes: Mapping[str, Mapping[float, float]],
+    stops: Sequence[float],
     curves: pd.DataFrame | None,
     series: str | None,
 ) -> dict[str, Any]:
     """Return the parameters of a run as its `params.yaml` has them, with measured sizes as numbers by week.
 
     `settings` are its own, `weeks` its output weeks, `surface` is the report of the start brain's surface, and
-    `target_sizes` are those of the shapes that it grows towards, by week, the start first; empty where there are none.
+    `target_sizes` are those of the shapes that it grows towards, by week, the start first; empty where there are none. `stops` are those of the weeks without an observed brain.
     Curves and series are as for `followed_sizes`.
     """
     growth = {**settings["growth"], **target_sizes}
     targets = list(next(iter(target_sizes.values()), ()))[1:]
-    shapes = {"targets": {week: target_map(week) for week in targets}} if target_sizes else {}
+    shapes = {"targets": {week: target_map(week) for week in targets}, "stops": list(stops)} if target_sizes else {}
     sizes = followed_sizes(growth, curves, series, weeks, shrink=bool(target_sizes))
     thickness = {THICKNESS: {"weeks": sizes[THICKNESS]}} if THICKNESS in sizes else {}
     start = {"start_week": weeks[0], "output_weeks": list(weeks), "fissure_x_mm": surface["fissure_x_mm"]}

@@ -50,7 +50,9 @@ class WeeklyShapes:
 
     `positions` (w, n, 3) of its vertices are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of its
     boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm. `ages`
-    is the table of an atlas' ages by size, if they were used.
+    is the table of an atlas' ages by size, if they were used. `stops` are those of the weeks at which no brain was
+    observed, and `between` those whose shapes are on the path through the others. `tets` are the mesh's elements, if it
+    has no file of its own.
     """
 
     weeks: Floats
@@ -58,6 +60,14 @@ class WeeklyShapes:
     sizes: Mapping[str, Floats] = field(default_factory=dict)
     surfaces: Mapping[str, Sequence[Floats]] = field(default_factory=dict)
     ages: pd.DataFrame | None = None
+    stops: Sequence[float] = ()
+    between: Sequence[float] = ()
+    tets: NDArray[np.int64] | None = None
+
+    @property
+    def passed(self) -> NDArray[np.integer]:
+        """The numbers of the weeks that the path is defined by."""
+        return np.flatnonzero(~np.isin(self.weeks, self.between))
 
     def index(self, week: float) -> int:
         """Return the number of a week among those of the shapes; InputError where it is missing."""
@@ -71,12 +81,15 @@ class WeeklyShapes:
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
-    """Write the data sets weeks, positions, sizes/{area_cm2, volume_ml}, surfaces/{name} and ages/{column}."""
+    """Write the data sets weeks, stops, between, positions, tets, sizes/{area_cm2, volume_ml}, surfaces/{name} and ages/{column}."""
     with new_hdf5(path) as file:
-        file["weeks"] = np.asarray(shapes.weeks, dtype=np.float64)
+        for name, weeks in {"weeks": shapes.weeks, "stops": shapes.stops, "between": shapes.between}.items():
+            file[name] = np.asarray(weeks, dtype=np.float64)
         places = {"positions": shapes.positions} | {f"surfaces/{name}": at for name, at in shapes.surfaces.items()}
         for name, values in places.items():
             file.create_dataset(name, data=np.asarray(values, dtype=np.float32), compression="gzip", shuffle=True)
+        if shapes.tets is not None:
+            file.create_dataset("tets", data=shapes.tets, compression="gzip", shuffle=True)
         for name, values in shapes.sizes.items():
             file[f"sizes/{name}"] = np.asarray(values, dtype=np.float64)
         if shapes.ages is not None:
@@ -91,4 +104,7 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
         sizes = {name: values[:] for name, values in file.get("sizes", {}).items()}
         surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
         ages = pd.DataFrame({name: values[:] for name, values in file["ages"].items()}) if "ages" in file else None
-        return WeeklyShapes(file["weeks"][:], file["positions"][:].astype(np.float64), sizes, surfaces, ages)
+        positions = file["positions"][:].astype(np.float64)
+        special = (file[name][:].tolist() for name in ("stops", "between"))
+        tets = file["tets"][:] if "tets" in file else None
+        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, *special, tets)

@@ -193,6 +193,8 @@ class FoldingParameters(FoldingSettings):
     targets: dict[Week, str] = Field({})
     """With `growth.model: shapes`: by week what the names of the maps of the mesh's positions begin with.
     [GW]"""
+    stops: tuple[Week, ...] = ()
+    """Weeks of those targets that no brain was observed at: they lie on the way between two that were. [GW]"""
 
     @property
     def varying_maps(self) -> set[str]:

@@ -24,7 +24,7 @@ def some_state(steps=3):
     rng = np.random.default_rng(1)
     for i in range(steps):
         row = {"step": i + 1, "week": 21.0 + i, "rung": "cg"}
-        state = state.after(rng.normal(size=(4, 3)), 100.0, row, log_growth=np.full((6, 4), 0.1))
+        state = state.after(rng.normal(size=(4, 3)), 100.0, row, growth=np.full((4, 3, 3), 0.1))
     return state
 
 

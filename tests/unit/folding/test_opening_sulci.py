@@ -11,7 +11,8 @@ from gyriflow.geometry.deformations import Deformation
 from gyriflow.geometry.matching import faces_that_cross, nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
 from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas
-from gyriflow.growth.expected import carry_sharply, fit_onto_surface
+from gyriflow.growth.fitting import fit_onto_surface
+from gyriflow.growth.series_shapes import follow_series
 
 SIZE_MM = np.array([20.0, 20.0, 12.0])
 """Of a block below z = 0."""
@@ -65,10 +66,11 @@ def test_a_body_opens_a_slit_that_registration_does_not_know():
     mesh = TetrahedralMesh(box.vertices - [0, 0, SIZE_MM[2] / 2], box.tets)
     surfaces = [block_with_slit(depth) for depth in DEPTHS_MM]
     pairs = [registration(*depths) for depths in pairwise(DEPTHS_MM)]
-    found = carry_sharply(mesh, pairs, surfaces[1:], ElasticFit(mesh), open_sulci=True)
+    shapes = follow_series(mesh, range(len(surfaces)), pairs, surfaces[1:], ElasticFit(mesh), open_sulci=True)
     faces, used = boundary_surface(mesh)[0].faces, boundary_surface(mesh)[1]
     start = area_at_slit(surfaces[0])
-    for positions, surface in zip(found[1:], surfaces[1:], strict=True):
+    for week, surface in enumerate(surfaces[1:], start=1):
+        positions = shapes.positions[shapes.weeks.index(week)]
         body = TriangleMesh(positions[used], faces)
         assert len(faces_that_cross(body)) == 0
         assert (volumes_between(positions, linear_pieces(mesh)) > 0).all()

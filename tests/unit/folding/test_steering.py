@@ -110,7 +110,7 @@ def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its
     first = np.array([[0.02, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, -0.3]])
     tensors = np.stack([first, turn @ first @ turn.T])
     normals = np.stack([[0.0, 0.0, 1.0], turn[:, 2]])
-    found = growth_components(packed(tensors).T, normals)
+    found = growth_components(packed(tensors), normals)
     assert found["tangential_growth_per_step"] == pytest.approx([0.035, 0.035])
     assert found["radial_growth_per_step"] == pytest.approx([-0.3, -0.3])
     directions = found["growth_direction_per_step"]

@@ -15,7 +15,6 @@ from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.step_fields import (
     areal_stretch,
-    deformation_gradients,
     green_lagrange_maximum,
     hencky_equivalent,
     pressure,
@@ -23,6 +22,7 @@ from gyriflow.folding.step_fields import (
     von_mises,
 )
 from gyriflow.folding.stress import left_stretch, relaxed
+from gyriflow.folding.stretches import deformation_gradients
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import MATERIALS, Material, NeoHookean

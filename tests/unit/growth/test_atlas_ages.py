@@ -5,7 +5,8 @@ import pytest
 from shapes import ellipsoid_mesh
 
 from gyriflow.growth.atlas_ages import MIN_SPACING_GW, ages_by_size
-from gyriflow.growth.expected import resample_by_size, sizes_of
+from gyriflow.growth.atlas_path import resample_by_size
+from gyriflow.growth.series_shapes import sizes_of
 
 WEEKS = np.arange(21.0, 33.0)
 SMOOTH = 60 * np.exp(0.1 * (WEEKS - 21) - 0.002 * (WEEKS - 21) ** 2)
@@ -51,7 +52,8 @@ def test_shape_follows_the_ages_and_size_the_curve():
         [shape * np.cbrt(volume / size) for shape, size, volume in zip(shapes, volumes, SMOOTH, strict=True)]
     )
     atlas[4] *= 1.04
-    found, ages = resample_by_size(mesh, atlas, WEEKS.tolist())
+    ages = ages_by_size(WEEKS, sizes_of(mesh, atlas)["volume_ml"])
+    found = resample_by_size(mesh, atlas, WEEKS, ages, ages.ages)
     assert sizes_of(mesh, found)["volume_ml"] == pytest.approx(SMOOTH, rel=0.02)
 
     def length(places):

@@ -9,22 +9,19 @@ from scipy.spatial.transform import Rotation
 from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
-from gyriflow.folding.stretches import Stretches
-from gyriflow.folding.targets import log_growth
+from gyriflow.folding.elastic_fit import ElasticFit
+from gyriflow.folding.stretches import deformation_gradients, log_stretch
 from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, transform_points
-from gyriflow.geometry.diffusion import diffuse, vertex_sizes
+from gyriflow.geometry.diffusion import cell_sizes, diffuse, vertex_sizes
+from gyriflow.geometry.jacobians import SLOPES
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
-from gyriflow.growth.expected import (
-    FADING_GW,
-    carry_sharply,
-    expected_positions,
-    fit_onto_surface,
-    predict_shapes,
-    sizes_of,
-)
+from gyriflow.growth.atlas_path import AtlasPath, resample_by_size
+from gyriflow.growth.expected import FADING_GW, expected_positions, place_in_atlas, predict_shapes
+from gyriflow.growth.fitting import fit_onto_surface
+from gyriflow.growth.series_shapes import SeriesShapes, follow_series, sizes_of
 from gyriflow.metrics.curvature import curvature
 
 BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))
@@ -88,7 +85,7 @@ def shift_map(factor, shift=(0.0, 0.0, 0.0)):
 def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_along():
     later = wavy(1.0)
     moved = TriangleMesh(1.1 * later.vertices + [3.0, -2.0, 1.0], later.faces)
-    positions = carry_sharply(BALL, [shift_map(1.1, (3.0, -2.0, 1.0))], [moved])
+    positions = follow_series(BALL, [22.0, 23.0], [shift_map(1.1, (3.0, -2.0, 1.0))], [moved]).positions
     assert positions[0] == pytest.approx(BALL.vertices)
     boundary, used = boundary_surface(BALL)
     plain = 1.1 * BALL.vertices + [3.0, -2.0, 1.0]
@@ -99,28 +96,11 @@ def test_a_mesh_is_carried_onto_the_surface_of_the_next_brain_and_its_inside_alo
     assert positions[1][deep] == pytest.approx(plain[deep], abs=0.3)
 
 
-def test_a_start_outside_an_atlas_of_matched_surfaces_follows_them_from_where_it_is_registered_to():
-    turn = rigid(10, 20, 30)[:3, :3]
-    first = sphere(20.0, centre=(9.0, 0.0, 0.0))
-    later = [sphere(20.0).vertices @ turn.T * factor for factor in ([1.2, 1.1, 1.0], [1.5, 1.2, 1.1])]
-    surfaces = [first, *(TriangleMesh(places, first.faces) for places in later)]
-    pairs = [shift_map(1.0, (9.0, 0.0, 0.0)), *(MatchedSurfaces(one, two.vertices) for one, two in pairwise(surfaces))]
-    weeks, positions, others, _ = predict_shapes(BALL, 22.0, pairs, surfaces, WEEKS)
-    assert weeks == WEEKS
-    boundary, used = boundary_surface(BALL)
-    ends = BALL.vertices[used] @ turn.T * [1.5, 1.2, 1.1]
-    assert others["atlas"][2] == pytest.approx(ends, abs=0.1)
-    wanted = sizes_of(BALL, positions)["volume_ml"]
-    assert wanted[2] / wanted[0] == pytest.approx(1.5 * 1.2 * 1.1, rel=0.01)
-    for places in others.values():
-        assert signed_volume(TriangleMesh(places[2], boundary.faces)) == pytest.approx(1e3 * wanted[2], rel=0.02)
-
-
 def test_a_run_of_matched_surfaces_is_followed_from_its_first():
     inner = sphere(19.5)
     sheared = inner.vertices + inner.vertices[:, 2:] * [1.0, 0.0, 0.0]
     pairs = [MatchedSurfaces(inner, sheared), MatchedSurfaces(TriangleMesh(sheared, inner.faces), inner.vertices)]
-    positions = carry_sharply(BALL, pairs, None)
+    positions = follow_series(BALL, WEEKS, pairs, []).positions
     used = boundary_surface(BALL)[1]
     assert np.abs(positions[1] - BALL.vertices)[used].max() > 10.0
     # matched anew in the middle, points beside the surface would come back elsewhere
@@ -149,8 +129,7 @@ def without_pose(found, wanted, mesh=BALL):
 
 def test_a_brain_that_is_the_atlas_ends_as_the_atlas():
     plain, posed = atlas_of(BALL.vertices)
-    weeks, positions = expected_positions(BALL, 22.0, posed, WEEKS)
-    assert weeks == WEEKS
+    positions = expected_positions(BALL, 22.0, posed, WEEKS, WEEKS[1:])
     assert positions[0] == pytest.approx(BALL.vertices)
     for found, wanted in zip(positions, plain, strict=True):
         assert without_pose(found, wanted) < 1e-6
@@ -162,31 +141,30 @@ def test_a_brain_between_two_weeks_has_gone_a_part_of_the_way():
     places = BALL.vertices * [1.0, 1.2, 0.9]
     atlas = np.stack([places * (1 + 0.1 * (week - 22)) for week in WEEKS])
     start = TetrahedralMesh(places * 1.04, BALL.tets)
-    weeks, positions = expected_positions(start, 22.4, atlas, WEEKS)
-    assert weeks == [22.4, 23.0, 24.0]
-    assert without_pose(positions[1], places * 1.1) < 1e-6
-    assert without_pose(positions[2], places * 1.2) < 1e-6
+    positions = expected_positions(start, 22.4, atlas, WEEKS, [23.0, 23.5, 24.0])
+    for found, factor in zip(positions[1:], (1.1, 1.15, 1.2), strict=True):
+        assert without_pose(found, places * factor) < 1e-6
     # as of the week before it would be a brain too large, all its life
-    early = expected_positions(start, 22.0, atlas, WEEKS, smoothing_mm=0)[1][-1]
+    early = expected_positions(start, 22.0, atlas, WEEKS, [24.0], smoothing_mm=0)[-1]
     assert early == pytest.approx(1.04 * 1.2 * places, abs=1e-6)
 
 
-def test_a_brain_is_expected_in_further_weeks_between_those_of_the_atlas():
-    _, posed = atlas_of(BALL.vertices)
-    weeks, positions = expected_positions(BALL, 22.4, posed, WEEKS, also=[23.4, 22.9])
-    assert weeks == [22.4, 22.9, 23.0, 23.4, 24.0]
-    plain = expected_positions(BALL, 22.4, posed, WEEKS)[1]
-    assert positions[[0, 2, 4]] == pytest.approx(plain)
-    half = 0.6 * positions[2] + 0.4 * positions[4]
-    assert without_pose(positions[3], half) < 0.05
-    assert without_pose(positions[3], positions[2]) > 0.5
+def test_finer_differences_fade_from_the_start_on_wherever_the_atlas_begins():
+    mesh = box_mesh((10, 10, 10), (40.0, 40.0, 40.0))
+    start = TetrahedralMesh(mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets)
+    found = []
+    for first in (20.0, 22.0):
+        weeks = np.arange(first, 24.1)
+        atlas = np.stack([mesh.vertices * (1 + 0.1 * (week - 22)) for week in weeks])
+        found.append(expected_positions(start, 22.0, atlas, weeks, [23.0, 24.0]))
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
 
 
 def test_small_bumps_of_a_brain_fade_and_its_size_stays():
     mesh = box_mesh((10, 10, 10), (40.0, 40.0, 40.0))
     atlas = np.stack([mesh.vertices * (1 + 0.1 * (week - 22)) for week in WEEKS])
     start = TetrahedralMesh(mesh.vertices + 0.3 * np.sin(mesh.vertices * 2.0), mesh.tets)
-    _, positions = expected_positions(start, 22.0, atlas, WEEKS)
+    positions = expected_positions(start, 22.0, atlas, WEEKS, WEEKS[1:])
     left = [np.sqrt(((at - a) ** 2).mean()) for at, a in zip(positions, atlas, strict=True)]
     # a fifth larger by then, as the brain is
     assert left[2] < 1.1 * 1.2 * np.exp(-2.0 / FADING_GW) * left[0]
@@ -196,8 +174,10 @@ def test_small_bumps_of_a_brain_fade_and_its_size_stays():
 @pytest.mark.parametrize("week", [20.9, 24.0, 25.0])
 def test_a_brain_before_or_after_the_atlas_is_refused(week):
     with pytest.raises(InputError, check=Facts(f"{week:g} GW", "22 to 24 GW", "21 GW")):
-        expected_positions(BALL, week, np.stack([BALL.vertices] * 3), WEEKS)
-    assert expected_positions(BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS)[0] == [21.0, *WEEKS]
+        expected_positions(BALL, week, np.stack([BALL.vertices] * 3), WEEKS, [26.0])
+    assert expected_positions(BALL, 21.0, np.stack([BALL.vertices] * 3), WEEKS, WEEKS) == pytest.approx(
+        np.stack([BALL.vertices] * 4)
+    )
 
 
 def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
@@ -210,7 +190,6 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     axes = np.array([30.0, 36.0, 27.0])
     mesh, fine = ellipsoid_mesh(12, tuple(axes)), ellipsoid(axes, 5)
     pieces, x = linear_pieces(mesh), mesh.vertices
-    stretches = Stretches(pieces, len(x))
 
     # the atlas' place of each point of the brain
     def psi(p):
@@ -226,21 +205,26 @@ def test_growth_comes_through_registrations_of_a_known_map_in_the_whole_body():
     first = psi(fine.vertices)
     surfaces = [TriangleMesh(at, fine.faces) for at in (first, grows(first))]
     pairs = [sampled(psi, fine.vertices), sampled(grows, first)]
-    carried = carry_sharply(mesh, pairs, surfaces)[1:]
-    known = tensors(log_growth(psi(x), stretches, grows(psi(x)) - psi(x), 0.0))
+    carried = follow_series(mesh, [21.0, 22.0, 23.0], pairs, surfaces).positions[1:]
+    centres = x[pieces].mean(axis=1)
+
+    def growth(before, after):
+        return log_stretch(deformation_gradients(before, after, pieces, SLOPES[None])[:, 0])
+
+    known = growth(psi(x), grows(psi(x)))
     h = 1e-4 * np.eye(3)
-    u, _, vt = np.linalg.svd(np.stack([(psi(x + e) - psi(x - e)) / 2e-4 for e in h], axis=2))
+    u, _, vt = np.linalg.svd(np.stack([(psi(centres + e) - psi(centres - e)) / 2e-4 for e in h], axis=2))
     R = u @ vt
     wanted = np.swapaxes(R, 1, 2) @ known @ R
 
     def size(parts):
-        return np.average(np.linalg.norm(parts, axis=(1, 2)), weights=vertex_sizes(x, pieces))
+        return np.average(np.linalg.norm(parts, axis=(1, 2)), weights=cell_sizes(x, pieces))
 
     # without the rotation they would be wrong by far more than what is allowed
     assert size(known - wanted) > 0.5 * size(wanted)
     for smoothing_mm, least, most in ((0.0, 0.0, 0.05), (8.0, 0.05, 0.1)):
-        _, positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], smoothing_mm=smoothing_mm)
-        found = tensors(log_growth(x, stretches, positions[1] - x, 0.0))
+        positions = expected_positions(mesh, 22.0, carried, [22.0, 23.0], [23.0], smoothing_mm=smoothing_mm)
+        found = growth(x, positions[1])
         assert least * size(wanted) <= size(found - wanted) < most * size(wanted)
 
 
@@ -252,25 +236,109 @@ def sampled(moved, points, spacing_mm=3.0):
     return Deformation(np.eye(4), (moved(at) - at).reshape(*shape, 3), scaling(spacing_mm, low))
 
 
-def tensors(parts):
-    xx, yy, zz, xy, xz, yz = parts.T
-    return np.stack([np.stack(row, axis=1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))], axis=1)
+def path_of(weeks, growing, stops=()):
+    """Return the path of an atlas whose brain is the ball, at other vertices, that grows from week to week."""
+    mesh = ellipsoid_mesh(12, (20.0, 20.0, 20.0))
+    return AtlasPath(mesh.tets, SeriesShapes(list(weeks), np.stack([growing(mesh.vertices, w) for w in weeks]), list(stops)))
 
 
-def test_simpler_ways_start_where_the_brain_is_and_sizes_are_those_of_the_boundary():
-    pairs = [shift_map(1.0), shift_map(1.1)]
-    surface = sphere(20.0)
-    surfaces = [surface, TriangleMesh(1.1 * surface.vertices, surface.faces)]
-    weeks, positions, others, _ = predict_shapes(BALL, 22.0, pairs, surfaces, [22.0, 23.0])
-    assert weeks == [22.0, 23.0]
-    used = boundary_surface(BALL)[1]
-    assert set(others) == {"atlas", "atlas_deformed", "displaced"}
-    # the atlas' own brain lies on the finer sphere
-    assert others["atlas"][0] == pytest.approx(BALL.vertices[used], abs=0.1)
-    for places in others.values():
-        if places is not others["atlas"]:
-            assert places[0] == pytest.approx(BALL.vertices[used])
-        assert places[1] == pytest.approx(1.1 * BALL.vertices[used], abs=0.1)
-    sizes = sizes_of(BALL, positions)
-    assert sizes["volume_ml"][1] / sizes["volume_ml"][0] == pytest.approx(1.1**3, rel=0.01)
-    assert sizes["area_cm2"][0] == pytest.approx(4 * np.pi * 4.0, rel=0.03)
+def uneven(places, week):
+    """Grow unevenly, by a tenth a week and more along y, and turn by 40 degrees a week."""
+    turn = rigid(0, 0, 40 * (week - 22))[:3, :3]
+    return (places * (1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) @ turn.T
+
+
+def test_points_keep_their_places_in_an_atlas_that_grows_and_turns_inside_and_outside_of_it():
+    path = path_of(WEEKS, uneven)
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(500, 3))
+    points *= (rng.uniform(0, 19.0, 500) / np.linalg.norm(points, axis=1))[:, None]
+    # as seen from the second week
+    carried = path.carry(uneven(points, 23.0), 23.0)
+    for found, week in zip(carried, WEEKS, strict=True):
+        assert found == pytest.approx(uneven(points, week), abs=1e-6)
+    # those outside keep their distance from the surface
+    outside = points * (21.0 / np.linalg.norm(points, axis=1))[:, None]
+    surfaces = [boundary_surface(path.mesh(week))[0] for week in WEEKS]
+    distances = [nearest_on(at, surface)[0] for at, surface in zip(path.carry(outside, 22.0), surfaces, strict=True)]
+    assert distances[0].min() > 0.9
+    for found in distances[1:]:
+        assert found == pytest.approx(distances[0], abs=0.15)
+
+
+def test_ages_are_those_of_all_weeks_of_the_atlas_and_of_its_brains_alone():
+    weeks = [21.0, 22.0, 22.6, 23.0, 24.0, 25.0]
+    path = path_of(weeks, lambda places, week: places * (week / 22) ** 2, stops=[22.6])
+    ages = path.ages()
+    assert ages.weeks.tolist() == [21.0, 22.0, 23.0, 24.0, 25.0]
+    assert ages.ages == pytest.approx(ages.weeks, abs=0.02)
+    assert path.knots(ages) == pytest.approx(weeks, abs=0.02)
+
+
+def test_an_atlas_resampled_by_size_has_the_volumes_of_its_curve_as_multiples_of_the_mesh():
+    weeks = np.array([21.0, 22.0, 23.0, 24.0, 25.0])
+    # the brain called 23 is as large as one of 22.4
+    path = path_of(weeks, lambda places, week: places * 1.1 ** ((22.4 if week == 23 else week) - 22))
+    ages = path.ages()
+    inside = 0.9 * BALL.vertices
+    carried = path.carry(inside, 22.0)
+    mesh = TetrahedralMesh(inside, BALL.tets)
+    found = sizes_of(mesh, resample_by_size(mesh, carried, weeks, ages, path.knots(ages)))["volume_ml"]
+    curve = np.array([ages.volume(week) for week in weeks])
+    assert found / found[0] == pytest.approx(curve / curve[0], rel=1e-3)
+    assert found[1] == pytest.approx(0.9**3 * curve[1], rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def prediction():
+    """Return a function that predicts a ball 5 % larger than the atlas at 22.3 GW, to an end week."""
+    path = path_of([21.0, 22.0, 23.0, 24.0, 25.0, 26.0], uneven)
+    start = TetrahedralMesh(1.05 * uneven(BALL.vertices, 22.3), BALL.tets)
+    turn = rigid(0, 0, -12)
+    turn[:3, :3] /= 1.05
+    pair = Deformation(turn, np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
+
+    def predict(end_week, **options):
+        return start, predict_shapes(start, 22.3, end_week, path, pair, 22.0, ElasticFit, **options)
+
+    return predict
+
+
+def test_a_prediction_at_a_week_does_not_depend_on_where_it_ends_or_on_what_else_is_predicted(prediction):
+    _, whole = prediction(26.0)
+    for end_week, further in ((23.5, []), (24.0, [22.9, 23.4]), (25.2, [25.0])):
+        _, part = prediction(end_week, further_weeks=further)
+        for week, shape in zip(part.shapes.weeks, part.shapes.positions, strict=True):
+            assert shape == pytest.approx(whole.shapes.positions[whole.shapes.weeks.index(week)], abs=1e-9)
+    _, first = prediction(24.0, further_weeks=[23.4])
+    _, second = prediction(26.0, further_weeks=[23.4, 24.6])
+    assert first.between[23.4] == pytest.approx(second.between[23.4], abs=1e-9)
+
+
+def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(prediction):
+    start, found = prediction(25.0, further_weeks=[24.5])
+    assert found.shapes.weeks == [22.3, 23.0, 24.0, 25.0, 26.0]
+    volumes = sizes_of(start, found.shapes.positions)["volume_ml"]
+    wanted = np.array([np.linalg.det(np.diag(1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) for week in found.shapes.weeks])
+    # a part of the difference in size is smoothed away
+    assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.04)
+    assert set(found.baselines) == {"atlas", "atlas_deformed"}
+    assert found.weeks == [22.3, 23.0, 24.0, 24.5, 25.0, 26.0]
+    boundary, used = boundary_surface(start)
+    own, deformed = (
+        np.array([abs(signed_volume(TriangleMesh(at, boundary.faces))) / 1e3 for at in found.baselines[name]])
+        for name in ("atlas", "atlas_deformed")
+    )
+    # the atlas' own brain is smaller by 5 % in each direction, the one with the whole difference is not
+    assert deformed[[0, 1, 2, 4, 5]] == pytest.approx(volumes, rel=0.04)
+    assert own[1] / deformed[1] == pytest.approx(1.05**-3, rel=0.03)
+    assert (cell_sizes(found.between[24.5], start.tets) > 0).all()
+
+
+def test_a_brain_is_placed_inside_the_atlas_with_its_boundary_on_the_atlas_and_no_inverted_element():
+    atlas = ellipsoid_mesh(12, (20.0, 22.0, 20.0))
+    places = place_in_atlas(BALL, shift_map(1.0), atlas, ElasticFit)
+    boundary, used = boundary_surface(BALL)
+    surface, _ = boundary_surface(atlas)
+    assert apart_mm(TriangleMesh(places[used], boundary.faces), surface) < 0.15
+    assert (cell_sizes(places, BALL.tets) > 0).all()

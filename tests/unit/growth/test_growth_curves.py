@@ -159,7 +159,7 @@ def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
     settings = {"growth": MEASURED | {"thickness_mm": "measured"}, "thickness_mm": 1.5, "end_week": 22.0}
     table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21)))
-    found = run_parameters(settings, weeks, surface, {}, table, "volume")
+    found = run_parameters(settings, weeks, surface, {}, [], table, "volume")
     assert {name: found[name] for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")} == {
         **{"start_week": 21.0, "output_weeks": weeks, "fissure_x_mm": 0.5, "side": "left", "end_week": 22.0}
     }
@@ -167,7 +167,7 @@ def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_
     assert found["thickness_mm"]["weeks"][22.0] == pytest.approx(2.3, rel=5e-3)
     assert "targets" not in found
     shapes = {"area_cm2": {21.0: 90.0, 23.0: 80.0}, "volume_ml": {21.0: 40.0, 23.0: 60.0}}
-    found = run_parameters({"growth": {"model": "shapes"}}, weeks, surface, shapes, None, None)
+    found = run_parameters({"growth": {"model": "shapes"}}, weeks, surface, shapes, [], None, None)
     assert found["targets"] == {23.0: "target_23.00"}
     assert found["growth"]["volume_ml"][22.0] == pytest.approx(np.sqrt(40 * 60), rel=1e-9)
 

@@ -1,0 +1,187 @@
+"""Shapes of a mesh through the weeks of its own series: carried from brain to brain, and fitted to each surface."""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry
+from ..geometry.diffusion import harmonic_continuation
+from ..geometry.matching import match_surface, nearest_on, surface_distance, values_at
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
+from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, volume_ml
+from .carrying import carry_over_weeks
+from .fitting import PULL_MM, fit_onto_surface, points_below
+from .matched_surfaces import follow_surfaces
+
+log = logging.getLogger(__name__)
+
+FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
+"""Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
+MAX_OPENING_DRAWS, OPENED_MM = 4, 0.06
+"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
+MAX_MISFIT_MM = 0.25
+"""Mean distance of a body from the surface it is fitted to above which a warning is logged."""
+CONTINUATION_TOL = 1e-4
+"""Relative tolerance of the harmonic continuation that a body follows."""
+
+Target = tuple[TriangleMesh, Floats | None]
+"""A surface, and where the tissue below the vertices that are fitted to it is in its brain (n, 3), if it counts."""
+
+
+class FittedBody(Protocol):
+    """A mesh that is drawn to shapes, without inverted elements and crossing faces (`folding.elastic_fit`)."""
+
+    positions_mm: Floats
+
+    @property
+    def boundary(self) -> TriangleMesh: ...
+    def follow(self, shape: Floats) -> Floats: ...
+    def draw(self, goals: Floats) -> Floats: ...
+    def move_to(self, shape: Floats) -> Floats: ...
+    def way_from(self, before: Floats) -> list[tuple[float, Floats]]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class SeriesShapes:
+    """The (w, n, 3) positions in mm of a mesh at w weeks; `stops` are those of the weeks without an observed brain."""
+
+    weeks: list[float]
+    positions: Floats
+    stops: list[float]
+
+    @classmethod
+    def of(cls, shapes: Sequence[tuple[float, Floats, bool]]) -> "SeriesShapes":
+        """Return the shapes from ascending weeks with positions, and whether each is a stop."""
+        weeks = [week for week, _, _ in shapes]
+        stops = [week for week, _, is_stop in shapes if is_stop]
+        return cls(weeks, np.stack([positions for _, positions, _ in shapes]), stops)
+
+
+def with_stops(before: tuple[float, Floats], week: float, body: FittedBody) -> list[tuple[float, Floats, bool]]:
+    """Return the shape of a body at a week, after the stops on its way from the week and shape before."""
+    way = [(round(before[0] + part * (week - before[0]), 2), shape) for part, shape in body.way_from(before[1])]
+    stops = {at: shape for at, shape in way if before[0] < at < week}
+    return [*((at, shape, True) for at, shape in stops.items()), (week, body.positions_mm, False)]
+
+
+def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Floats, *, open_sulci: bool) -> None:
+    """Let a body follow a shape, and fit its boundary to a target; `used` are the vertices of the boundary.
+
+    With `open_sulci` it is drawn several times, until it is close or stays as it is.
+    """
+    body.follow(shape)
+    if target is None:
+        body.draw(shape[used])
+        return
+    surface, inner = target
+    for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
+        before = body.boundary.vertices
+        goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
+        if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
+            break
+        body.draw(goals)
+        if np.allclose(body.boundary.vertices, before, atol=1e-6):
+            break
+    body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
+
+
+def follow_series(
+    mesh: TetrahedralMesh,
+    weeks: Sequence[float],
+    pairs: Sequence[Correspondence],
+    surfaces: Sequence[TriangleMesh],
+    body: FittedBody | None = None,
+    *,
+    open_sulci: bool = False,
+) -> SeriesShapes:
+    """Carry a mesh's vertices through the brains of its series with its boundary fitted to theirs.
+
+    Registration smooths: it carries a surface to within half a millimetre of the brain's own and flattens its folds.
+    Therefore the boundary is fitted to that brain's surface week by week, and the inside is continued harmonically.
+    Matched surfaces need no fit: the boundary keeps its place relative to them.
+
+    Such a shape may have inverted elements and a boundary that crosses itself. A `body` of this mesh follows it week by
+    week to a shape without these, and is fitted to the surface once more from there; the next week starts from it.
+
+    With `open_sulci` the surfaces have slits that registration by labels does not show. Then points are matched by the
+    tissue below them, too, and a body is drawn to its surface several times.
+
+    The mesh belongs to the first of the `weeks`, `pairs` lead from each brain to the next, all by registration or all by
+    matched surfaces, and `surfaces` are the pial surfaces of the later brains, all in the spaces of these
+    correspondences.
+
+    InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
+    """
+    boundary, used = boundary_surface(mesh)
+    pieces = linear_pieces(mesh)
+    extend = harmonic_continuation(mesh.vertices, pieces, used)
+    shapes: list[tuple[float, Floats, bool]] = [(weeks[0], mesh.vertices, False)]
+    for week, (places, goals, target) in zip(weeks[1:], _carried(boundary, used, shapes, pairs, surfaces, open_sulci), strict=False):
+        before = shapes[-1]
+        if target is not None:
+            goals = fit_onto_surface(TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1])
+        if body is not None:
+            # on the shape of the week before, which has no inverted elements
+            extend = harmonic_continuation(before[1], pieces, used, CONTINUATION_TOL)
+        shape = places + extend(goals - places[used])
+        if body is None:
+            shapes.append((week, shape, False))
+            continue
+        fit_body(body, shape, target, used, open_sulci=open_sulci and target is not None)
+        if target is not None:
+            warn_of_misfit(body.boundary, target[0], week)
+        shapes += with_stops(before[:2], week, body)
+    return SeriesShapes.of(shapes)
+
+
+def _carried(
+    boundary: TriangleMesh,
+    used: Floats,
+    shapes: Sequence[tuple[float, Floats, bool]],
+    pairs: Sequence[Correspondence],
+    surfaces: Sequence[TriangleMesh],
+    open_sulci: bool,
+) -> Iterator[tuple[Floats, Floats, Target | None]]:
+    """Yield after each pair the (n, 3) places of the last of the shapes, the boundary's there, and its target."""
+    if matched := [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]:
+        for moved in follow_surfaces(boundary, matched)[1:]:
+            yield shapes[-1][1], moved, None
+        return
+    for number, pair in enumerate(pairs):
+        assert isinstance(pair, Deformation)
+        now = shapes[-1][1]
+        places = carry_over_weeks(now, [pair])[-1]
+        before = TriangleMesh(now[used], boundary.faces)
+        # below the observed surface: with the body's normals its roughness would add up from week to week
+        inner = tissue_below(before, surfaces[number - 1] if number else before, pair) if open_sulci else None
+        yield places, places[used], (surfaces[number], inner)
+
+
+def tissue_below(boundary: TriangleMesh, observed: TriangleMesh, pair: Deformation) -> Floats:
+    """Return the (n, 3) places, after a registration, of the tissue below the vertices of a boundary before it."""
+    return carry(pair, values_at(match_surface(boundary, observed), points_below(observed)))
+
+
+def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -> None:
+    """Log the distance of a body's boundary from the surface that it is fitted to, as a warning if it is large."""
+    ways = ((boundary, surface), (surface, boundary))
+    mean, far = surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
+    log.info("GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm", week, mean, far)
+    if mean > MAX_MISFIT_MM:
+        log.warning(
+            "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body cannot "
+            "reach all of it without inverted elements or crossing folds",
+            week,
+            mean,
+            far,
+        )
+
+
+def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats] | Floats) -> dict[str, Floats]:
+    """Return area_cm2 and volume_ml (w,) of a mesh's boundary at w positions (n, 3)."""
+    boundary, used = boundary_surface(mesh)
+    surfaces = [TriangleMesh(places[used], boundary.faces) for places in positions]
+    return {"area_cm2": np.array(list(map(area_cm2, surfaces))), "volume_ml": np.array(list(map(volume_ml, surfaces)))}

@@ -1,0 +1,131 @@
+"""Paths through shapes by week: noise of close weeks does not bend them, and elements stay valid on the way."""
+
+import numpy as np
+import pytest
+from shapes import box_mesh, ellipsoid_mesh, rigid
+
+from gyriflow.geometry.alignment import without_rigid_motion
+from gyriflow.geometry.deformations import transform_points
+from gyriflow.geometry.jacobians import inverted_on_the_way
+from gyriflow.geometry.paths import limited_velocities, merged_shapes, path_through
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, quadratic, volumes_between
+
+BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
+
+
+def grown(week):
+    """Return the body's vertices at a week: they move linearly and unevenly."""
+    x, y, z = BODY.vertices.T
+    return BODY.vertices * (1 + 0.04 * (week - 21)) + (week - 21) * np.stack([np.sin(y / 12), 0 * x, np.cos(x / 9)], 1)
+
+
+def without_motion(found, wanted):
+    return np.linalg.norm(without_rigid_motion(wanted, found, np.ones(len(found))), axis=1)
+
+
+def test_linear_growth_is_linear_between_uneven_weeks_in_any_pose():
+    weeks = [21.0, 21.5, 23.5, 24.0]
+    poses = [rigid(), rigid(10, 20, 30), rigid(0, -40, 5, shift=(9, 8, 7)), rigid(90, 0, 0)]
+    shapes = [transform_points(grown(week), pose) for week, pose in zip(weeks, poses, strict=True)]
+    path = path_through(weeks, shapes, BODY)
+    for week in (21.25, 22.5, 23.0, 23.75):
+        # but for the curvature that alignment of shapes that bend brings
+        assert without_motion(path(week), grown(week)).max() < 0.02
+
+
+def test_velocities_are_those_of_parabolas_and_do_not_overshoot():
+    weeks = np.array([21.0, 22.0, 24.0, 24.5])
+    at = np.array([0.0, 1.0, 5.0, 5.1])[:, None, None] * [[1.0, 0.0, 0.0]]
+    found = limited_velocities(weeks, at)[:, 0, 0]
+    # mean speeds 1, 2, 0.2: at 24 the parabola has 0.56, at most three times the smaller
+    assert found == pytest.approx([1.0, 4 / 3, 0.56, 0.2])
+    jump = np.array([0.0, 0.1, 5.0, 5.5])[:, None, None] * [[1.0, 0.0, 0.0]]
+    assert limited_velocities(weeks, jump)[1, 0, 0] == pytest.approx(0.3)
+
+
+def test_two_scans_at_almost_the_same_time_do_not_bend_the_path():
+    rng = np.random.default_rng(3)
+    noise = 0.2 / np.sqrt(3) * rng.normal(size=(2, *BODY.vertices.shape))
+    weeks = [21.0, 23.0, 23.1, 25.0]
+    shapes = [grown(21.0), grown(23.0) + noise[0], grown(23.1) + noise[1], grown(25.0)]
+    path = path_through(weeks, shapes, BODY)
+
+    def error(week):
+        return np.sqrt((without_motion(path(week), grown(week)) ** 2).mean())
+
+    # the mean of two scans has 0.14 mm
+    assert error(23.05) < 0.16
+    assert max(error(week) for week in np.linspace(21, 25, 33)) < 0.2
+
+
+def test_close_weeks_lie_on_a_line_through_their_mean_and_the_start_stays():
+    weeks = np.array([21.0, 21.2, 23.0, 24.0, 24.3])
+    places = np.array([0.0, 9.0, 2.0, 4.0, 6.0])[:, None, None] * np.ones((1, 1, 3))
+    at, found = merged_shapes(weeks, places)
+    assert at.tolist() == weeks.tolist()
+    # the start stays; the mean of the last two is 5 at 24.15, 3 after the 2 at 23
+    last = [5 + (week - 24.15) * 3 / 1.15 for week in (24.0, 24.3)]
+    assert found[:, 0, 0] == pytest.approx([0.0, 0.2 * 2 / 2.0, 2.0, *last])
+    # a stop next to them goes, others stay
+    with_stops = np.array([21.0, 22.0, 23.0, 24.0, 24.1, 24.3])
+    at, _ = merged_shapes(with_stops, np.zeros((6, 1, 3)), [22.0, 24.1])
+    assert at.tolist() == [21.0, 22.0, 23.0, 24.0, 24.3]
+    # a start and one scan are not merged
+    assert merged_shapes(weeks[:2], places[:2])[1] == pytest.approx(places[:2])
+
+
+def turned(angle):
+    """Return a box of elements whose inner half is turned about its axis, as a whole."""
+    mesh = box_mesh((4, 4, 4), (8.0, 8.0, 8.0))
+    x, y, z = (mesh.vertices - mesh.vertices.mean(axis=0)).T
+    fade = np.clip(1.5 - np.hypot(x, y) / 3, 0, 1) * angle
+    c, s = np.cos(fade), np.sin(fade)
+    return mesh, np.stack([c * x - s * y, s * x + c * y, z], axis=1)
+
+
+def test_an_element_inverted_in_the_middle_of_a_straight_way_is_found():
+    tet = np.array([[0, 1, 2, 3]])
+    before = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    # half a turn about z: valid at both ends, flat in the middle
+    after = before * [-1, -1, 1]
+    assert volumes_between(after, tet) > 0
+    assert inverted_on_the_way(before, after, tet).tolist() == [True]
+    # a third of a turn stays valid, with a negative Bernstein coefficient or not
+    c, s = np.cos(1.0), np.sin(1.0)
+    third = before @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    assert inverted_on_the_way(before, third, tet).tolist() == [False]
+    assert inverted_on_the_way(before, before * [1, 1, -1], tet).tolist() == [True]
+    assert inverted_on_the_way(before, before * [0.1, 0.1, 0.1], tet).tolist() == [False]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_check_agrees_with_many_points_on_the_way(order):
+    mesh, after = turned(2.2)
+    before = mesh.vertices - mesh.vertices.mean(axis=0)
+    if order == 2:
+        mesh = quadratic(TetrahedralMesh(before, mesh.tets))
+        before, after = mesh.vertices, quadratic(TetrahedralMesh(after, mesh.corners)).vertices
+    found = inverted_on_the_way(before, after, mesh.tets)
+    volumes = np.stack([volumes_between(before + t * (after - before), mesh.tets) for t in np.linspace(0, 1, 101)])
+    sampled = volumes.min(axis=0) <= 0
+    assert 0 < sampled.sum() < len(sampled)
+    assert found[sampled].all()
+    # bounds of quadratic elements may be below 0 where their volume is not
+    assert (volumes.min(axis=0)[found] <= (1e-9 if order == 1 else 0.2) * volumes[0][found]).all()
+    assert inverted_on_the_way(before, after, mesh.corners, least=0.5).sum() > found.sum() if order == 1 else True
+
+
+def test_near_an_element_that_would_be_inverted_the_path_is_straight_and_elsewhere_smooth():
+    # one vertex overshoots through its element's face; far away points slow down
+    mesh = box_mesh((8, 8, 8), (32.0, 32.0, 32.0))
+    shapes = [mesh.vertices.copy() for _ in range(3)]
+    far = mesh.vertices[:, 0] > 24.0
+    shapes[1][far, 0] += 2.0
+    shapes[2][far, 0] += 2.5
+    vertex = int(np.argmin(np.linalg.norm(mesh.vertices - [8.0, 16.0, 16.0], axis=1)))
+    shapes[1][vertex, 0] += 1.5
+    shapes[2][vertex, 0] += 3.3
+    path = path_through([21.0, 22.0, 23.0], shapes, mesh)
+    assert [len(faults) for faults in path.inverted] == [0, 0]
+    middle = path(22.5)
+    assert (volumes_between(middle, mesh.tets) > 0).all()
