@@ -43,7 +43,7 @@ BY_TESTS = {
     "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],
     "study/test_studies.py": [("src/gyriflow/study/checks.py", '"logs", ', "")],
-    "study/test_participants.py": [("src/gyriflow/study/ages.py", "whole[4]) / 7", "whole[4]) / 10")],
+    "study/test_participants.py": [("src/gyriflow/settings/weeks.py", "whole[4]) / 7", "whole[4]) / 10")],
     "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
     # comparisons and metrics
     "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "interval_of(room)[1] > 0", "room[0] > 0")],
@@ -85,6 +85,9 @@ BY_TESTS = {
     ],
     # simulations, jobs and exit codes
     "folding/test_stress.py": [("src/gyriflow/folding/stress.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
+    "cli/test_scan_ages.py": [
+        ("src/gyriflow/study/participants.py", "is_only_scan &= len({*sessions, session} - {None}) < 2", "pass"),
+    ],
     "cli/test_checking.py": [("src/gyriflow/running/cost.py", '"tetgen": 2.2', '"tetgen": 22')],
     "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime < since_s", "st_mtime > since_s")],
     "io/test_files.py": [("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1")],

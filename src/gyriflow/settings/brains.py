@@ -9,7 +9,8 @@ from .base import InputFile, KeyProblem, Settings
 from .schemes import Label
 from .synthetic import ShapeSettings
 from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
-from .varying import FileOrPair, Week, files_of
+from .varying import FileOrPair, files_of
+from .weeks import Week
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """A brain has exactly one of these keys."""

@@ -14,17 +14,16 @@ from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
-    EndWeek,
     Maps,
     Varying,
     VaryingNumber,
-    Week,
     bounds_of,
     map_of,
     require_bounds,
     value_range,
     varying,
 )
+from .weeks import EndWeek, Week
 
 
 def _memory(value: Any) -> float:

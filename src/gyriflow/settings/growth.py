@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from .base import KeyProblem, Settings
-from .varying import AnyWeek
+from .weeks import AnyWeek
 
 SizeCurve = Annotated[
     Annotated[dict[AnyWeek, Annotated[float, Field(gt=0)]], Tag("(table)")]

@@ -1,12 +1,11 @@
 """The section that names a table of participants."""
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import ConfigDict, Field, model_validator
 
 from .base import Settings
-
-WeekNotation = Literal["decimal", "days"]
+from .weeks import WeekNotation
 
 
 class ParticipantsSettings(Settings):

@@ -12,7 +12,7 @@ from .ensemble import Variation
 from .folding import FoldingSettings
 from .growth import SIZES
 from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
-from .varying import EndWeek
+from .weeks import EndWeek
 
 ALL = "all"
 """Value of `start` for all brains."""

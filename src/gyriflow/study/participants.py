@@ -14,9 +14,9 @@ from ..formats import is_volume
 from ..io.files import read_json, read_text_table
 from ..settings.base import absent_content, located, own_name, path_in
 from ..settings.brains import SOURCES
-from ..settings.participants import ParticipantsSettings, WeekNotation
+from ..settings.participants import ParticipantsSettings
+from ..settings.weeks import EXPECTED_AGE, WeekNotation
 from .ages import (
-    EXPECTED_AGE,
     EXPECTED_COLUMNS,
     OTHER_TYPE,
     AgeColumn,
