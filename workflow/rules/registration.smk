@@ -132,7 +132,6 @@ rule targets:
         posed=lambda w: chain_of(w).posed,
         is_own_growth=lambda w: chain_of(w).origin == "self",
         opens_sulci=CONFIG.surface.open_sulci,
-        by_size=CONFIG.growth.atlas_ages == "size",
         variation=lambda w: chain_of(w).variation,
     script:
         "../scripts/targets.py"

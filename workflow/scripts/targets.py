@@ -35,7 +35,7 @@ with step(snakemake.log[0]):
         weeks, baselines = [params.start_week, *params.weeks], {}
         positions = carry_sharply(mesh, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
     else:
-        options = {"make_body": ElasticFit, "by_size": params.by_size, "open_sulci": open_sulci}
+        options = {"make_body": ElasticFit, "open_sulci": open_sulci}
         if files.norms:
             options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(params.stated_weeks)
         if variation:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
@@ -55,7 +55,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes", "gap_mm": 2.5, "penalty_pa_per_m": 5.0e5},
+        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5},
         "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth towards the shapes that were measured on the brain's own series
@@ -116,9 +116,6 @@ class GrowthSettings(Settings):
     may combine several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
     """The series, if there are several, that gives measured curves or an atlas' growth. `null`: the start brain's."""
-    atlas_ages: Literal["size", "stated"] = "size"
-    """With `growth: {model: shapes, of: atlas}`, the ages of the atlas' brains: `size`, the week at which the smooth
-    curve of the atlas' volume has a brain's volume, with the size of the curve at each week; `stated`, those given."""
     matched_surfaces: bool = True
     """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
     needed."""
@@ -199,7 +196,7 @@ class SweepSettings(ComparisonSettings):
 
     vary: dict[str, tuple[Value, ...]]
     """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots
-    (`contact.gap_mm`)."""
+    (`solver.newton_tolerance`)."""
     fixed: dict[str, Value] = Field({})
     """Keys of `folding` that are changed in all runs."""
     fixed_at: dict[float, dict[str, Value]] = Field({})

@@ -8,6 +8,9 @@ from .base import InputFile, Settings
 from .brains import GivenRegions
 from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
 
+MIN_RADIUS_RATIO = 0.001
+"""Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
+
 
 class SurfaceSettings(Settings):
     """Extraction and repair of pial surfaces from label volumes and surface files."""
@@ -40,10 +43,13 @@ class MeshSettings(Settings):
     """Distance between neighbouring nodes deep inside. [mm]"""
     envelope_mm: float = Field(0.1, gt=0.001, le=2)
     """Largest distance of the mesh's surface from the pial surface (`pytetwild`). [mm]"""
-    min_radius_ratio: float = Field(0.02, ge=0, lt=1)
-    """Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
     max_surface_distance_mm: float = Field(0.1, gt=0, le=5)
     """Largest 99th percentile of the distance between mesh and pial surface, in both directions. [mm]"""
+
+    @property
+    def gates(self) -> dict[str, float]:
+        """The limits on the quality of the mesh."""
+        return {"min_radius_ratio": MIN_RADIUS_RATIO, "max_surface_distance_mm": self.max_surface_distance_mm}
 
 
 Modes = Annotated[
