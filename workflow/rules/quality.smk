@@ -10,13 +10,6 @@ def quality_columns(name):
     )
 
 
-def surface_log(wildcards):
-    """Return the log of the job that made a brain's surface and thickness."""
-    brain = brain_of(wildcards)
-    (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.config.source, brain.sides)]
-    return f"{BRAIN}/logs/{rule}{'_with_thickness' if brain.has_thickness else ''}.log".format(brain=brain.id)
-
-
 rule brain_figures:
     input:
         surface=PIAL["whole"],
@@ -47,7 +40,7 @@ rule brain_figures:
         labels=lambda w: brain_of(w).labels,
         columns=lambda w: quality_columns(w.brain),
         side=lambda w: brain_of(w).sides[0],
-        log=surface_log,
+        log=lambda w: f"{BRAIN}/logs/pial.log".format(brain=w.brain),
     script:
         "../scripts/brain_figures.py"
 

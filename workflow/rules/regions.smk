@@ -16,7 +16,7 @@ rule given_regions:
     benchmark:
         f"{BRAIN}/benchmarks/given_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "given"),
+        brain=brains_with(regions_from="given"),
     conda:
         ENVIRONMENT
     params:
@@ -52,7 +52,7 @@ rule carried_regions:
     benchmark:
         f"{BRAIN}/benchmarks/carried_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "carried"),
+        brain=brains_with(regions_from="carried"),
     conda:
         ENVIRONMENT
     params:
@@ -76,7 +76,7 @@ rule named_sulci:
     benchmark:
         f"{BRAIN}/benchmarks/named_sulci.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "named"),
+        brain=brains_with(regions_from="named"),
     conda:
         ENVIRONMENT
     params:
@@ -99,7 +99,7 @@ rule simulated_regions:
     benchmark:
         f"{RUN}/benchmarks/simulated_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.has_regions),
+        brain=brains_with(has_regions=True),
     conda:
         ENVIRONMENT
     script:

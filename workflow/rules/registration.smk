@@ -42,38 +42,40 @@ def pair_of(wildcards):
     return study.brains[wildcards.earlier], study.brains[wildcards.later]
 
 
-for rule_name, output_file in (
-    ("register", REGISTERED),
-    ("register_varied", VARIED_REGISTRATION),
-):
-    pair = output_file.removeprefix(f"{STUDY}/registration/").removesuffix(".h5").replace("/", ".")
+rule register:
+    input:
+        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
+        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
+    output:
+        REGISTERED,
+    log:
+        f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.tsv"
+    wildcard_constraints:
+        smoothing=r"\d\.\d+",
+        seed=r"\d+",
+    priority: 1
+    conda:
+        ENVIRONMENT
+    params:
+        brains=lambda w: [brain.registered for brain in pair_of(w)],
+        images=lambda w: [brain.config.image for brain in pair_of(w)],
+        smoothing=lambda w: float(dict(w).get("smoothing", 1)),
+        seed=lambda w: int(dict(w).get("seed", 0)),
+        is_varied=lambda w: "seed" in dict(w),
+    script:
+        "../scripts/register.py"
 
-    rule:
-        name:
-            rule_name
-        input:
-            brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-            images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
-        output:
-            output_file,
-        log:
-            f"{STUDY}/logs/register.{pair}.log",
-        benchmark:
-            f"{STUDY}/benchmarks/register.{pair}.tsv"
-        wildcard_constraints:
-            smoothing=r"\d\.\d+",
-            seed=r"\d+",
-        priority: 1
-        conda:
-            ENVIRONMENT
-        params:
-            brains=lambda w: [brain.registered for brain in pair_of(w)],
-            images=lambda w: [brain.config.image for brain in pair_of(w)],
-            smoothing=lambda w: float(dict(w).get("smoothing", 1)),
-            seed=lambda w: int(dict(w).get("seed", 0)),
-            is_varied=rule_name == "register_varied",
-        script:
-            "../scripts/register.py"
+
+# of a member of an ensemble
+use rule register as register_varied with:
+    output:
+        VARIED_REGISTRATION,
+    log:
+        f"{STUDY}/logs/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.log",
+    benchmark:
+        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.tsv"
 
 
 # the original surfaces with all their vertices, in the pose of the mesh

@@ -93,6 +93,10 @@ class Brain:
         return self.config.sides
 
     @property
+    def source(self) -> str:
+        return self.config.source
+
+    @property
     def subject(self) -> str:
         """The subject that was scanned; the brain's own id if none is named."""
         return self.config.subject or self.id
