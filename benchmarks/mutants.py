@@ -40,7 +40,7 @@ BY_TESTS = {
         ("src/gyriflow/study/series.py", "all(brain.sides == start.sides for brain in brains)", "True"),
         ("src/gyriflow/settings/terms.py", "10 if individuals", "19 if individuals"),
     ],
-    "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
+    "study/test_study.py": [("src/gyriflow/study/series.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],
     "study/test_studies.py": [("src/gyriflow/study/checks.py", '"logs", ', "")],
     "study/test_participants.py": [("src/gyriflow/settings/weeks.py", "whole[4]) / 7", "whole[4]) / 10")],

@@ -9,19 +9,22 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    GetCoreSchemaHandler,
     ModelWrapValidatorHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
-from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core.core_schema import tagged_union_schema
 
 from ..errors import InputError
 
@@ -47,6 +50,23 @@ class KeyProblem:
 
     text: str
     key: tuple[str | int, ...] = ()
+
+
+@dataclass(frozen=True)
+class FirstIf:
+    """Mark a union of two types, the first of which is meant by values of some kinds and the second by all others.
+
+    So a message is about one of them, not about both.
+    """
+
+    kinds: type | UnionType
+
+    def __get_pydantic_core_schema__(self, union: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        first, second = map(handler.generate_schema, get_args(union))
+        return tagged_union_schema(
+            {"(first)": first, "(second)": second},
+            lambda value: "(first)" if isinstance(value, self.kinds) else "(second)",
+        )
 
 
 def refused(text: str) -> PydanticCustomError:

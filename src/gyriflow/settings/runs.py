@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Field
 
-from .base import KeyProblem, Settings
+from .base import FirstIf, KeyProblem, Settings
 from .brains import BrainConfig
 from .ensemble import Variation
 from .folding import FoldingSettings
@@ -19,10 +19,7 @@ ALL = "all"
 FIRST = "first"
 """Value of `start` for the first of `brains`. The first of an atlas is its earliest week."""
 
-Start = Annotated[
-    Annotated[str, Tag("(id)")] | Annotated[tuple[str, ...], Tag("(list)")],
-    Discriminator(lambda value: "(list)" if isinstance(value, list | tuple) else "(id)"),
-]
+Start = Annotated[tuple[str, ...] | str, FirstIf(list | tuple)]
 """The id of a brain, a list of ids, `first` or `all`."""
 
 RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=MAX_NAME_LENGTH)]
@@ -100,10 +97,7 @@ def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[s
 # growth
 
 Names = tuple[str, ...]
-Series = Annotated[
-    Annotated[Names, Tag("(list)")] | Annotated[dict[str, Names], Tag("(table)")],
-    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(list)"),
-]
+Series = Annotated[dict[str, Names] | Names, FirstIf(dict)]
 
 
 class GrowthSettings(Settings):
@@ -162,10 +156,7 @@ def _ages(brains: Sequence[BrainConfig]) -> int:
 
 # studies and calibration
 
-Value = Annotated[
-    Annotated[float, Tag("(number)")] | Annotated[str, Tag("(text)")],
-    Discriminator(lambda value: "(text)" if isinstance(value, str) else "(number)"),
-]
+Value = Annotated[str | float, FirstIf(str)]
 """A value of a parameter that a sweep varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields", "ensemble")
 """Keys that do not belong to the model of a run, or that the sweep sets."""

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
-from .base import InputFile, Settings
+from .base import FirstIf, InputFile, Settings
 from .brains import GivenRegions
 from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
 
@@ -52,16 +52,8 @@ class MeshSettings(Settings):
         return {"min_radius_ratio": MIN_RADIUS_RATIO, "max_surface_distance_mm": self.max_surface_distance_mm}
 
 
-Modes = Annotated[
-    Annotated[int, Field(ge=2, le=20000), Tag("(number)")] | Annotated[LastBand, Tag("(word)")],
-    Discriminator(lambda value: "(word)" if isinstance(value, str) and not value.isdigit() else "(number)"),
-]
-
-
-Regions = Annotated[
-    Annotated[dict[str, GivenRegions], Tag("(table)")] | Annotated[Literal["named_sulci"], Tag("(word)")],
-    Discriminator(lambda value: "(word)" if isinstance(value, str) else "(table)"),
-]
+Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)]
+Regions = Annotated[Literal["named_sulci"] | dict[str, GivenRegions], FirstIf(str)]
 
 
 class CostSettings(Settings):

@@ -6,19 +6,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, field_validator
+from pydantic import Field, field_validator
 from pydantic.fields import FieldInfo
 
 from ..formats import format_of, is_volume
-from .base import InputFile, KeyProblem, Settings
+from .base import FirstIf, InputFile, KeyProblem, Settings
 from .weeks import AnyWeek, week_of
 
 Maps = Mapping[str, NDArray[np.float64]]
 """Values at the mesh vertices, by parameter name. They move with the tissue."""
-FileOrPair = Annotated[
-    Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
-    Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
-]
+FileOrPair = Annotated[tuple[InputFile, InputFile] | InputFile, FirstIf(list | tuple)]
 
 
 class Varying(Settings):
@@ -69,10 +66,7 @@ def files_of(files: str | tuple[str, str] | None) -> list[str]:
     return [files] if isinstance(files, str) else list(files or ())
 
 
-VaryingNumber = Annotated[
-    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
-    Discriminator(lambda value: "(table)" if isinstance(value, dict | Varying) else "(number)"),
-]
+VaryingNumber = Annotated[Varying | float, FirstIf(dict | Varying)]
 """A number, a curve or a map."""
 
 

@@ -13,8 +13,8 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import UsedAtlas
-from .records import Brain, CalibrationRuns, Chain, Measurement, Simulation, Sweep
-from .series import Series, several_subjects
+from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
+from .series import Chain, Series, several_subjects
 
 
 @dataclass(frozen=True)
