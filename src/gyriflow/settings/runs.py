@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 from .base import FirstIf, KeyProblem, Settings
 from .brains import BrainConfig
 from .ensemble import Variation
-from .folding import FoldingSettings
+from .folding import VARYING, FoldingSettings
 from .growth import SIZES
 from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
 from .weeks import EndWeek
@@ -77,6 +77,37 @@ class Run(FoldingSettings):
             yield KeyProblem(problem.text, ("growth", *problem.key))
         if self.ensemble is not None and self.growth.definition.measured != "shapes":
             yield KeyProblem(f"is not used by the growth model {self.growth.model}, only by shapes", ("ensemble",))
+
+
+def complete_runs(raw: dict[str, Any]) -> dict[str, Any]:
+    """Return a configuration, as plain dictionaries, with complete runs and `folding`.
+
+    A run has the keys of `folding`, overridden by its preset, overridden by its own. Keys of `folding` override the
+    preset of `folding`. Values that are not sections are left for validation. Without `runs` there is one, `reference`.
+    """
+    folding, runs = raw.get("folding", {}), raw.get("runs") or {"reference": {}}
+    if not isinstance(folding, dict) or not isinstance(runs, dict):
+        return raw | {"folding": folding, "runs": runs}
+    base = _merged(PRESETS.get(str(folding.get("preset")), {}), folding)
+    complete = {}
+    for name, run in runs.items():
+        own = run or {}
+        is_preset = isinstance(own, dict) and "preset" in own
+        inherited = _merged(folding, PRESETS.get(str(own["preset"]), {})) if is_preset else base
+        complete[name] = _merged(inherited, own)
+    return raw | {"folding": base, "runs": complete}
+
+
+def _merged(base: Any, over: Any, key: str = "") -> Any:
+    """Return a section with the keys of another on top; inner sections are merged, but not values that vary."""
+    if key == "growth":
+        base, over = ({"model": growth} if isinstance(growth, str) else growth for growth in (base, over))
+    if not isinstance(base, dict) or not isinstance(over, dict) or key in VARYING:
+        return over
+    # another growth model has other keys
+    if key == "growth" and over.get("model", base.get("model")) != base.get("model"):
+        return over
+    return base | {name: _merged(base.get(name), value, name) for name, value in over.items()}
 
 
 def members_of(name: str, run: Run) -> dict[str, Variation]:
