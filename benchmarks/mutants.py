@@ -44,7 +44,9 @@ BY_TESTS = {
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],
     "study/test_studies.py": [("src/gyriflow/study/checks.py", '"logs", ', "")],
     "study/test_participants.py": [("src/gyriflow/settings/weeks.py", "whole[4]) / 7", "whole[4]) / 10")],
-    "study/test_maps_and_growth.py": [("src/gyriflow/settings/runs.py", "if is_preset else base", "if False else base")],
+    "study/test_maps_and_growth.py": [
+        ("src/gyriflow/settings/runs.py", "if is_preset else base", "if False else base")
+    ],
     # comparisons and metrics
     "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "interval_of(room)[1] > 0", "room[0] > 0")],
     "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '!= "run"]', '!= "target"]')],

@@ -186,4 +186,10 @@ rule growth_maps:
 rule folding:
     input:
         study.files(*FOLDING.values()),
-        study.folded_surfaces,
+        [
+            simulation.file(file, week=week)
+            for simulation in study.run_simulations
+            for file in folded_of(*simulation.start.sides).values()
+            for week in simulation.weeks
+        ],
+        [simulation.file(GROWTH_MAPS) for simulation in study.run_simulations if simulation.has_growth_maps],

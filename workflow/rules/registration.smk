@@ -2,11 +2,12 @@
 from gyriflow.running.cost import targets_memory_mib
 
 if workflow.is_main_process:
-    for series, cause in study.unmatched_starts.items():
-        print(
-            f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
-            file=sys.stderr,
-        )
+    for series, cause in study.series.unmatched.items():
+        if set(study.starts) & set(study.series.brains[series]):
+            print(
+                f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
+                file=sys.stderr,
+            )
 
 
 def similar_thickness(brain):

@@ -140,11 +140,16 @@ rule deviation:
         "../scripts/deviation.py"
 
 
+def ceiling_weeks(brain):
+    """Return the validated weeks to which a start brain's mesh is carried."""
+    return [week for week in study.chains[brain, "self"].later_weeks if (brain, week) in study.references]
+
+
 # the start brain's mesh carried to later weeks by registration alone: an upper limit of accuracy
 rule registration_ceiling:
     input:
-        unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
-        whole=lambda w: [study.references[w.brain, week][0].pial for week in study.ceiling_weeks(w.brain)],
+        unpack(lambda w: prepared_files(w.brain, ceiling_weeks(w.brain))),
+        whole=lambda w: [study.references[w.brain, week][0].pial for week in ceiling_weeks(w.brain)],
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
@@ -163,9 +168,9 @@ rule registration_ceiling:
     params:
         carried_weeks=lambda w: study.chains[w.brain, "self"].weeks,
         start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: study.ceiling_weeks(w.brain),
+        weeks=lambda w: ceiling_weeks(w.brain),
         run="registration",
-        real=lambda w: [study.references[w.brain, week][0].id for week in study.ceiling_weeks(w.brain)],
+        real=lambda w: [study.references[w.brain, week][0].id for week in ceiling_weeks(w.brain)],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:

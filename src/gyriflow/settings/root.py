@@ -6,9 +6,8 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from .atlas import AtlasSettings
 from .base import Settings
-from .brains import BrainConfig
+from .brains import BrainConfig, ParticipantsSettings
 from .folding import FoldingSettings
-from .participants import ParticipantsSettings
 from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings, complete_runs
 from .schemes import SchemeSettings
 from .stages import CostSettings, MeshSettings, MetricsSettings, SurfaceSettings

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import PROBLEM, Key, line, messages
-from ..settings.participants import ParticipantsSettings
+from ..settings.brains import ParticipantsSettings
 from ..settings.root import Config
 from .atlases import UsedAtlas, atlas_brains, atlas_problems
 from .checks import problems_between
