@@ -34,10 +34,6 @@ rule ensemble:
         ENSEMBLE,
     log:
         f"{RUN}/logs/ensemble.log",
-    benchmark:
-        f"{RUN}/benchmarks/ensemble.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/ensemble.py"
 
@@ -56,12 +52,8 @@ rule ensemble_maps:
         **ensemble_maps(*SIDES),
     log:
         f"{RUN}/logs/ensemble_maps.{WEEK}.log",
-    benchmark:
-        f"{RUN}/benchmarks/ensemble_maps.{WEEK}.tsv"
     wildcard_constraints:
         brain=brains_with(*SIDES),
-    conda:
-        ENVIRONMENT
     params:
         sides=lambda w: brain_of(w).sides,
     script:
@@ -94,9 +86,5 @@ rule growth_sd:
         GROWTH_SD,
     log:
         f"{RUN}/logs/growth_sd.log",
-    benchmark:
-        f"{RUN}/benchmarks/growth_sd.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/growth_sd.py"

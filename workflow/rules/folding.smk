@@ -40,12 +40,8 @@ rule prepare:
         data=REGIONS["data"],
     log:
         f"{RUN}/logs/prepare.log",
-    benchmark:
-        f"{RUN}/benchmarks/prepare.tsv"
     wildcard_constraints:
         run=prepared_runs(with_maps=False),
-    conda:
-        ENVIRONMENT
     params:
         settings=lambda w: simulation_of(w).parameters,
         weeks=lambda w: simulation_of(w).weeks,
@@ -114,14 +110,10 @@ rule simulate:
         **FOLDING,
     log:
         f"{RUN}/logs/simulate.log",
-    benchmark:
-        f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(CONFIG.runs),
     # these are the longest and start first; runs of sweeps use the remaining cores
     priority: 1
-    conda:
-        ENVIRONMENT
     threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
@@ -142,12 +134,8 @@ checkpoint simulate_member:
         **FOLDING,
     log:
         f"{RUN}/logs/simulate.log",
-    benchmark:
-        f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(study.may_diverge),
-    conda:
-        ENVIRONMENT
     threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
@@ -175,10 +163,6 @@ rule growth_maps:
         GROWTH_MAPS,
     log:
         f"{RUN}/logs/growth_maps.log",
-    benchmark:
-        f"{RUN}/benchmarks/growth_maps.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/growth_maps.py"
 

@@ -13,10 +13,6 @@ rule growth_rates:
         **GROWTH,
     log:
         f"{STUDY}/logs/growth_rates.log",
-    benchmark:
-        f"{STUDY}/benchmarks/growth_rates.tsv"
-    conda:
-        ENVIRONMENT
     params:
         series=[series for series, _ in study.growth_brains],
         brains=[brain.id for _, brain in study.growth_brains],
@@ -34,10 +30,6 @@ rule growth_curves:
         **CURVES,
     log:
         f"{STUDY}/logs/growth_curves.log",
-    benchmark:
-        f"{STUDY}/benchmarks/growth_curves.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/growth_curves.py"
 

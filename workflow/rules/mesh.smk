@@ -6,11 +6,7 @@ rule tetrahedralise:
         **MESH,
     log:
         f"{BRAIN}/logs/tetrahedralise.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/tetrahedralise.tsv"
     priority: 1
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=6000,
     params:

@@ -17,12 +17,8 @@ rule measure:
         **measures_in(f"{BRAIN}/metrics", *SIDES),
     log:
         f"{BRAIN}/logs/measure.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/measure.tsv"
     wildcard_constraints:
         brain=brains_with(*SIDES),
-    conda:
-        ENVIRONMENT
     params:
         labels=lambda w: brain_of(w).measurement.labels,
         settings=MEASURED_WITH,
@@ -41,12 +37,8 @@ rule measure_simulated:
         **measures_in(f"{RUN}/metrics/{WEEK}", *SIDES),
     log:
         f"{RUN}/logs/measure_simulated.{WEEK}.log",
-    benchmark:
-        f"{RUN}/benchmarks/measure_simulated.{WEEK}.tsv"
     wildcard_constraints:
         brain=brains_with(*SIDES),
-    conda:
-        ENVIRONMENT
     params:
         labels=lambda w: simulation_of(w).at(float(w.week)).labels,
         settings=MEASURED_WITH,
@@ -63,12 +55,8 @@ rule white:
         **white_of(*SIDES),
     log:
         f"{BRAIN}/logs/white.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/white.tsv"
     wildcard_constraints:
         brain=brains_with(*SIDES, has_white=True),
-    conda:
-        ENVIRONMENT
     params:
         columns=lambda w: brain_of(w).measurement.labels,
         labels=lambda w: brain_of(w).labels,

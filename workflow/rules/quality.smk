@@ -31,10 +31,6 @@ rule brain_figures:
         row=f"{BRAIN}/quality.json",
     log:
         f"{BRAIN}/logs/brain_figures.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/brain_figures.tsv"
-    conda:
-        ENVIRONMENT
     params:
         white_files=lambda w: brain_of(w).config.white_files,
         labels=lambda w: brain_of(w).labels,
@@ -52,10 +48,6 @@ rule quality_table:
         f"{STUDY}/quality.csv",
     log:
         f"{STUDY}/logs/quality_table.log",
-    benchmark:
-        f"{STUDY}/benchmarks/quality_table.tsv"
-    conda:
-        ENVIRONMENT
     params:
         refused=[
             *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),

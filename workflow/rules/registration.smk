@@ -28,10 +28,6 @@ rule filled_labels:
         FILLED_LABELS,
     log:
         f"{BRAIN}/logs/filled_labels.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/filled_labels.tsv"
-    conda:
-        ENVIRONMENT
     params:
         white=lambda w: brain_of(w).config.white_files,
     script:
@@ -51,14 +47,10 @@ rule register:
         REGISTERED,
     log:
         f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.tsv"
     wildcard_constraints:
         smoothing=r"\d\.\d+",
         seed=r"\d+",
     priority: 1
-    conda:
-        ENVIRONMENT
     params:
         brains=lambda w: [brain.registered for brain in pair_of(w)],
         images=lambda w: [brain.config.image for brain in pair_of(w)],
@@ -75,8 +67,6 @@ use rule register as register_varied with:
         VARIED_REGISTRATION,
     log:
         f"{STUDY}/logs/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.tsv"
 
 
 # the original surfaces with all their vertices, in the pose of the mesh
@@ -88,10 +78,6 @@ rule match_surfaces:
         MATCHED,
     log:
         f"{STUDY}/logs/match_surfaces.{{earlier}}.{{later}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/match_surfaces.{{earlier}}.{{later}}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         files=lambda w: [brain.config.files for brain in pair_of(w)],
     script:
@@ -118,13 +104,9 @@ rule targets:
         TARGETS,
     log:
         f"{BRAIN}/logs/targets.{{origin}}.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/targets.{{origin}}.tsv"
     wildcard_constraints:
         origin=one_of(dict.fromkeys(name for _, name in study.chains)),
     priority: 1
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
     params:

@@ -40,10 +40,6 @@ rule study_records:
         config=f"{REPORT}/config.yaml",
     log:
         f"{STUDY}/logs/study_records.log",
-    benchmark:
-        f"{STUDY}/benchmarks/study_records.tsv"
-    conda:
-        ENVIRONMENT
     params:
         config=USED_SETTINGS,
         # also refused brains
@@ -134,10 +130,6 @@ rule html_report:
         view=f"{REPORT}/surfaces.json",
     log:
         f"{REPORT}/logs/html_report.log",
-    benchmark:
-        f"{REPORT}/benchmarks/html_report.tsv"
-    conda:
-        ENVIRONMENT
     params:
         figures=ON_PAGE[None],
         brain_figures={brain: ON_PAGE[brain] for brain in study.brains},

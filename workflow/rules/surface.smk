@@ -40,12 +40,8 @@ rule shape:
         SHAPE,
     log:
         f"{BRAIN}/logs/shape.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/shape.tsv"
     wildcard_constraints:
         brain=brains_with(source="shape"),
-    conda:
-        ENVIRONMENT
     params:
         shape=lambda w: brain_of(w).config.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
@@ -60,12 +56,8 @@ rule pial:
         **pial_of(*SIDES),
     log:
         f"{BRAIN}/logs/pial.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/pial.tsv"
     wildcard_constraints:
         brain=brains_with(*SIDES, has_thickness=False),
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=surface_memory,
     params:
