@@ -203,9 +203,7 @@ def test_a_sidecar_outside_the_data_set_does_not_describe_its_tables(folder):
 
 def test_ids_and_values_of_a_table_keep_their_text(folder):
     names = ["021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01"]
-    rows = [
-        (name, str(22 + number), text, "a.nii.gz", "feta-7") for number, (name, text) in enumerate(zip(names, names))
-    ]
+    rows = [(name, str(22 + number), name, "a.nii.gz", "feta-7") for number, name in enumerate(names)]
     write(folder, ("participant_id", "week", "code", "files", "scheme"), *rows)
     brains = load(RAW | {"start": "021", "folding": {"end_week": 24}}, folder).brains
     assert [(brain.id, brain.subject, brain.week) for brain in brains] == [
