@@ -84,14 +84,15 @@ class BrainConfig(Settings):
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)
     """Name in paths and tables: letters, digits, - _ ."""
     week: Week
-    """Gestational age; rounded to two decimals. [GW]"""
+    """Gestational age, such as `24.3` or `24+2`; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
     """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
     subject: str | None = Field(None, min_length=1)
     """Subject, if several brains are scans of one. Changes between scans are tabulated, and simulations are compared
     with scans of their own subject first."""
     covariates: dict[str, str] = Field({})
-    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
+    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv`, whose own columns have other names, and of
+    the export."""
     labels: InputFile | None = None
     """Tissue label volume, such as a NIfTI or MGZ file."""
     image: InputFile | None = None
