@@ -139,49 +139,54 @@ def _simulations(
     chains: Chains,
     brains: Sequence[Brain],
 ) -> tuple[dict[tuple[str, str], Simulation], dict[str, str]]:
-    """Return the simulations by run and start brain, and the run that each run of a sweep is equal to, by its name.
+    """Return the simulations by run and start brain, and the simulated run of each run of a sweep, by its name.
 
-    Equal runs of sweeps are simulated once, to the latest of their weeks. If a run of `runs` is equal too, and its
-    simulations have all their weeks, they share that one. The chains of members of ensembles are added to `chains`.
+    The chains of members of ensembles are added to `chains`.
     """
     simulations: dict[tuple[str, str], Simulation] = {}
 
-    def add(run: str, start: Brain, settings: Run, weeks: Iterable[float], member_of: str | None = None) -> None:
+    def add(run: str, start: Brain, settings: Run, weeks: Iterable[float], member_of: str | None = None) -> Simulation:
         simulation = _simulation(config, run, start, settings, weeks, member_of, series, chains, brains)
-        simulations[run, start.id] = simulation
+        return simulations.setdefault((run, start.id), simulation)
 
     predicted = {start for name, start, run in folded if name in config.runs and run.growth.shapes == "atlas"}
     for name, start, run in folded:
         if name in config.runs:
-            observed = later_observed_weeks(start, brains) if start in predicted else []
-            weeks = _weeks(run, start, observed)
+            weeks = _weeks(run, start, later_observed_weeks(start, brains) if start in predicted else ())
             add(name, start, run, weeks)
             for member, variation in members_of(name, run).items():
-                add(member, start, run.model_copy(update={"ensemble": None}), weeks, name)
-                if run.growth.shapes:
-                    chain = member_chain(name, start, run, variation, series, brains)
-                    chains[start.id, f"{run.growth.shapes}.{member}"] = chain
-    weeks_of: dict[str, set[float]] = {}
-    for _, _, _, run in swept:
-        weeks_of.setdefault(_equality_key(run), set()).add(run.end_week)
-    equal = {
-        _equality_key(run): name
-        for name, run in reversed(list(config.runs.items()))
-        if all(
-            weeks_of.get(_equality_key(run), set()) <= set(simulation.weeks)
-            for simulation in simulations.values()
-            if simulation.run == name
-        )
-    }
-    names = {name: equal.setdefault(_equality_key(run), name) for _, name, _, run in swept}
+                simulation = add(member, start, run.model_copy(update={"ensemble": None}), weeks, name)
+                if simulation.chain:
+                    chains[start.id, simulation.chain] = member_chain(name, start, run, variation, series, brains)
+    names, compared = _shared_runs(config, swept, simulations.values())
     for name, start, run in folded:
-        if name in names.values() and name not in config.runs:
-            weeks = weeks_of[_equality_key(run)]
-            complete = run.model_copy(update={"end_week": max(weeks)})
-            add(name, start, complete, _weeks(complete, start, weeks))
+        if name in compared and name not in config.runs:
+            complete = run.model_copy(update={"end_week": max(compared[name])})
+            add(name, start, complete, _weeks(complete, start, compared[name]))
         elif config.calibrate is not None and name in config.calibrate.runs:
             add(name, start, run, [start.week, run.end_week])
     return simulations, names
+
+
+def _shared_runs(
+    config: Config, swept: Sequence[Variant], simulations: Iterable[Simulation]
+) -> tuple[dict[str, str], dict[str, set[float]]]:
+    """Return the run that each run of a sweep is simulated by, and the weeks of comparison of these runs, by name.
+
+    Equal runs are simulated once, to the latest of their weeks. If a run of `runs` is equal too, and its simulations
+    have all their weeks, they share that one.
+    """
+    compared: dict[str, set[float]] = {}
+    for _, _, _, run in swept:
+        compared.setdefault(_equality_key(run), set()).add(run.end_week)
+    lacking = {
+        simulation.run
+        for simulation in simulations
+        if compared.get(_equality_key(simulation.settings), set()) - set(simulation.weeks)
+    }
+    shared = {_equality_key(run): name for name, run in reversed(list(config.runs.items())) if name not in lacking}
+    names = {name: shared.setdefault(_equality_key(run), name) for _, name, _, run in swept}
+    return names, {shared[key]: weeks for key, weeks in compared.items()}
 
 
 def _equality_key(run: Run) -> str:
