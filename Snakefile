@@ -10,7 +10,7 @@ CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
 SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
-from gyriflow.running.reruns import remove_stale, rerun_on_changes
+from gyriflow.running.reruns import complete_rules, remove_stale, rerun_on_changes
 
 # a configuration from the command line replaces that of the demo; they are not merged
 if not workflow.overwrite_configfiles:
@@ -52,6 +52,8 @@ rule all:
         rules.report.input,
 
 
+# every job runs in the environment and has a benchmark file beside its log
+complete_rules(workflow.rules, ENVIRONMENT)
 rerun_on_changes(workflow.rules, CONTENTS, Path(workflow.basedir, "workflow", "scripts"))
 if RUNS and (REFUSED or CONFIG.left_out):
     remove_stale(workflow.rules, STUDY, REPORT)

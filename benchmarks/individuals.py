@@ -59,7 +59,7 @@ METRICS = "results/brains/{brain}/metrics/metrics.csv"
 RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # a coarse mesh of a detailed surface has flat elements
-MESH_SETTINGS |= {"max_surface_distance_mm": 0.5, "min_radius_ratio": 0.001}
+MESH_SETTINGS |= {"max_surface_distance_mm": 0.5}
 INDIVIDUALS = ["shape-1-1", "sulci-1-2", "shape-2-2", "sulci-2-1", "shape-4-1", "shape-4-2"]
 
 

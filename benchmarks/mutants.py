@@ -37,14 +37,21 @@ BY_TESTS = {
         ("src/gyriflow/study/study.py", "max(earlier, key", "min(earlier, key"),
         ("src/gyriflow/study/study.py", "return min(sources, key", "return max(sources, key"),
         ("src/gyriflow/study/records.py", "brain.sides == self.sides", "True"),
+        ("src/gyriflow/study/study.py", "return min(self.chains", "return max(self.chains"),
+        ("src/gyriflow/study/study.py", "(other.labels is None, abs(", "(abs("),
+        ("src/gyriflow/study/study.py", " and side in template.sides", ""),
+        ("src/gyriflow/study/series.py", "if week <= end and week not in", "if week not in"),
+        ("src/gyriflow/study/resolve.py", "if week < weeks[-1])", ")"),
         ("src/gyriflow/study/series.py", "all(brain.sides == start.sides for brain in brains)", "True"),
         ("src/gyriflow/settings/terms.py", "10 if individuals", "19 if individuals"),
     ],
-    "study/test_study.py": [("src/gyriflow/study/resolve.py", "first = max(", "first = min(")],
+    "study/test_study.py": [("src/gyriflow/study/series.py", "first = max(", "first = min(")],
     "study/test_growth_series.py": [("src/gyriflow/study/study.py", "late - early < 0.5", "late - early < 5")],
     "study/test_studies.py": [("src/gyriflow/study/checks.py", '"logs", ', "")],
-    "study/test_participants.py": [("src/gyriflow/study/ages.py", "whole[4]) / 7", "whole[4]) / 10")],
-    "study/test_maps_and_growth.py": [("src/gyriflow/study/loading.py", "{})), run)", "{})) | folding, run)")],
+    "study/test_participants.py": [("src/gyriflow/settings/weeks.py", "whole[4]) / 7", "whole[4]) / 10")],
+    "study/test_maps_and_growth.py": [
+        ("src/gyriflow/settings/runs.py", "if is_preset else base", "if False else base")
+    ],
     # comparisons and metrics
     "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "interval_of(room)[1] > 0", "room[0] > 0")],
     "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '!= "run"]', '!= "target"]')],
@@ -85,6 +92,9 @@ BY_TESTS = {
     ],
     # simulations, jobs and exit codes
     "folding/test_stress.py": [("src/gyriflow/folding/stress.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
+    "cli/test_scan_ages.py": [
+        ("src/gyriflow/study/participants.py", "is_only_scan &= len({*sessions, session} - {None}) < 2", "pass"),
+    ],
     "cli/test_checking.py": [("src/gyriflow/running/cost.py", '"tetgen": 2.2', '"tetgen": 22')],
     "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime < since_s", "st_mtime > since_s")],
     "io/test_files.py": [("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1")],

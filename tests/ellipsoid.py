@@ -7,5 +7,7 @@ RUN = {
     "output_weeks": [21.0, 22.0],
     "fissure_x_mm": 0.0,
     "thickness_mm": 4.0,
-    "contact": {"kind": "planes", "gap_mm": 8.0},
+    "contact": {"kind": "planes"},
 }
+GAP_MM = 8.0
+"""Width of its fissure."""

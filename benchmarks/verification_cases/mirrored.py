@@ -92,7 +92,7 @@ def parameters(**changes) -> FoldingParameters:
         "step_s": STEP_S,
         "thickness_mm": 2.5,
         "core_growth_rate_per_s": 1e-7,
-        "contact": {"kind": "planes", "gap_mm": GAP_MM},
+        "contact": {"kind": "planes"},
         # clamped below, so that growth pushes the hemispheres against the planes
         "no_growth": {"shift": [0.0, -0.5], "semi_axes": [0.6, 0.45, 0.25]},
         "solver": {"newton_tolerance": 1e-12},
@@ -112,7 +112,7 @@ def folded(half: TetrahedralMesh, steps: int, comm: MPI.Comm = MPI.COMM_WORLD, *
     """Fold a half with its mirror image and return the state and its asymmetry after some steps."""
     mesh = reflected_and_merged(half)
     p = parameters(**changes)
-    zones = zones_of_run(mesh, p)
+    zones = zones_of_run(mesh, p, GAP_MM)
     folding = Folding(comm, mesh, zones, p)
     state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
     for _ in range(steps):

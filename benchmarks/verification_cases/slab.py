@@ -15,11 +15,11 @@ from scipy.fft import dct
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
 from gyriflow.settings.folding import FoldingParameters, Solver, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
+from .boxes import box_zones
 from .modes import Slab, amplifications
 
 Floats = NDArray[np.float64]
@@ -87,7 +87,7 @@ class Waved:
             "growth_rate_per_s": RATE_PER_S,
             "step_s": self.growth / RATE_PER_S,
             "stress_memory_gw": "infinite" if np.isinf(memory_gw) else memory_gw,
-            "support": "box",
+            "support": "free",
             "contact": {"kind": "none"},
             "no_growth": {"kind": "none"},
             "solver": {"newton_tolerance": 1e-11},
@@ -127,7 +127,7 @@ def fastest_wave(case: Waved, cells: int, timed_steps: int = 4) -> dict[str, flo
     comm = MPI.COMM_SELF
     mesh, p = mesh_of(case, cells, HEIGHT_MM), case.parameters()
     p = p.model_copy(update={"solver": Solver(), "step_s": REFERENCE_GROWTH / RATE_PER_S})
-    folding = Folding(comm, mesh, zones_of_run(mesh, p), p)
+    folding = Folding(comm, mesh, box_zones(mesh, p), p)
     state, seconds = State.at_start(mesh.vertices * M_PER_MM, p.step_s), []
     for _ in range(2 + timed_steps):
         began = time.process_time()
@@ -154,7 +154,7 @@ def heights(case: Waved, cells: int, height_mm: float, comm: MPI.Comm) -> Floats
     """Return the (steps + 1, waves) heights (mm) of the waves at the start and after each step."""
     mesh = mesh_of(case, cells, height_mm)
     p = case.parameters()
-    folding = Folding(comm, mesh, zones_of_run(mesh, p), p)
+    folding = Folding(comm, mesh, box_zones(mesh, p), p)
     states = [State.at_start(mesh.vertices * M_PER_MM, p.step_s)]
     for _ in range(case.steps):
         states.append(folding.step(states[-1], p.step_s))

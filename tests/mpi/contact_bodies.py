@@ -3,6 +3,7 @@
 import numpy as np
 from boxes import COMM, MATERIAL, set_layers, smooth_displacement
 from shapes import box_mesh
+from verification_cases.boxes import box_zones
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
@@ -75,7 +76,7 @@ def slab_with_a_sulcus():
     return TetrahedralMesh(np.stack([x, y, z * lift], axis=1), mesh.tets)
 
 
-def closing_sulcus(kind, comm=COMM, **changes):
+def closing_sulcus(kind, comm=COMM, support="box", **changes):
     """Return what folds a block with a groove that closes in some steps, and the state at the start."""
     mesh = slab_with_a_sulcus()
     p = parameters_from(
@@ -86,13 +87,14 @@ def closing_sulcus(kind, comm=COMM, **changes):
             "fissure_x_mm": 0.0,
             "thickness_mm": 2.0,
             "growth_rate_per_s": 1e-6,
-            "support": "box",
+            "support": "free",
             "contact": {"kind": kind},
             "no_growth": {"kind": "none"},
         }
         | changes
     )
-    return Folding(comm, mesh, zones_of_run(mesh, p), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    zones = zones_of_run(mesh, p) if support == "free" else box_zones(mesh, p)
+    return Folding(comm, mesh, zones, p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
 
 
 def after_steps(folding, state, number):

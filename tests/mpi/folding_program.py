@@ -18,10 +18,20 @@ WEEK = {
 }
 
 
-def command(mesh, out, ranks=1, **changes):
+PROGRAM = ["-m", "gyriflow.folding"]
+IMPATIENT = [
+    "-c",
+    "import functools, runpy; from gyriflow.folding import newton, simulation; "
+    "simulation.NewtonSettings = functools.partial(newton.NewtonSettings, max_newton=1); "
+    "runpy.run_module('gyriflow.folding', run_name='__main__')",
+]
+"""The program, and the program with steps that fail after one Newton iteration without progress."""
+
+
+def command(mesh, out, ranks=1, program=PROGRAM, **changes):
     params = out.parent / f"{out.name}.yaml"
     params.write_text(yaml.safe_dump(WEEK | changes))
-    program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(params), "--out", str(out)]
+    program = [sys.executable, *program, str(mesh), "--params", str(params), "--out", str(out)]
     program += ["--progress", str(out.with_suffix(".jsonl"))]
     return ["mpiexec", "-n", str(ranks), *program]
 

@@ -18,13 +18,13 @@ from boxes import (
 )
 from scipy.optimize import minimize_scalar
 from shapes import box_mesh
+from verification_cases.boxes import box_zones
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.stress import packed, unpacked
-from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
 from gyriflow.settings.folding import parameters_from
@@ -155,8 +155,8 @@ def stretch_up(growth, volume):
 @pytest.mark.parametrize("relaxation", ["all", "shape"])
 @pytest.mark.parametrize("mesh", [box_mesh((3, 3, 3), (6.0, 6.0, 6.0)), curved_box((2, 2, 2))], ids=ORDERS)
 def test_tissue_held_at_its_sides_keeps_the_volume_it_grew_by_if_only_its_shape_relaxes(mesh, relaxation):
-    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "support": "box", "no_growth": {"kind": "none"}})
-    zones = zones_of_run(mesh, parameters)
+    parameters = parameters_from(RUN | {"contact": {"kind": "none"}, "support": "free", "no_growth": {"kind": "none"}})
+    zones = box_zones(mesh, parameters)
     folding, state = folding_of(mesh, zones, relaxation=relaxation, **EVEN)
     folding.model = EvenGrowth(folding.parameters, None, 0.02).growth
     height, volume = 1.0, 1.0

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from facts import Facts
-from folding_program import TIGHT, WEEK, command, fold, kill
+from folding_program import IMPATIENT, TIGHT, WEEK, command, fold, kill
 from processes import ran
 from shapes import ellipsoid_mesh
 
@@ -87,11 +87,11 @@ def test_without_growth_nothing_moves_at_all(mesh, tmp_path):
 
 @pytest.mark.fault(32)
 def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_path):
-    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_newton": 1}}
+    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "program": IMPATIENT}
     done = fold(mesh, tmp_path / "out", end_week=21.4, output_weeks=[21.0, 21.4], **hard)
     assert done.returncode == 0, done.stdout + done.stderr
-    # what remains to the end is shorter than a step, and is halved
-    assert done.stdout == Facts("69120 s", "34560 s")
+    # which step fails first depends on round-off
+    assert re.search(r"step of (86400|69120) s failed .*: trying (43200|34560) s", done.stdout)
     steps = pd.read_csv(tmp_path / "out" / "steps.csv")
     assert steps["dt_s"].min() <= 34560
     assert steps["week"].iloc[-1] == pytest.approx(21.4)
@@ -100,7 +100,7 @@ def test_a_step_that_is_far_too_long_is_halved_and_the_run_continues(mesh, tmp_p
 
 @pytest.mark.fault(32)
 def test_at_the_smallest_step_the_run_ends_in_code_four(mesh, tmp_path):
-    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0, "max_newton": 1}}
+    hard = {"growth_rate_per_s": 1e-5, "step_s": 86400.0, "solver": {"max_halvings": 0}, "program": IMPATIENT}
     done = fold(mesh, tmp_path / "out", 2, **hard)
     assert done.returncode == 4, done.stdout + done.stderr
     # no step is halved: a whole one fails, or what is left before the first output

@@ -53,7 +53,7 @@ class Surfaces:
         """Return the report on a brain's surface."""
         return read_json(self.results / brain / "surface" / "surface.json")
 
-    def log(self, brain: str, rule: str = "pial_from_*") -> str:
+    def log(self, brain: str, rule: str = "pial") -> str:
         """Return what the step that made a brain's surface, or refused to, has said."""
         (log,) = (self.results / brain / "logs").glob(f"{rule}.log")
         return log.read_text()

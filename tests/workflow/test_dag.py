@@ -10,7 +10,7 @@ EXAMPLES = CHECKOUT / "config" / "examples"
 
 def test_the_demo_is_planned_from_any_folder(workflow):
     jobs = workflow.jobs()
-    assert jobs["pial_from_labels_with_thickness"] == 3
+    assert jobs["pial_with_thickness"] == 3
     assert jobs["measure"] == 3
     assert jobs["measure_simulated"] == 3 * jobs["simulate"]
     assert "atlas_file" not in jobs
@@ -31,9 +31,9 @@ EXPECTED = {
     # a brain a week, of which eight are of an output week after the start
     "spina-bifida-atlas": (
         "all",
-        {"pial_from_labels_with_thickness": 5, "simulate": 2, "measure": 5, "measure_simulated": 10, "register": 4},
+        {"pial_with_thickness": 5, "simulate": 2, "measure": 5, "measure_simulated": 10, "register": 4},
     ),
-    "simple-shapes": ("all", {"shape": 1, "pial_from_shape": 1, "simulate": 2}),
+    "simple-shapes": ("all", {"shape": 1, "pial": 1, "simulate": 2}),
     # twelve members: one is the reference, one is in both studies; the observed brain of 29 GW
     "paper": (
         "paper",
@@ -41,8 +41,8 @@ EXPECTED = {
         | {"measure": 1, "replication": 1},
     ),
     "calibration": ("calibrate", {"calibration_design": 4, "simulate_member": 24, "calibration_score": 24}),
-    "crl-atlas": ("all", {"atlas_file": 9, "pial_from_labels_with_thickness": 9}),
-    "dhcp-atlas": ("all", {"atlas_file": 48, "pial_from_labels_with_thickness": 16, "pial_from_hemispheres": 16}),
+    "crl-atlas": ("all", {"atlas_file": 9, "pial_with_thickness": 9}),
+    "dhcp-atlas": ("all", {"atlas_file": 48, "pial_with_thickness": 16, "pial": 16}),
     # a stage plans no later one
     "labels-and-hemispheres": (
         "growth",

@@ -16,7 +16,7 @@ from .conftest import SMALL_STUDY, Workflow, labelled
 pytestmark = pytest.mark.slow
 
 STAGES = (
-    *("pial_from_labels_with_thickness", "growth_curves", "growth_rates", "growth_figure"),
+    *("pial_with_thickness", "growth_curves", "growth_rates", "growth_figure"),
     *("register", "tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
     *("validation", "registration_ceiling", "study_records", "html_report"),
 )
@@ -32,7 +32,7 @@ MESH = CARRIED | {"tetrahedralise": 1}
 CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
 # of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = RESULTS | CARRIED | CURVES | {
-    "pial_from_labels_with_thickness": 1, "register": 1, "measure": 1, "validation": 2,
+    "pial_with_thickness": 1, "register": 1, "measure": 1, "validation": 2,
 }  # fmt: skip
 
 
@@ -69,14 +69,14 @@ SETTINGS = {
     ),
     "surface": (
         {"surface": {"edge_length_mm": 1.5}},
-        BOTH_RUNS | MESH | CURVES | {"pial_from_labels_with_thickness": 2, "measure": 2},
+        BOTH_RUNS | MESH | CURVES | {"pial_with_thickness": 2, "measure": 2},
     ),
     "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"measure_simulated": 6}),
     # the number of ranks changes no result, but the report shows the configuration
     "ranks": ({"folding": {"ranks": 1}}, RESULTS),
     "new brain": (
         {"brains": [{"id": "c", "week": 23, **labelled(23)}]},
-        RESULTS | CURVES | {"pial_from_labels_with_thickness": 1, "measure": 1, "validation": 2},
+        RESULTS | CURVES | {"pial_with_thickness": 1, "measure": 1, "validation": 2},
     ),
 }
 
@@ -118,7 +118,7 @@ def test_a_replaced_input_runs_again_what_was_made_of_it_and_the_dry_run_says_wh
     with changed_files(finished.directory, labels):
         assert planned(finished, "--configfile", "study.yaml") == OF_THE_OTHER_BRAIN
         said = finished.run("-n", "--configfile", "study.yaml").stdout
-    (reason,) = re.findall(r"rule pial_from_labels_with_thickness:\n(?: +.*\n)*? +reason: (.*)\n", said)
+    (reason,) = re.findall(r"rule pial_with_thickness:\n(?: +.*\n)*? +reason: (.*)\n", said)
     assert reason == f"Updated input files: {finished.directory / labels}"
 
 
@@ -139,5 +139,5 @@ def test_inputs_are_known_by_their_content_not_their_date(workflow):
     os.utime(other, ns=(an_hour_ago, an_hour_ago))
     # as `mv` and `rsync -a` do
     other.rename(labels)
-    assert workflow.jobs(*arguments) == {"pial_from_labels": 1, "surface": 1}
+    assert workflow.jobs(*arguments) == {"pial": 1, "surface": 1}
     assert workflow.run("-n", *arguments).stdout == Facts(sha256_of(labels))

@@ -39,7 +39,7 @@ def test_a_run_that_diverges_is_reported_and_sinks_nothing_and_the_others_stand_
     rates = {
         "base": "reference",
         "vary": {"growth_rate_per_s": [1.0e-7, 1.0e-5]},
-        "fixed": {"solver.max_newton": 3, "solver.max_halvings": 0},
+        "fixed": {"solver.max_halvings": 0},
         "compare_week": 28,
     }
     thicknesses = {"base": "reference", "vary": {"thickness_mm": [2.25, 6.0]}, "compare_week": 28}

@@ -49,9 +49,9 @@ def test_a_run_shows_a_bar_and_all_else_is_in_the_log_whatever_names_there_are(c
     arguments = ("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", config))
     code, said = on_a_terminal(workflow, *arguments)
     assert code == 0, said
-    assert "pial_from_labels_with_thickness a\r\x1b[2K" in said
+    assert "pial_with_thickness a\r\x1b[2K" in said
     (log,) = set(re.findall(rf"{re.escape(str(workflow.directory))}/\.snakemake/log/[\w.-]+\.log", said))
-    assert "rule pial_from_labels_with_thickness:" in Path(log).read_text()
+    assert "rule pial_with_thickness:" in Path(log).read_text()
     state = read_json(workflow.directory / STATE)
     assert state["done"] == state["total"] == 2
     assert state["ended"] is not None

@@ -22,12 +22,8 @@ rule calibration_design:
         f"{CALIBRATION}/round-{{round}}.csv",
     log:
         f"{CALIBRATION}/logs/calibration_design.{{round}}.log",
-    benchmark:
-        f"{CALIBRATION}/benchmarks/calibration_design.{{round}}.tsv"
     wildcard_constraints:
         round=r"\d+",
-    conda:
-        ENVIRONMENT
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,
@@ -51,12 +47,8 @@ rule prepare_calibrated:
         data=REGIONS["data"],
     log:
         f"{RUN}/logs/prepare_calibrated.log",
-    benchmark:
-        f"{RUN}/benchmarks/prepare_calibrated.tsv"
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
-    conda:
-        ENVIRONMENT
     params:
         week=lambda w: CONFIG.calibrate.compare_week,
     script:
@@ -81,12 +73,8 @@ rule calibration_score:
         f"{CALIBRATION}/scores/{{run}}.csv",
     log:
         f"{CALIBRATION}/logs/calibration_score.{{run}}.log",
-    benchmark:
-        f"{CALIBRATION}/benchmarks/calibration_score.{{run}}.tsv"
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
-    conda:
-        ENVIRONMENT
     params:
         # number of observed brains of each simulated one
         compared=lambda w: list(map(len, CALIBRATED.observed.values())),
@@ -106,10 +94,6 @@ rule calibration_tables:
         optimum=f"{CALIBRATION}/optimum.csv",
     log:
         f"{CALIBRATION}/logs/calibration_tables.log",
-    benchmark:
-        f"{CALIBRATION}/benchmarks/calibration_tables.tsv"
-    conda:
-        ENVIRONMENT
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,

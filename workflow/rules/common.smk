@@ -64,9 +64,6 @@ if REFUSED and workflow.is_main_process:
 if REFUSED and not study.brains:
     remove_stale([], STUDY, REPORT)
     sys.exit(0)
-# Brains of one hemisphere have fewer files, so they have separate rules with the same script: in Snakemake all output
-# files of a rule must have the same wildcards, and files of whole brains have no wildcard for the side.
-PARTS_OF_BRAINS = {"": SIDES, "_left": ("left",), "_right": ("right",)}
 FIGURES = figures_of(study)
 if workflow.is_main_process:
     for cause in study.unreachable.values():
@@ -93,9 +90,18 @@ def simulation_of(wildcards):
     return study.simulations[wildcards.run, wildcards.brain]
 
 
-def brains_with(condition):
-    """Return a regular expression that matches the ids of the brains that meet a condition."""
-    return one_of(brain.id for brain in study.brains.values() if condition(brain))
+def brains_with(*sides, **properties):
+    """Return a regular expression for the ids of the brains with exactly these hemispheres and properties.
+
+    Brains of one hemisphere have fewer files. They have rules of their own (`use rule … as …_left with:`), since all
+    output files of a rule are made by each of its jobs.
+    """
+    return one_of(
+        brain.id
+        for brain in study.brains.values()
+        if (not sides or brain.sides == sides)
+        and all(getattr(brain, name) == value for name, value in properties.items())
+    )
 
 
 wildcard_constraints:

@@ -34,10 +34,6 @@ rule ensemble:
         ENSEMBLE,
     log:
         f"{RUN}/logs/ensemble.log",
-    benchmark:
-        f"{RUN}/benchmarks/ensemble.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/ensemble.py"
 
@@ -48,28 +44,34 @@ def rows_of_ensemble(wildcards):
     return reached([run, *members], [float(wildcards.week)])
 
 
-for suffix, sides in PARTS_OF_BRAINS.items():
+rule ensemble_maps:
+    input:
+        surfaces=lambda w: [file for row in rows_of_ensemble(w) for file in row.hemispheres],
+        maps=lambda w: [file for row in rows_of_ensemble(w) for file in row.maps],
+    output:
+        **ensemble_maps(*SIDES),
+    log:
+        f"{RUN}/logs/ensemble_maps.{WEEK}.log",
+    wildcard_constraints:
+        brain=brains_with(*SIDES),
+    params:
+        sides=lambda w: brain_of(w).sides,
+    script:
+        "../scripts/ensemble_maps.py"
 
-    rule:
-        name:
-            f"ensemble_maps{suffix}"
-        input:
-            surfaces=lambda w: [file for row in rows_of_ensemble(w) for file in row.hemispheres],
-            maps=lambda w: [file for row in rows_of_ensemble(w) for file in row.maps],
-        output:
-            **ensemble_maps(*sides),
-        log:
-            f"{RUN}/logs/ensemble_maps{suffix}.{WEEK}.log",
-        benchmark:
-            f"{RUN}/benchmarks/ensemble_maps{suffix}.{WEEK}.tsv"
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.sides == sides),
-        conda:
-            ENVIRONMENT
-        params:
-            sides=sides,
-        script:
-            "../scripts/ensemble_maps.py"
+
+use rule ensemble_maps as ensemble_maps_left with:
+    output:
+        **ensemble_maps("left"),
+    wildcard_constraints:
+        brain=brains_with("left"),
+
+
+use rule ensemble_maps as ensemble_maps_right with:
+    output:
+        **ensemble_maps("right"),
+    wildcard_constraints:
+        brain=brains_with("right"),
 
 
 rule growth_sd:
@@ -84,9 +86,5 @@ rule growth_sd:
         GROWTH_SD,
     log:
         f"{RUN}/logs/growth_sd.log",
-    benchmark:
-        f"{RUN}/benchmarks/growth_sd.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/growth_sd.py"

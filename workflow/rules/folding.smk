@@ -12,47 +12,55 @@ def map_sources(wildcards):
     }
 
 
-# Runs of a calibration have the parameters of its rounds and the maps of its base run.
-for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
+def prepared_runs(*, with_maps):
+    """Return a regular expression for the runs with or without maps.
 
-    rule:
-        name:
-            f"prepare{suffix}"
-        input:
-            lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
-            mesh=MESH["mesh"],
-            data=MESH["data"],
-            surface=PIAL["report"],
-            curves=lambda w: simulation_of(w).curves,
-            targets=lambda w: simulation_of(w).targets,
-            # the simulated brain has the hemispheres of its start brain
-            sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
-        output:
-            **maps,
-            params=PARAMETERS,
-            regions=REGIONS["mesh"],
-            data=REGIONS["data"],
-        log:
-            f"{RUN}/logs/prepare{suffix}.log",
-        benchmark:
-            f"{RUN}/benchmarks/prepare{suffix}.tsv"
-        wildcard_constraints:
-            run=one_of(
-                simulation.run
-                for simulation in study.simulations.values()
-                if simulation.base == simulation.run and bool(simulation.maps) == bool(maps)
-            ),
-        conda:
-            ENVIRONMENT
-        params:
-            settings=lambda w: simulation_of(w).parameters,
-            weeks=lambda w: simulation_of(w).weeks,
-            series=lambda w: simulation_of(w).followed_series,
-            # volumes of maps are read like label volumes
-            affine_from=lambda w: brain_of(w).config.affine_from,
-            maps=map_sources,
-        script:
-            "../scripts/prepare.py"
+    Runs of a calibration have the parameters of its rounds and the maps of its base run.
+    """
+    return one_of(
+        simulation.run
+        for simulation in study.simulations.values()
+        if simulation.base == simulation.run and bool(simulation.maps) == with_maps
+    )
+
+
+rule prepare:
+    input:
+        lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        surface=PIAL["report"],
+        curves=lambda w: simulation_of(w).curves,
+        targets=lambda w: simulation_of(w).targets,
+        # the simulated brain has the hemispheres of its start brain
+        sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
+    output:
+        params=PARAMETERS,
+        regions=REGIONS["mesh"],
+        data=REGIONS["data"],
+    log:
+        f"{RUN}/logs/prepare.log",
+    wildcard_constraints:
+        run=prepared_runs(with_maps=False),
+    params:
+        settings=lambda w: simulation_of(w).parameters,
+        weeks=lambda w: simulation_of(w).weeks,
+        series=lambda w: simulation_of(w).followed_series,
+        # volumes of maps are read like label volumes
+        affine_from=lambda w: brain_of(w).config.affine_from,
+        maps=map_sources,
+    script:
+        "../scripts/prepare.py"
+
+
+use rule prepare as prepare_with_maps with:
+    output:
+        maps=MAPS,
+        params=PARAMETERS,
+        regions=REGIONS["mesh"],
+        data=REGIONS["data"],
+    wildcard_constraints:
+        run=prepared_runs(with_maps=True),
 
 
 SOLVED_FROM = {
@@ -102,14 +110,10 @@ rule simulate:
         **FOLDING,
     log:
         f"{RUN}/logs/simulate.log",
-    benchmark:
-        f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(CONFIG.runs),
     # these are the longest and start first; runs of sweeps use the remaining cores
     priority: 1
-    conda:
-        ENVIRONMENT
     threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
@@ -130,12 +134,8 @@ checkpoint simulate_member:
         **FOLDING,
     log:
         f"{RUN}/logs/simulate.log",
-    benchmark:
-        f"{RUN}/benchmarks/simulate.tsv"
     wildcard_constraints:
         run=one_of(study.may_diverge),
-    conda:
-        ENVIRONMENT
     threads: lambda w: simulation_of(w).settings.ranks
     resources:
         **LIMITED,
@@ -163,10 +163,6 @@ rule growth_maps:
         GROWTH_MAPS,
     log:
         f"{RUN}/logs/growth_maps.log",
-    benchmark:
-        f"{RUN}/benchmarks/growth_maps.tsv"
-    conda:
-        ENVIRONMENT
     script:
         "../scripts/growth_maps.py"
 
@@ -174,4 +170,10 @@ rule growth_maps:
 rule folding:
     input:
         study.files(*FOLDING.values()),
-        study.folded_surfaces,
+        [
+            simulation.file(file, week=week)
+            for simulation in study.run_simulations
+            for file in folded_of(*simulation.start.sides).values()
+            for week in simulation.weeks
+        ],
+        [simulation.file(GROWTH_MAPS) for simulation in study.run_simulations if simulation.has_growth_maps],

@@ -1,7 +1,4 @@
 # Tetrahedral meshes of start brains.
-MESH_GATES = {key: value for key, value in CONFIG.mesh.model_dump().items() if key.startswith(("min_", "max_"))}
-
-
 rule tetrahedralise:
     input:
         PIAL["whole"],
@@ -9,16 +6,12 @@ rule tetrahedralise:
         **MESH,
     log:
         f"{BRAIN}/logs/tetrahedralise.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/tetrahedralise.tsv"
     priority: 1
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=6000,
     params:
-        settings=CONFIG.mesh.model_dump(exclude={*MESH_GATES}),
-        gates=MESH_GATES,
+        settings=CONFIG.mesh.model_dump(exclude={"max_surface_distance_mm"}),
+        gates=CONFIG.mesh.gates,
         # not an output, so that it stays if the rule fails
         refused=f"{BRAIN}/mesh/refused",
     script:

@@ -8,79 +8,105 @@ def labels_or_white(wildcards):
     return brain.labels.path if brain.labels else list(brain.config.white_files.values())
 
 
-for suffix, sides in PARTS_OF_BRAINS.items():
+rule measure:
+    input:
+        unpack(lambda w: brain_of(w).measurement.parts),
+        thickness=lambda w: brain_of(w).measurement.thickness,
+        report=PIAL["report"],
+    output:
+        **measures_in(f"{BRAIN}/metrics", *SIDES),
+    log:
+        f"{BRAIN}/logs/measure.log",
+    wildcard_constraints:
+        brain=brains_with(*SIDES),
+    params:
+        labels=lambda w: brain_of(w).measurement.labels,
+        settings=MEASURED_WITH,
+    script:
+        "../scripts/measure.py"
 
-    rule:
-        name:
-            f"measure{suffix}"
-        input:
-            unpack(lambda w: brain_of(w).measurement.parts),
-            thickness=lambda w: brain_of(w).measurement.thickness,
-            report=PIAL["report"],
-        output:
-            **measures_in(f"{BRAIN}/metrics", *sides),
-        log:
-            f"{BRAIN}/logs/measure{suffix}.log",
-        benchmark:
-            f"{BRAIN}/benchmarks/measure{suffix}.tsv"
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.sides == sides),
-        conda:
-            ENVIRONMENT
-        params:
-            labels=lambda w: brain_of(w).measurement.labels,
-            settings=MEASURED_WITH,
-        script:
-            "../scripts/measure.py"
 
-    # also writes the surfaces: the facets of the start brain's hemispheres
-    rule:
-        name:
-            f"measure_simulated{suffix}"
-        input:
-            frames=FOLDING["frames"],
-            regions=REGIONS["mesh"],
-            data=REGIONS["data"],
-        output:
-            **folded_of(*sides),
-            **measures_in(f"{RUN}/metrics/{WEEK}", *sides),
-        log:
-            f"{RUN}/logs/measure_simulated{suffix}.{WEEK}.log",
-        benchmark:
-            f"{RUN}/benchmarks/measure_simulated{suffix}.{WEEK}.tsv"
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.sides == sides),
-        conda:
-            ENVIRONMENT
-        params:
-            labels=lambda w: simulation_of(w).at(float(w.week)).labels,
-            settings=MEASURED_WITH,
-        script:
-            "../scripts/measure.py"
+# also writes the surfaces: the facets of the start brain's hemispheres
+rule measure_simulated:
+    input:
+        frames=FOLDING["frames"],
+        regions=REGIONS["mesh"],
+        data=REGIONS["data"],
+    output:
+        **folded_of(*SIDES),
+        **measures_in(f"{RUN}/metrics/{WEEK}", *SIDES),
+    log:
+        f"{RUN}/logs/measure_simulated.{WEEK}.log",
+    wildcard_constraints:
+        brain=brains_with(*SIDES),
+    params:
+        labels=lambda w: simulation_of(w).at(float(w.week)).labels,
+        settings=MEASURED_WITH,
+    script:
+        "../scripts/measure.py"
 
-    rule:
-        name:
-            f"white{suffix}"
-        input:
-            unpack(lambda w: brain_of(w).measurement.parts),
-            report=PIAL["report"],
-            given=labels_or_white,
-        output:
-            **white_of(*sides),
-        log:
-            f"{BRAIN}/logs/white{suffix}.log",
-        benchmark:
-            f"{BRAIN}/benchmarks/white{suffix}.tsv"
-        wildcard_constraints:
-            brain=brains_with(lambda brain: brain.has_white and brain.sides == sides),
-        conda:
-            ENVIRONMENT
-        params:
-            columns=lambda w: brain_of(w).measurement.labels,
-            labels=lambda w: brain_of(w).labels,
-            # also parameters, since swapped input files do not trigger a rerun
-            white=lambda w: brain_of(w).config.white_files,
-            surface=surface_settings("edge_length_mm", "max_hole_mm"),
-            curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
-        script:
-            "../scripts/white.py"
+
+rule white:
+    input:
+        unpack(lambda w: brain_of(w).measurement.parts),
+        report=PIAL["report"],
+        given=labels_or_white,
+    output:
+        **white_of(*SIDES),
+    log:
+        f"{BRAIN}/logs/white.log",
+    wildcard_constraints:
+        brain=brains_with(*SIDES, has_white=True),
+    params:
+        columns=lambda w: brain_of(w).measurement.labels,
+        labels=lambda w: brain_of(w).labels,
+        # also parameters, since swapped input files do not trigger a rerun
+        white=lambda w: brain_of(w).config.white_files,
+        surface=surface_settings("edge_length_mm", "max_hole_mm"),
+        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
+    script:
+        "../scripts/white.py"
+
+
+use rule measure as measure_left with:
+    output:
+        **measures_in(f"{BRAIN}/metrics", "left"),
+    wildcard_constraints:
+        brain=brains_with("left"),
+
+
+use rule measure_simulated as measure_simulated_left with:
+    output:
+        **folded_of("left"),
+        **measures_in(f"{RUN}/metrics/{WEEK}", "left"),
+    wildcard_constraints:
+        brain=brains_with("left"),
+
+
+use rule white as white_left with:
+    output:
+        **white_of("left"),
+    wildcard_constraints:
+        brain=brains_with("left", has_white=True),
+
+
+use rule measure as measure_right with:
+    output:
+        **measures_in(f"{BRAIN}/metrics", "right"),
+    wildcard_constraints:
+        brain=brains_with("right"),
+
+
+use rule measure_simulated as measure_simulated_right with:
+    output:
+        **folded_of("right"),
+        **measures_in(f"{RUN}/metrics/{WEEK}", "right"),
+    wildcard_constraints:
+        brain=brains_with("right"),
+
+
+use rule white as white_right with:
+    output:
+        **white_of("right"),
+    wildcard_constraints:
+        brain=brains_with("right", has_white=True),

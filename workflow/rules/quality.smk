@@ -10,13 +10,6 @@ def quality_columns(name):
     )
 
 
-def surface_log(wildcards):
-    """Return the log of the job that made a brain's surface and thickness."""
-    brain = brain_of(wildcards)
-    (rule,) = [name for name, made in PIAL_RULES.items() if made == (brain.config.source, brain.sides)]
-    return f"{BRAIN}/logs/{rule}{'_with_thickness' if brain.has_thickness else ''}.log".format(brain=brain.id)
-
-
 rule brain_figures:
     input:
         surface=PIAL["whole"],
@@ -38,16 +31,12 @@ rule brain_figures:
         row=f"{BRAIN}/quality.json",
     log:
         f"{BRAIN}/logs/brain_figures.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/brain_figures.tsv"
-    conda:
-        ENVIRONMENT
     params:
         white_files=lambda w: brain_of(w).config.white_files,
         labels=lambda w: brain_of(w).labels,
         columns=lambda w: quality_columns(w.brain),
         side=lambda w: brain_of(w).sides[0],
-        log=surface_log,
+        log=lambda w: f"{BRAIN}/logs/pial.log".format(brain=w.brain),
     script:
         "../scripts/brain_figures.py"
 
@@ -59,10 +48,6 @@ rule quality_table:
         f"{STUDY}/quality.csv",
     log:
         f"{STUDY}/logs/quality_table.log",
-    benchmark:
-        f"{STUDY}/benchmarks/quality_table.tsv"
-    conda:
-        ENVIRONMENT
     params:
         refused=[
             *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),

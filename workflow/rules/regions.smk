@@ -13,12 +13,8 @@ rule given_regions:
         **region_files(f"{BRAIN}/metrics"),
     log:
         f"{BRAIN}/logs/given_regions.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/given_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "given"),
-    conda:
-        ENVIRONMENT
+        brain=brains_with(regions_from="given"),
     params:
         affine_from=lambda w: brain_of(w).config.affine_from,
         names=lambda w: CONFIG.metrics.regions[w.brain].names,
@@ -49,12 +45,8 @@ rule carried_regions:
         **region_files(f"{BRAIN}/metrics"),
     log:
         f"{BRAIN}/logs/carried_regions.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/carried_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "carried"),
-    conda:
-        ENVIRONMENT
+        brain=brains_with(regions_from="carried"),
     params:
         posed=lambda w: study.series.posed(*region_pair(w)),
     script:
@@ -73,12 +65,8 @@ rule named_sulci:
         **region_files(f"{BRAIN}/metrics"),
     log:
         f"{BRAIN}/logs/named_sulci.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/named_sulci.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.regions_from == "named"),
-    conda:
-        ENVIRONMENT
+        brain=brains_with(regions_from="named"),
     params:
         labels=lambda w: brain_of(w).registered,
         posed=lambda w: brain_of(w).labels is None,
@@ -96,12 +84,8 @@ rule simulated_regions:
         **region_files(f"{RUN}/metrics"),
     log:
         f"{RUN}/logs/simulated_regions.log",
-    benchmark:
-        f"{RUN}/benchmarks/simulated_regions.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.has_regions),
-    conda:
-        ENVIRONMENT
+        brain=brains_with(has_regions=True),
     script:
         "../scripts/simulated_regions.py"
 
@@ -121,12 +105,8 @@ rule region_metrics:
         f"{PLACE}/regions.csv",
     log:
         f"{PLACE}/logs/region_metrics.log",
-    benchmark:
-        f"{PLACE}/benchmarks/region_metrics.tsv"
     wildcard_constraints:
         where=one_of(where for where, row in study.all_measurements.items() if row.regions),
-    conda:
-        ENVIRONMENT
     params:
         labels=lambda w: place_of(w).labels,
     script:
@@ -164,12 +144,8 @@ rule template_maps:
         TEMPLATE_MAPS,
     log:
         f"{PLACE}/logs/template_maps.{{side}}.log",
-    benchmark:
-        f"{PLACE}/benchmarks/template_maps.{{side}}.tsv"
     wildcard_constraints:
         where=one_of(study.measurements),
-    conda:
-        ENVIRONMENT
     params:
         posed=lambda w: study.series.posed(*on_template(w)),
     script:

@@ -2,11 +2,12 @@
 from gyriflow.running.cost import targets_memory_mib
 
 if workflow.is_main_process:
-    for series, cause in study.unmatched_starts.items():
-        print(
-            f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
-            file=sys.stderr,
-        )
+    for series, cause in study.series.unmatched.items():
+        if set(study.starts) & set(study.series.brains[series]):
+            print(
+                f"gyriflow: surfaces of {series} are not matched by their vertices: {cause}",
+                file=sys.stderr,
+            )
 
 
 def similar_thickness(brain):
@@ -27,10 +28,6 @@ rule filled_labels:
         FILLED_LABELS,
     log:
         f"{BRAIN}/logs/filled_labels.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/filled_labels.tsv"
-    conda:
-        ENVIRONMENT
     params:
         white=lambda w: brain_of(w).config.white_files,
     script:
@@ -42,38 +39,34 @@ def pair_of(wildcards):
     return study.brains[wildcards.earlier], study.brains[wildcards.later]
 
 
-for rule_name, output_file in (
-    ("register", REGISTERED),
-    ("register_varied", VARIED_REGISTRATION),
-):
-    pair = output_file.removeprefix(f"{STUDY}/registration/").removesuffix(".h5").replace("/", ".")
+rule register:
+    input:
+        brains=lambda w: [brain.registered.path for brain in pair_of(w)],
+        images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
+    output:
+        REGISTERED,
+    log:
+        f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
+    wildcard_constraints:
+        smoothing=r"\d\.\d+",
+        seed=r"\d+",
+    priority: 1
+    params:
+        brains=lambda w: [brain.registered for brain in pair_of(w)],
+        images=lambda w: [brain.config.image for brain in pair_of(w)],
+        smoothing=lambda w: float(dict(w).get("smoothing", 1)),
+        seed=lambda w: int(dict(w).get("seed", 0)),
+        is_varied=lambda w: "seed" in dict(w),
+    script:
+        "../scripts/register.py"
 
-    rule:
-        name:
-            rule_name
-        input:
-            brains=lambda w: [brain.registered.path for brain in pair_of(w)],
-            images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
-        output:
-            output_file,
-        log:
-            f"{STUDY}/logs/register.{pair}.log",
-        benchmark:
-            f"{STUDY}/benchmarks/register.{pair}.tsv"
-        wildcard_constraints:
-            smoothing=r"\d\.\d+",
-            seed=r"\d+",
-        priority: 1
-        conda:
-            ENVIRONMENT
-        params:
-            brains=lambda w: [brain.registered for brain in pair_of(w)],
-            images=lambda w: [brain.config.image for brain in pair_of(w)],
-            smoothing=lambda w: float(dict(w).get("smoothing", 1)),
-            seed=lambda w: int(dict(w).get("seed", 0)),
-            is_varied=rule_name == "register_varied",
-        script:
-            "../scripts/register.py"
+
+# of a member of an ensemble
+use rule register as register_varied with:
+    output:
+        VARIED_REGISTRATION,
+    log:
+        f"{STUDY}/logs/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.log",
 
 
 # the original surfaces with all their vertices, in the pose of the mesh
@@ -85,10 +78,6 @@ rule match_surfaces:
         MATCHED,
     log:
         f"{STUDY}/logs/match_surfaces.{{earlier}}.{{later}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/match_surfaces.{{earlier}}.{{later}}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         files=lambda w: [brain.config.files for brain in pair_of(w)],
     script:
@@ -115,13 +104,9 @@ rule targets:
         TARGETS,
     log:
         f"{BRAIN}/logs/targets.{{origin}}.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/targets.{{origin}}.tsv"
     wildcard_constraints:
         origin=one_of(dict.fromkeys(name for _, name in study.chains)),
     priority: 1
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
     params:
@@ -132,7 +117,6 @@ rule targets:
         posed=lambda w: chain_of(w).posed,
         is_own_growth=lambda w: chain_of(w).origin == "self",
         opens_sulci=CONFIG.surface.open_sulci,
-        by_size=CONFIG.growth.atlas_ages == "size",
         variation=lambda w: chain_of(w).variation,
     script:
         "../scripts/targets.py"

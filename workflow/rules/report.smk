@@ -5,6 +5,14 @@ from itertools import takewhile
 from gyriflow.running.reruns import benchmark_patterns
 from gyriflow.settings.terms import run_names
 
+# the configuration; brains of atlases and of the table of participants are already among its brains
+USED_SETTINGS = CONFIG.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
+# of each brain, refused ones too, with the licence of its atlas
+DESCRIPTIONS = [
+    {name: getattr(brain, name) for name in ("id", "week", "population", "source", "synthetic", "covariates")}
+    | {"licence": study.atlases[brain.id].licence.name if brain.id in study.atlases else None}
+    for brain in CONFIG.brains
+]
 PAGE = f"{workflow.basedir}/workflow/report/page"
 
 
@@ -32,12 +40,8 @@ rule study_records:
         config=f"{REPORT}/config.yaml",
     log:
         f"{STUDY}/logs/study_records.log",
-    benchmark:
-        f"{STUDY}/benchmarks/study_records.tsv"
-    conda:
-        ENVIRONMENT
     params:
-        config=study.used_settings,
+        config=USED_SETTINGS,
         # also refused brains
         known_brains=[brain.id for brain in CONFIG.brains],
         brains=[brain.config.model_dump(mode="json", exclude_defaults=True) for brain in study.brains.values()],
@@ -60,7 +64,7 @@ rule study_records:
         growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
         # used by the methods text
         method={
-            "brains": [brain for brain in study.brain_descriptions if brain["id"] in study.brains],
+            "brains": [brain for brain in DESCRIPTIONS if brain["id"] in study.brains],
             "filled": study.filled,
             "surface": surface_settings("edge_length_mm", "open_sulci"),
             "mesh": CONFIG.mesh.model_dump(mode="json", include={"mesher", "order"}),
@@ -126,19 +130,15 @@ rule html_report:
         view=f"{REPORT}/surfaces.json",
     log:
         f"{REPORT}/logs/html_report.log",
-    benchmark:
-        f"{REPORT}/benchmarks/html_report.tsv"
-    conda:
-        ENVIRONMENT
     params:
         figures=ON_PAGE[None],
         brain_figures={brain: ON_PAGE[brain] for brain in study.brains},
-        brains=study.brain_descriptions,
+        brains=DESCRIPTIONS,
         prediction=study.prediction_facts,
         surfaces=SURFACES,
         observed_name=observed_name(VIEWED),
         norm=CONFIG.metrics.norms or observed_name(study.brains[brain] for brain in study.norm_reference),
-        config=study.used_settings,
+        config=USED_SETTINGS,
     script:
         "../scripts/html_report.py"
 

@@ -36,10 +36,6 @@ rule compare_member:
         coefficients=MEMBER_COEFFICIENTS,
     log:
         f"{SWEEP}/logs/compare_member.{{run}}.{{brain}}.log",
-    benchmark:
-        f"{SWEEP}/benchmarks/compare_member.{{run}}.{{brain}}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         real=lambda w: {real.id: real.population for real in study.sweeps[w.study].observed[w.brain]},
         population=lambda w: brain_of(w).population,
@@ -61,10 +57,6 @@ rule study_tables:
         nearest=f"{SWEEP}/nearest.csv",
     log:
         f"{SWEEP}/logs/study_tables.log",
-    benchmark:
-        f"{SWEEP}/benchmarks/study_tables.tsv"
-    conda:
-        ENVIRONMENT
     params:
         members=lambda w: [
             {"run": simulation.run, "subject": simulation.start.id, "values": dict(values)}
@@ -99,10 +91,6 @@ rule replication:
         nearest=f"{STUDY}/paper_nearest.csv",
     log:
         f"{STUDY}/logs/replication.log",
-    benchmark:
-        f"{STUDY}/benchmarks/replication.tsv"
-    conda:
-        ENVIRONMENT
     params:
         studies={
             name: {"varied": list(asked.vary), "week": asked.compare_week}

@@ -28,10 +28,6 @@ rule metrics_tables:
         norms=f"{STUDY}/norms.json",
     log:
         f"{STUDY}/logs/metrics_tables.log",
-    benchmark:
-        f"{STUDY}/benchmarks/metrics_tables.tsv"
-    conda:
-        ENVIRONMENT
     params:
         labelled=[(brain.id, brain.week, brain.sides, brain.labels.scheme) for brain in LABELLED],
         scans=study.scans,
@@ -58,10 +54,6 @@ rule run_tables:
         displacement=f"{STUDY}/displacement.csv",
     log:
         f"{STUDY}/logs/run_tables.log",
-    benchmark:
-        f"{STUDY}/benchmarks/run_tables.tsv"
-    conda:
-        ENVIRONMENT
     params:
         folded=study.pairs,
         growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
@@ -97,10 +89,6 @@ rule export:
         "results/export/dataset_description.json",
     log:
         f"{STUDY}/logs/export.log",
-    benchmark:
-        f"{STUDY}/benchmarks/export.tsv"
-    conda:
-        ENVIRONMENT
     params:
         brains=EXPORTED,
     script:

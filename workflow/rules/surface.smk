@@ -1,17 +1,6 @@
 # Pial surfaces in RAS+ mm, from label volumes, hemisphere surfaces or closed surfaces.
-from itertools import product
-
 from gyriflow.running.cost import surface_memory_mib
 
-# rules that make pial surfaces, by name: source of the brains, and their hemispheres
-PIAL_RULES = {
-    "pial_from_labels": ("labels", SIDES),
-    "pial_from_hemispheres": ("hemispheres", SIDES),
-    "pial_from_surface": ("pial", SIDES),
-    "pial_from_shape": ("shape", SIDES),
-    "pial_from_left_hemisphere": ("hemisphere", ("left",)),
-    "pial_from_right_hemisphere": ("hemisphere", ("right",)),
-}
 # no limits on unequal or asymmetric hemispheres with `surface.asymmetric`
 LIMITS = (
     dict.fromkeys(("max_hemisphere_ratio", "max_asymmetry"), float("inf")) if CONFIG.surface.asymmetric else {}
@@ -29,10 +18,16 @@ def surface_settings(*names):
     return CONFIG.surface.model_dump(include=set(names))
 
 
+def given_surface(wildcards):
+    """Return the files that a brain's pial surface is made from."""
+    brain = brain_of(wildcards)
+    return [SHAPE.format(brain=brain.id)] if brain.source == "shape" else brain.config.files
+
+
 def pial_settings(wildcards):
     """Return the surface settings for the data of a brain."""
     brain = brain_of(wildcards)
-    if brain.config.source == "shape":
+    if brain.source == "shape":
         return {}
     if not brain.labels:
         return surface_settings("edge_length_mm", "max_hole_mm")
@@ -45,58 +40,78 @@ rule shape:
         SHAPE,
     log:
         f"{BRAIN}/logs/shape.log",
-    benchmark:
-        f"{BRAIN}/benchmarks/shape.tsv"
     wildcard_constraints:
-        brain=brains_with(lambda brain: brain.config.source == "shape"),
-    conda:
-        ENVIRONMENT
+        brain=brains_with(source="shape"),
     params:
         shape=lambda w: brain_of(w).config.shape.model_dump(mode="json") | surface_settings("edge_length_mm"),
     script:
         "../scripts/shape.py"
 
 
-# with the cortical thickness, if there are labels of the cortex or white surfaces
-for (name, (source, sides)), (suffix, thickness) in product(
-    PIAL_RULES.items(), {"": {}, "_with_thickness": THICKNESS}.items()
-):
+rule pial:
+    input:
+        given=given_surface,
+        white=lambda w: list(brain_of(w).config.white_files.values()),
+    output:
+        **pial_of(*SIDES),
+    log:
+        f"{BRAIN}/logs/pial.log",
+    wildcard_constraints:
+        brain=brains_with(*SIDES, has_thickness=False),
+    resources:
+        mem_mb=surface_memory,
+    params:
+        source=lambda w: brain_of(w).source,
+        week=lambda w: brain_of(w).week,
+        side=lambda w: brain_of(w).sides[0] if len(brain_of(w).sides) == 1 else None,
+        coordinates=lambda w: brain_of(w).config.coordinates,
+        labels=lambda w: brain_of(w).labels,
+        # also parameters, since swapped input files do not trigger a rerun
+        white=lambda w: brain_of(w).config.white_files,
+        checksums=lambda w: brain_of(w).checksums,
+        settings=pial_settings,
+        limits=lambda w: LIMITS if brain_of(w).source == "hemispheres" else {},
+    script:
+        "../scripts/pial.py"
 
-    rule:
-        name:
-            f"{name}{suffix}"
-        input:
-            given=[SHAPE] if source == "shape" else lambda w: brain_of(w).config.files,
-            white=lambda w: list(brain_of(w).config.white_files.values()),
-        output:
-            **pial_of(*sides),
-            **thickness,
-        log:
-            f"{BRAIN}/logs/{name}{suffix}.log",
-        benchmark:
-            f"{BRAIN}/benchmarks/{name}{suffix}.tsv"
-        wildcard_constraints:
-            brain=brains_with(
-                lambda brain: (brain.config.source, brain.sides, brain.has_thickness)
-                == (source, sides, bool(thickness))
-            ),
-        conda:
-            ENVIRONMENT
-        resources:
-            mem_mb=surface_memory,
-        params:
-            source=source,
-            week=lambda w: brain_of(w).week,
-            side=sides[0] if len(sides) == 1 else None,
-            coordinates=lambda w: brain_of(w).config.coordinates,
-            labels=lambda w: brain_of(w).labels,
-            # also parameters, since swapped input files do not trigger a rerun
-            white=lambda w: brain_of(w).config.white_files,
-            checksums=lambda w: brain_of(w).checksums,
-            settings=pial_settings,
-            limits=LIMITS if source == "hemispheres" else {},
-        script:
-            "../scripts/pial.py"
+
+use rule pial as pial_left with:
+    output:
+        **pial_of("left"),
+    wildcard_constraints:
+        brain=brains_with("left", has_thickness=False),
+
+
+use rule pial as pial_right with:
+    output:
+        **pial_of("right"),
+    wildcard_constraints:
+        brain=brains_with("right", has_thickness=False),
+
+
+# with the cortical thickness, if there are labels of the cortex or white surfaces
+use rule pial as pial_with_thickness with:
+    output:
+        **pial_of(*SIDES),
+        **THICKNESS,
+    wildcard_constraints:
+        brain=brains_with(*SIDES, has_thickness=True),
+
+
+use rule pial as pial_left_with_thickness with:
+    output:
+        **pial_of("left"),
+        **THICKNESS,
+    wildcard_constraints:
+        brain=brains_with("left", has_thickness=True),
+
+
+use rule pial as pial_right_with_thickness with:
+    output:
+        **pial_of("right"),
+        **THICKNESS,
+    wildcard_constraints:
+        brain=brains_with("right", has_thickness=True),
 
 
 rule surface:

@@ -9,10 +9,6 @@ rule prepared_surfaces:
         **PREPARED,
     log:
         f"{STUDY}/logs/prepared_surfaces.{{brain}}.{WEEK}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/prepared_surfaces.{{brain}}.{WEEK}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -36,10 +32,6 @@ rule validation:
         table=VALIDATION,
     log:
         f"{RUN}/logs/validation.log",
-    benchmark:
-        f"{RUN}/benchmarks/validation.tsv"
-    conda:
-        ENVIRONMENT
     params:
         start_week=lambda w: brain_of(w).week,
         series=lambda w: simulation_of(w).series,
@@ -65,10 +57,6 @@ rule prediction:
         PREDICTION,
     log:
         f"{RUN}/logs/prediction.log",
-    benchmark:
-        f"{RUN}/benchmarks/prediction.tsv"
-    conda:
-        ENVIRONMENT
     params:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: list(simulation_of(w).observed),
@@ -89,10 +77,6 @@ rule atlas_brain:
         ATLAS_BRAIN,
     log:
         f"{RUN}/logs/atlas_brain.{WEEK}.log",
-    benchmark:
-        f"{RUN}/benchmarks/atlas_brain.{WEEK}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         week=lambda w: float(w.week),
     script:
@@ -129,10 +113,6 @@ rule deviation:
         **DEVIATION,
     log:
         f"{RUN}/logs/deviation.{WEEK}.log",
-    benchmark:
-        f"{RUN}/benchmarks/deviation.{WEEK}.tsv"
-    conda:
-        ENVIRONMENT
     params:
         sides=lambda w: brain_of(w).sides,
         labels=deviation_labels,
@@ -140,11 +120,16 @@ rule deviation:
         "../scripts/deviation.py"
 
 
+def ceiling_weeks(brain):
+    """Return the validated weeks to which a start brain's mesh is carried."""
+    return [week for week in study.chains[brain, "self"].later_weeks if (brain, week) in study.references]
+
+
 # the start brain's mesh carried to later weeks by registration alone: an upper limit of accuracy
 rule registration_ceiling:
     input:
-        unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
-        whole=lambda w: [study.references[w.brain, week][0].pial for week in study.ceiling_weeks(w.brain)],
+        unpack(lambda w: prepared_files(w.brain, ceiling_weeks(w.brain))),
+        whole=lambda w: [study.references[w.brain, week][0].pial for week in ceiling_weeks(w.brain)],
         mesh=MESH["mesh"],
         data=MESH["data"],
         report=PIAL["report"],
@@ -154,18 +139,14 @@ rule registration_ceiling:
         carried=CARRIED_MESH,
     log:
         f"{STUDY}/logs/registration_ceiling.{{brain}}.log",
-    benchmark:
-        f"{STUDY}/benchmarks/registration_ceiling.{{brain}}.tsv"
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=8000,
     params:
         carried_weeks=lambda w: study.chains[w.brain, "self"].weeks,
         start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: study.ceiling_weeks(w.brain),
+        weeks=lambda w: ceiling_weeks(w.brain),
         run="registration",
-        real=lambda w: [study.references[w.brain, week][0].id for week in study.ceiling_weeks(w.brain)],
+        real=lambda w: [study.references[w.brain, week][0].id for week in ceiling_weeks(w.brain)],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -194,10 +175,6 @@ rule onset:
         ONSET,
     log:
         f"{RUN}/logs/onset.log",
-    benchmark:
-        f"{RUN}/benchmarks/onset.tsv"
-    conda:
-        ENVIRONMENT
     params:
         sides=lambda w: brain_of(w).sides,
         radius_mm=CONFIG.metrics.curvature_radius_mm,
@@ -237,10 +214,6 @@ rule validation_tables:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     log:
         f"{STUDY}/logs/validation_tables.log",
-    benchmark:
-        f"{STUDY}/benchmarks/validation_tables.tsv"
-    conda:
-        ENVIRONMENT
     params:
         individuals=study.are_individuals(
             {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}

@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, TriangleMesh, convex_hull, unit
-from ..settings.synthetic import ShapeSettings
+from ..settings.brains import ShapeSettings
 
 REMESHING_ROUNDS = 10
 # the edges of a finely sampled curved face are far less sharp

@@ -14,8 +14,9 @@ from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import own_name, validated
 from ..settings.brains import BrainConfig
 from ..settings.growth import BEFORE_GW
+from ..settings.root import FOLDING_SECTIONS
 from ..shipped import SHIPPED
-from ..study.loading import FOLDING_SECTIONS, load
+from ..study.loading import load
 from ..study.series import unmatched_reason
 from .recognition import UNSET, FoundBrain, FoundScans, recognise_brain
 

@@ -18,8 +18,8 @@ from ..io.files import files_in, read_json, reading
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean, own_name
-from ..settings.participants import WeekNotation
 from ..settings.terms import SIDES, Side
+from ..settings.weeks import WeekNotation
 from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
 from ..study.participants import TABLE_NAME, ScanTables, ambiguity_of, covariates, data_set_of
 

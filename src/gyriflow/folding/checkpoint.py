@@ -127,8 +127,7 @@ def run_key(mesh: TetrahedralMesh, parameters: FoldingParameters, maps: Maps) ->
     values = parameters.model_dump(mode="json")
     for name in ("ranks", "end_week", "output_weeks", "output_every_gw"):
         del values[name]
-    for name in ("max_newton", "max_halvings"):
-        del values["solver"][name]
+    del values["solver"]["max_halvings"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode())
     solver = modules_behind(Path(__file__).with_name("__main__.py"))
     for source in sorted(module for module in solver if room_of(module) in SUBPACKAGES):

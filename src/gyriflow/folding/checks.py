@@ -52,7 +52,7 @@ def zone_warnings(report: dict) -> list[str]:
         return []
     return [
         f"{share:.0%} of the pial area lies between the contact planes and has no contact, so the hemispheres may "
-        "cross: set folding.contact.gap_mm below twice the width of the fissure"
+        "cross: use folding.contact.kind global, or check that the fissure lies in the middle"
     ]
 
 

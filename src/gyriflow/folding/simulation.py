@@ -66,10 +66,10 @@ class Folding:
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]
         self.contact: SelfContact | None = None
         if p.contact.kind == "global":
-            barrier = STIFFNESS_PER_MODULUS * stiffest, p.contact.distance_mm
-            self.contact = SelfContact(self.domain, zones.facets, *barrier, stiffens=p.stress_memory_gw > 0)
+            barrier_pa = STIFFNESS_PER_MODULUS * stiffest
+            self.contact = SelfContact(self.domain, zones.facets, barrier_pa, stiffens=p.stress_memory_gw > 0)
             self.problem.contributions.append(self.contact)
-        newton = NewtonSettings(p.solver.newton_tolerance, max_newton=p.solver.max_newton)
+        newton = NewtonSettings(p.solver.newton_tolerance)
         self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
         self.inputs = GrowthInputs.of(mesh, zones, self.maps)
         self.model = growth_model(p, self.inputs, mesh.vertices, comm.allreduce)

@@ -18,8 +18,8 @@ from ..settings.varying import value_at
 from .layers import PialSearch, cortical_weight
 
 Tags = dict[str, NDArray[np.int32]]
-FLAT_TOL = 0.01
-"""Tolerance of a flat base or side, as a fraction of the extent."""
+GAP_MM = 2.5
+"""Width of the fissure, as in the FetalFoldSim paper."""
 MAX_WALL_MM, MIN_WALL_COSINE = 2.0, 0.7
 """The medial wall of a single hemisphere: its largest distance to the innermost point, and the smallest cosine of the
 angle between its normal and the left-right axis."""
@@ -128,30 +128,11 @@ def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: 
     return (((vertices - centre) / (np.array(ellipsoid.semi_axes) * extent)) ** 2).sum(axis=1) <= 1
 
 
-def flat_cuts(mesh: TetrahedralMesh, facets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return BASE for facets of a flat base, SIDE_X and SIDE_Y for those of upright sides, else FREE.
-
-    A facet of a cut faces an end of the mesh and lies within a hundredth of the extent from it.
-    """
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    near = FLAT_TOL * (high - low)
-    normals = face_normals(TriangleMesh(mesh.vertices, facets))
-    corners = mesh.vertices[facets]
-    zone = np.full(len(facets), terms.FREE)
-    for axis, name in ((0, terms.SIDE_X), (1, terms.SIDE_Y)):
-        for end, sign in ((low, -1.0), (high, 1.0)):
-            at_end = (np.abs(corners[:, :, axis] - end[axis]) <= near[axis]).all(axis=1)
-            zone[on_whole_faces(at_end & (sign * normals[:, axis] > 0.7), mesh.order)] = name
-    at_base = (corners[:, :, 2] <= low[2] + near[2]).all(axis=1)
-    zone[on_whole_faces(at_base & (normals[:, 2] < -0.7), mesh.order)] = terms.BASE
-    return zone
-
-
-def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
+def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: float = GAP_MM) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
-    The planes are a quarter of `contact.gap_mm` left and right of the middle of the fissure. With any kind of contact,
-    facets near the fissure are not clamped; with `planes`, the `medial_vertices` do not grow. The
+    The planes are a quarter of `gap_mm`, the width of the fissure, left and right of its middle. With any kind of
+    contact, facets near the fissure are not clamped; with `planes`, the `medial_vertices` do not grow. The
     ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
     has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
@@ -159,7 +140,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
     fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
-    left_plane, right_plane = fissure_x_mm - p.contact.gap_mm / 4, fissure_x_mm + p.contact.gap_mm / 4
+    left_plane, right_plane = fissure_x_mm - gap_mm / 4, fissure_x_mm + gap_mm / 4
     if side is not None:
         left_plane = right_plane = float(x.max() if side == "left" else x.min())
     low, high = brain_box(mesh.vertices, side)
@@ -179,9 +160,6 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:
         zone[all_of_face((facet_x > left_plane) & (facet_x < right_plane))] = terms.BETWEEN_PLANES
         zone[all_of_face((facet_x > fissure_x_mm - reach) & (facet_x <= left_plane))] = terms.LEFT_CONTACT
         zone[all_of_face((facet_x < fissure_x_mm + reach) & (facet_x >= right_plane))] = terms.RIGHT_CONTACT
-    if support == "box":
-        cuts = flat_cuts(mesh, facets)
-        zone[cuts != terms.FREE] = cuts[cuts != terms.FREE]
     anchors = None
     if side is not None:
         zone[medial_wall_facets(mesh, facets, side)] = terms.MEDIAL_WALL

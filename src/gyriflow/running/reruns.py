@@ -28,6 +28,17 @@ def rerun_on_changes(rules: Iterable[Any], contents: Mapping[str, str], scripts:
             rule.set_params(code=code_hash(scripts / Path(rule.script).name))
 
 
+def complete_rules(rules: Iterable[Any], environment: str) -> None:
+    """Give rules that name no environment the common one, and a benchmark file named like their log.
+
+    For Snakemake's software deployment with conda, `environment` is the path of the environment's file.
+    """
+    for rule in rules:
+        if (rule.script or rule.shellcmd) and not rule.conda_env:
+            rule.conda_env, rule.benchmark_modifier = environment, rule.log_modifier
+            rule.benchmark = rule.log[0].replace("/logs/", "/benchmarks/").removesuffix(".log") + ".tsv"
+
+
 def _contents_of(rule: Any, contents: Mapping[str, str]) -> Any:
     def read_by_job(wildcards: Any) -> list[str]:
         inputs = rule.expand_input(wildcards)[0]

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from ..shipped import ATLASES, shipped_atlases
 from .base import KeyProblem, Settings, did_you_mean, located, refused
 from .terms import AffineSource, Coordinates
-from .varying import AnyWeek
+from .weeks import AnyWeek
 
 SULCI = ATLASES / "spina-bifida"
 """The folder of the brain that named sulci are drawn on: how in `sulci.yaml`, by voxel in `sulci.nii.gz`."""

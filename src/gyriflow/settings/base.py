@@ -9,24 +9,39 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Annotated, Any, Self, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    GetCoreSchemaHandler,
     ModelWrapValidatorHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
-from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core.core_schema import tagged_union_schema
 
 from ..errors import InputError
 
 PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
+
+REMOVED_KEYS = {
+    (
+        "Contact",
+        "distance_mm",
+    ): "contact begins at a fifth of the mean edge, or at the smallest gap at the start",
+    ("Contact", "gap_mm"): "the planes are those of the paper, 0.625 mm from the middle of the fissure",
+    ("Solver", "max_newton"): "a step is halved after 20 Newton iterations without progress",
+    ("MeshSettings", "min_radius_ratio"): "elements with a radius ratio below 0.001 are refused",
+    ("GrowthSettings", "atlas_ages"): "atlas brains have the ages at which the curve of their volumes has their size",
+}
+"""What holds instead of keys that earlier versions had, by class of settings and key."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +50,23 @@ class KeyProblem:
 
     text: str
     key: tuple[str | int, ...] = ()
+
+
+@dataclass(frozen=True)
+class FirstIf:
+    """Mark a union of two types, the first of which is meant by values of some kinds and the second by all others.
+
+    So a message is about one of them, not about both.
+    """
+
+    kinds: type | UnionType
+
+    def __get_pydantic_core_schema__(self, union: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        first, second = map(handler.generate_schema, get_args(union))
+        return tagged_union_schema(
+            {"(first)": first, "(second)": second},
+            lambda value: "(first)" if isinstance(value, self.kinds) else "(second)",
+        )
 
 
 def refused(text: str) -> PydanticCustomError:
@@ -128,21 +160,31 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
     path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
-        text = f"unknown key; {did_you_mean(str(path[-1]), keys_at(kind, path[:-1]))}"
+        text = unknown_key(kind, path)
     elif details["type"] not in (PROBLEM, "missing"):
         text += f"; found {details['input']!r}"
     return path, text
 
 
-def keys_at(kind: Any, path: Key) -> list[str]:
-    """Return the keys of the settings at `path` inside the type `kind`; empty if no settings are there."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        if not path:
-            return list(kind.model_fields)
-        field = kind.model_fields.get(str(path[0]))
-        return [] if field is None else keys_at(field.annotation, path[1:])
+def unknown_key(kind: Any, path: Key) -> str:
+    """Return the message for a key that settings of a kind do not have: that it was removed, or the nearest keys.
+
+    It is empty where there is such a key, or where no settings are.
+    """
+    settings, key = settings_at(kind, path[:-1]), str(path[-1])
+    if settings is None or key in settings.model_fields:
+        return ""
+    removed = REMOVED_KEYS.get((settings.__name__, key))
+    return f"was removed; {removed}" if removed else f"unknown key; {did_you_mean(key, settings.model_fields)}"
+
+
+def settings_at(kind: Any, path: Key) -> type[Settings] | None:
+    """Return the class of the settings at `path` inside the type `kind`, or None if there are none."""
+    if isinstance(kind, type) and issubclass(kind, Settings):
+        field = kind.model_fields.get(str(path[0])) if path else None
+        return kind if not path else settings_at(field.annotation, path[1:]) if field else None
     inner = path[1:] if get_origin(kind) in (dict, tuple) else path
-    return next((keys for part in get_args(kind) if (keys := keys_at(part, inner))), [])
+    return next((found for part in get_args(kind) if (found := settings_at(part, inner))), None)
 
 
 # paths of input files

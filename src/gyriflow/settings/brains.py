@@ -1,15 +1,16 @@
-"""Settings of brains: the data that their pial surfaces are made from, and regions given on them."""
+"""Settings of brains: the data that their pial surfaces are made from, regions given on them, and tables of brains."""
 
 from collections.abc import Iterator
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, model_validator
 
 from ..formats import is_volume
 from .base import InputFile, KeyProblem, Settings
 from .schemes import Label
-from .synthetic import ShapeSettings
 from .terms import MAX_NAME_LENGTH, SIDES, AffineSource, Coordinates, Side
-from .varying import FileOrPair, Week, files_of
+from .varying import FileOrPair, files_of
+from .weeks import Week, WeekNotation
 
 SOURCES = ("labels", "hemispheres", "hemisphere", "pial", "shape")
 """A brain has exactly one of these keys."""
@@ -24,6 +25,39 @@ KEY_SOURCES: dict[str, tuple[str, ...]] = {
     "population": (*LABEL_SOURCES, *SURFACE_SOURCES),
 }
 """Keys that can only be used with some sources."""
+
+
+MAX_AXIS_RATIO = 2.0
+"""Limit of longest over shortest semi-axis; the ends of longer shapes are too sharp for even triangles."""
+MAX_NOISE = 0.02
+"""Largest height of the bumps relative to the shortest semi-axis."""
+Length = Annotated[float, Field(ge=5, le=150)]
+
+
+class ShapeSettings(Settings):
+    """An ellipsoid in place of a brain, for teaching and verification, centred on the origin; `{}` is one of 21 GW."""
+
+    semi_axes_mm: tuple[Length, Length, Length] = (21.0, 28.0, 22.0)
+    """Semi-axes along X, Y, Z, all the same for a sphere; the longest is at most twice the shortest. [mm]"""
+    noise_mm: float = Field(0.05, ge=0, le=0.5)
+    """Root mean square height of the smooth bumps that start the folding, at most a fiftieth of the shortest
+    semi-axis. [mm]"""
+    seed: int = Field(0, ge=0)
+    """Seed of the bumps' random pattern."""
+
+    @property
+    def kind(self) -> str:
+        return "sphere" if len(set(self.semi_axes_mm)) == 1 else "ellipsoid"
+
+    def problems(self) -> Iterator[KeyProblem]:
+        shortest, longest = min(self.semi_axes_mm), max(self.semi_axes_mm)
+        if longest > MAX_AXIS_RATIO * shortest:
+            text = f"found {longest:g} as the longest; expected at most {MAX_AXIS_RATIO:g} times the shortest"
+            yield KeyProblem(text, ("semi_axes_mm",))
+        # the default suits the default sizes; only a given value can be wrong
+        if self.is_set("noise_mm") and self.noise_mm > MAX_NOISE * shortest:
+            text = f"found {self.noise_mm:g}; expected at most {MAX_NOISE * shortest:g}, a fiftieth of the shortest"
+            yield KeyProblem(f"{text} semi-axis", ("noise_mm",))
 
 
 class HemisphereFiles(Settings):
@@ -50,14 +84,15 @@ class BrainConfig(Settings):
     id: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=MAX_NAME_LENGTH)
     """Name in paths and tables: letters, digits, - _ ."""
     week: Week
-    """Gestational age; rounded to two decimals. [GW]"""
+    """Gestational age, such as `24.3` or `24+2`; rounded to two decimals. [GW]"""
     population: str | None = Field(None, min_length=1)
     """Population in figures and tables, such as `spina bifida aperta`; `null`: real brain."""
     subject: str | None = Field(None, min_length=1)
     """Subject, if several brains are scans of one. Changes between scans are tabulated, and simulations are compared
     with scans of their own subject first."""
     covariates: dict[str, str] = Field({})
-    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv` and of the export."""
+    """Further properties, such as `{sex: F}`: columns of `metrics_wide.csv`, whose own columns have other names, and of
+    the export."""
     labels: InputFile | None = None
     """Tissue label volume, such as a NIfTI or MGZ file."""
     image: InputFile | None = None
@@ -194,3 +229,35 @@ class GivenRegions(Settings):
             if pair is not None
             for kind in ("labels", "surface")
         }
+
+
+# tables of brains
+
+
+class ParticipantsSettings(Settings):
+    """A table with a brain in each row. `participants: FILE` is short for a section.
+
+    Columns are `participant_id` (or `id`); `session_id` (or `session`, `visit`) where a subject has several scans; the
+    age of the scan, `scan_age`, `pma`, `gestational_age` or `week`, as `24.3`, `24+2` or `24w2d` (in days with
+    `age_days`; `age` has its unit in the sidecar); and keys of brains, inner ones with a dot (`hemispheres.left`), two
+    `white` surfaces with a semicolon between. Instead of keys, `files` may name labels, a pial surface, or left and
+    right surfaces with a semicolon between; with `side`, one hemisphere. `n/a` is an empty value. Other columns are
+    covariates. Each participant is a subject. One with a `sub-01/sub-01_sessions.tsv` next to the table has a brain
+    for each session, with its age.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+
+    file: str
+    """File with tabs, semicolons or commas between columns; paths in it are relative to it."""
+    ages: WeekNotation | None = None
+    """Whether 24.3 is a `decimal` or 24 weeks and 3 `days`; needed if all decimals of a table could be days."""
+    columns: dict[str, str] = Field({})
+    """Columns to add to the table, with one value for all rows. In it `{subject}`, `{session}` and `{id}`,
+    such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
+    feta-7}`."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _file_alone(cls, value: Any) -> Any:
+        return {"file": value} if isinstance(value, str) else value

@@ -9,22 +9,21 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .base import KeyProblem, Settings, line, validated
+from .base import KeyProblem, Settings, line, refused, validated
 from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
 from .varying import (
-    EndWeek,
     Maps,
     Varying,
     VaryingNumber,
-    Week,
     bounds_of,
     map_of,
     require_bounds,
     value_range,
     varying,
 )
+from .weeks import EndWeek, Week
 
 
 def _memory(value: Any) -> float:
@@ -58,12 +57,6 @@ class Contact(Settings):
     kind: Literal["global", "planes", "none"] = "global"
     """`global`: no part of the pial surface crosses another; `planes`: neither hemisphere passes the fissure's
     plane, but folds may cross each other (the paper); `none`: no contact."""
-    distance_mm: float | None = Field(None, gt=0, le=5)
-    """With `global`, distance at which contact begins; `null`: a fifth of the surface's mean edge, at most the
-    smallest gap at the start. [mm]"""
-    gap_mm: float = Field(2.5, gt=0, le=20)
-    """Width of the fissure, unless `none`. Planes are a quarter of it from the middle; nothing grows between
-    them. [mm]"""
     penalty_pa_per_m: float = Field(5.0e5, gt=0, le=1e9)
     """With `planes`, pressure per depth of penetration, ε_N of the FetalFoldSim paper. [Pa/m]"""
 
@@ -84,8 +77,6 @@ class Solver(Settings):
 
     newton_tolerance: float = Field(1e-4, gt=0, lt=1)
     """Residual at which Newton stops, over its value at u = 0."""
-    max_newton: int = Field(20, ge=1, le=200)
-    """Newton iterations without progress before a step is halved."""
     max_halvings: int = Field(6, ge=0, le=30)
     """Halvings of the time step before the run ends."""
 
@@ -129,9 +120,9 @@ class FoldingSettings(Settings):
     relaxation: Literal["all", "shape"] = "all"
     """What relaxes: `all` of the elastic strain (the paper), or its `shape` only, so that tissue keeps its change of
     volume and the pressure that goes with it."""
-    support: Literal["ellipsoid", "box", "free"] = "ellipsoid"
-    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `box` clamps a flat
-    base and lets upright sides slide; `free` removes rigid motions only."""
+    support: Literal["ellipsoid", "free"] = "ellipsoid"
+    """What holds the brain: `ellipsoid` clamps pial facets in the ellipsoid of no growth; `free` removes rigid
+    motions only."""
     contact: Contact = Contact()
     """Contact."""
     no_growth: NoGrowth = NoGrowth()
@@ -157,6 +148,13 @@ class FoldingSettings(Settings):
         for key in GROWTH_RATES:
             if key not in self.growth.definition.rates and self.is_set(key):
                 yield KeyProblem(f"is not used by the growth model {self.growth.model}; remove it", (key,))
+
+    @field_validator("support", mode="before")
+    @classmethod
+    def _no_box(cls, value: Any) -> Any:
+        if value == "box":
+            raise refused("found box, which was removed; expected ellipsoid or free")
+        return value
 
     @field_validator("*")
     @classmethod

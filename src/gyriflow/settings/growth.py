@@ -4,20 +4,18 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from .base import KeyProblem, Settings
-from .varying import AnyWeek
+from .base import FirstIf, KeyProblem, Settings
+from .weeks import AnyWeek
 
-SizeCurve = Annotated[
-    Annotated[dict[AnyWeek, Annotated[float, Field(gt=0)]], Tag("(table)")]
-    | Annotated[Literal["measured"], Tag("(word)")],
-    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(word)"),
-]
+SizeCurve = Annotated[dict[AnyWeek, Annotated[float, Field(gt=0)]] | Literal["measured"], FirstIf(dict)]
 """A size by gestational week, or the curve through the measured brains."""
 SIZES = ("area_cm2", "volume_ml")
 """Keys of the sizes that growth can follow."""
 ModelName = Literal["rates", "sizes", "shapes"]
+Origin = Literal["self", "atlas"]
+"""Source of a run's growth: the start brain's own series, or another population."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ class Growth(Settings):
     """`rates`: those of the keys that end with `growth_rate_per_s`; `sizes`: in each step the rates of cortex and
     core that lead to curves of area and volume, which a brain off its curves joins within a week; `shapes`: in each
     step what takes the brain to the shape that it is to have by the next known week."""
-    of: Literal["self", "atlas"] = "self"
+    of: Origin = "self"
     """With `shapes`, whose these are: of the start's own later brains (`self`), or what the growth of another
     population, such as an `atlas`, would make of the start: a prediction."""
     area_cm2: SizeCurve = "measured"
@@ -121,6 +119,16 @@ class Growth(Settings):
     def definition(self) -> GrowthModel:
         """The growth model."""
         return GROWTH_MODELS[self.model]
+
+    @property
+    def shapes(self) -> Origin | None:
+        """The source of the shapes that the brain grows towards; None for growth by rates or sizes."""
+        return self.of if self.definition.measured == "shapes" else None
+
+    @property
+    def follows_sizes(self) -> bool:
+        """Whether it follows curves of measured area or volume."""
+        return self.definition.measured == "sizes" and "measured" in (self.area_cm2, self.volume_ml)
 
     def own_keys(self) -> dict[str, Any]:
         """Return the model and the keys that it uses, as they are written in a file."""

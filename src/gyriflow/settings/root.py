@@ -2,16 +2,18 @@
 
 from typing import Any
 
-from pydantic import Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from .atlas import AtlasSettings
 from .base import Settings
-from .brains import BrainConfig
+from .brains import BrainConfig, ParticipantsSettings
 from .folding import FoldingSettings
-from .participants import ParticipantsSettings
-from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings
+from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings, complete_runs
 from .schemes import SchemeSettings
 from .stages import CostSettings, MeshSettings, MetricsSettings, SurfaceSettings
+
+FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
+"""Sections that are absent if a study only measures."""
 
 
 class Config(Settings):
@@ -48,6 +50,12 @@ class Config(Settings):
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
     _age_sources: dict[str, str] = PrivateAttr(default_factory=dict)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_presets(cls, raw: Any) -> Any:
+        is_folded = isinstance(raw, dict) and any(raw.get(section) is not None for section in FOLDING_SECTIONS)
+        return complete_runs(raw) if is_folded else raw
+
     @field_validator("atlas", mode="before", json_schema_input_type=AtlasSettings | tuple[AtlasSettings, ...])
     @classmethod
     def _one_or_several(cls, value: Any) -> Any:
@@ -73,5 +81,4 @@ class Config(Settings):
     @property
     def measured_only(self) -> "Config":
         """This configuration without simulations."""
-        nothing: dict[str, Any] = {"start": None, "folding": None, "runs": {}, "studies": {}, "calibrate": None}
-        return self.model_copy(update=nothing)
+        return self.model_copy(update={name: type(self).model_fields[name].get_default() for name in FOLDING_SECTIONS})

@@ -2,27 +2,24 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Field
 
-from .base import KeyProblem, Settings
+from .base import FirstIf, KeyProblem, Settings
 from .brains import BrainConfig
 from .ensemble import Variation
-from .folding import FoldingSettings
+from .folding import VARYING, FoldingSettings
 from .growth import SIZES
 from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
-from .varying import EndWeek
+from .weeks import EndWeek
 
 ALL = "all"
 """Value of `start` for all brains."""
 FIRST = "first"
 """Value of `start` for the first of `brains`. The first of an atlas is its earliest week."""
 
-Start = Annotated[
-    Annotated[str, Tag("(id)")] | Annotated[tuple[str, ...], Tag("(list)")],
-    Discriminator(lambda value: "(list)" if isinstance(value, list | tuple) else "(id)"),
-]
+Start = Annotated[tuple[str, ...] | str, FirstIf(list | tuple)]
 """The id of a brain, a list of ids, `first` or `all`."""
 
 RunName = Annotated[str, Field(pattern=r"^[^\W_][\w.-]*$", max_length=MAX_NAME_LENGTH)]
@@ -55,7 +52,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes", "gap_mm": 2.5, "penalty_pa_per_m": 5.0e5},
+        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5},
         "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth towards the shapes that were measured on the brain's own series
@@ -82,6 +79,37 @@ class Run(FoldingSettings):
             yield KeyProblem(f"is not used by the growth model {self.growth.model}, only by shapes", ("ensemble",))
 
 
+def complete_runs(raw: dict[str, Any]) -> dict[str, Any]:
+    """Return a configuration, as plain dictionaries, with complete runs and `folding`.
+
+    A run has the keys of `folding`, overridden by its preset, overridden by its own. Keys of `folding` override the
+    preset of `folding`. Values that are not sections are left for validation. Without `runs` there is one, `reference`.
+    """
+    folding, runs = raw.get("folding", {}), raw.get("runs") or {"reference": {}}
+    if not isinstance(folding, dict) or not isinstance(runs, dict):
+        return raw | {"folding": folding, "runs": runs}
+    base = _merged(PRESETS.get(str(folding.get("preset")), {}), folding)
+    complete = {}
+    for name, run in runs.items():
+        own = run or {}
+        is_preset = isinstance(own, dict) and "preset" in own
+        inherited = _merged(folding, PRESETS.get(str(own["preset"]), {})) if is_preset else base
+        complete[name] = _merged(inherited, own)
+    return raw | {"folding": base, "runs": complete}
+
+
+def _merged(base: Any, over: Any, key: str = "") -> Any:
+    """Return a section with the keys of another on top; inner sections are merged, but not values that vary."""
+    if key == "growth":
+        base, over = ({"model": growth} if isinstance(growth, str) else growth for growth in (base, over))
+    if not isinstance(base, dict) or not isinstance(over, dict) or key in VARYING:
+        return over
+    # another growth model has other keys
+    if key == "growth" and over.get("model", base.get("model")) != base.get("model"):
+        return over
+    return base | {name: _merged(base.get(name), value, name) for name, value in over.items()}
+
+
 def members_of(name: str, run: Run) -> dict[str, Variation]:
     """Return the variations of a run's ensemble by the name of the member; empty if it has none."""
     variations = run.ensemble.variations if run.ensemble else []
@@ -100,10 +128,7 @@ def starts_of(study_start: Start | None, run: Run, ids: Sequence[str]) -> list[s
 # growth
 
 Names = tuple[str, ...]
-Series = Annotated[
-    Annotated[Names, Tag("(list)")] | Annotated[dict[str, Names], Tag("(table)")],
-    Discriminator(lambda value: "(table)" if isinstance(value, dict) else "(list)"),
-]
+Series = Annotated[dict[str, Names] | Names, FirstIf(dict)]
 
 
 class GrowthSettings(Settings):
@@ -116,9 +141,6 @@ class GrowthSettings(Settings):
     may combine several subjects, such as all: `{cohort: [all]}`."""
     series: str | None = None
     """The series, if there are several, that gives measured curves or an atlas' growth. `null`: the start brain's."""
-    atlas_ages: Literal["size", "stated"] = "size"
-    """With `growth: {model: shapes, of: atlas}`, the ages of the atlas' brains: `size`, the week at which the smooth
-    curve of the atlas' volume has a brain's volume, with the size of the curve at each week; `stated`, those given."""
     matched_surfaces: bool = True
     """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
     needed."""
@@ -165,10 +187,7 @@ def _ages(brains: Sequence[BrainConfig]) -> int:
 
 # studies and calibration
 
-Value = Annotated[
-    Annotated[float, Tag("(number)")] | Annotated[str, Tag("(text)")],
-    Discriminator(lambda value: "(text)" if isinstance(value, str) else "(number)"),
-]
+Value = Annotated[str | float, FirstIf(str)]
 """A value of a parameter that a sweep varies."""
 NOT_VARIED = ("preset", "start", "end_week", "ranks", "output_every_gw", "fields", "ensemble")
 """Keys that do not belong to the model of a run, or that the sweep sets."""
@@ -199,7 +218,7 @@ class SweepSettings(ComparisonSettings):
 
     vary: dict[str, tuple[Value, ...]]
     """Values of one or more keys of `folding`, such as `{thickness_mm: [0.8, 1.5]}`; inner keys with dots
-    (`contact.gap_mm`)."""
+    (`solver.newton_tolerance`)."""
     fixed: dict[str, Value] = Field({})
     """Keys of `folding` that are changed in all runs."""
     fixed_at: dict[float, dict[str, Value]] = Field({})

@@ -2,11 +2,14 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
-from .base import InputFile, Settings
+from .base import FirstIf, InputFile, Settings
 from .brains import GivenRegions
 from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
+
+MIN_RADIUS_RATIO = 0.001
+"""Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
 
 
 class SurfaceSettings(Settings):
@@ -40,22 +43,17 @@ class MeshSettings(Settings):
     """Distance between neighbouring nodes deep inside. [mm]"""
     envelope_mm: float = Field(0.1, gt=0.001, le=2)
     """Largest distance of the mesh's surface from the pial surface (`pytetwild`). [mm]"""
-    min_radius_ratio: float = Field(0.02, ge=0, lt=1)
-    """Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
     max_surface_distance_mm: float = Field(0.1, gt=0, le=5)
     """Largest 99th percentile of the distance between mesh and pial surface, in both directions. [mm]"""
 
+    @property
+    def gates(self) -> dict[str, float]:
+        """The limits on the quality of the mesh."""
+        return {"min_radius_ratio": MIN_RADIUS_RATIO, "max_surface_distance_mm": self.max_surface_distance_mm}
 
-Modes = Annotated[
-    Annotated[int, Field(ge=2, le=20000), Tag("(number)")] | Annotated[LastBand, Tag("(word)")],
-    Discriminator(lambda value: "(word)" if isinstance(value, str) and not value.isdigit() else "(number)"),
-]
 
-
-Regions = Annotated[
-    Annotated[dict[str, GivenRegions], Tag("(table)")] | Annotated[Literal["named_sulci"], Tag("(word)")],
-    Discriminator(lambda value: "(word)" if isinstance(value, str) else "(table)"),
-]
+Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)]
+Regions = Annotated[Literal["named_sulci"] | dict[str, GivenRegions], FirstIf(str)]
 
 
 class CostSettings(Settings):

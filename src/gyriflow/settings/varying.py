@@ -6,27 +6,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator
+from pydantic import Field, field_validator
 from pydantic.fields import FieldInfo
 
 from ..formats import format_of, is_volume
-from .base import InputFile, KeyProblem, Settings
+from .base import FirstIf, InputFile, KeyProblem, Settings
+from .weeks import AnyWeek, week_of
 
 Maps = Mapping[str, NDArray[np.float64]]
 """Values at the mesh vertices, by parameter name. They move with the tissue."""
-WEEK_RANGE = (15.0, 45.0)
-"""First and last valid gestational week."""
-AnyWeek = Annotated[float, Field(ge=WEEK_RANGE[0], le=WEEK_RANGE[1])]
-"""A gestational week, such as one that a curve has a value at."""
-_two_decimals = AfterValidator(lambda week: round(week, 2))
-Week = Annotated[AnyWeek, _two_decimals]
-"""The week of a brain, rounded to the two decimals of file names and tables: equal weeks are equal numbers."""
-EndWeek = Annotated[float, Field(gt=WEEK_RANGE[0], le=WEEK_RANGE[1]), _two_decimals]
-"""The last week of a simulation, rounded likewise."""
-FileOrPair = Annotated[
-    Annotated[InputFile, Tag("(file)")] | Annotated[tuple[InputFile, InputFile], Tag("(pair)")],
-    Discriminator(lambda value: "(pair)" if isinstance(value, list | tuple) else "(file)"),
-]
+FileOrPair = Annotated[tuple[InputFile, InputFile] | InputFile, FirstIf(list | tuple)]
 
 
 class Varying(Settings):
@@ -49,7 +38,7 @@ class Varying(Settings):
         if isinstance(value, dict):
             if any(isinstance(number, bool) for number in value.values()):
                 raise ValueError("should contain numbers, not true or false")
-            if len({float(week) for week in value}) < len(value):
+            if len({week_of(week) for week in value}) < len(value):
                 raise ValueError("should contain each week only once")
         return value
 
@@ -77,10 +66,7 @@ def files_of(files: str | tuple[str, str] | None) -> list[str]:
     return [files] if isinstance(files, str) else list(files or ())
 
 
-VaryingNumber = Annotated[
-    Annotated[float, Tag("(number)")] | Annotated[Varying, Tag("(table)")],
-    Discriminator(lambda value: "(table)" if isinstance(value, dict | Varying) else "(number)"),
-]
+VaryingNumber = Annotated[Varying | float, FirstIf(dict | Varying)]
 """A number, a curve or a map."""
 
 

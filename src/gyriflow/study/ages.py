@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..settings.participants import WeekNotation
-from ..settings.varying import WEEK_RANGE
+from ..settings.weeks import TENTHS, WeekNotation, read_week
 
 MISSING_VALUES = frozenset(("", "n/a", "na", "nan", "none", "null", "-"))
 """Missing values, in lower case: those of BIDS and of R and Python."""
@@ -38,10 +37,6 @@ OTHER_DESCRIPTION = {
     "age": OTHER_TYPE,
 }
 EXPECTED_COLUMNS = "scan_age, gestational_age, ga, pma or week, or age with Units weeks or days in"
-EXPECTED_AGE = "the gestational age in weeks, such as 24.3, 24+2 or 24w2d"
-WEEKS_AND_DAYS = re.compile(r"(\d{2})(?:\+|w(?:eeks?|k)?)([0-6])(?:d(?:ays?)?|w(?:eeks?)?)?|(\d{2})\+?([0-6])/7")
-NUMBER = re.compile(r"(\d+(?:[.,]\d+)?)(?:gw|w(?:eeks?|ks?)?)?")
-TENTHS = re.compile(r"\d{2}[.,]([0-9])")
 MIN_AMBIGUOUS_AGES = 3
 """Number of ages in tenths of a week with digits from 0 to 6 that is enough to suspect days."""
 MAX_DIFFERENCE_WEEKS = 0.1
@@ -212,28 +207,6 @@ def _shows_birth(age: TableAge) -> bool:
     """Return whether an age (at the scan or since birth) shows that a gestational one is at birth."""
     is_since_birth = age.column.kind == "postnatal" or age.column.is_other
     return age.column.kind == "scan" or (is_since_birth and not is_missing(age.text))
-
-
-def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = None) -> tuple[float | None, str]:
-    """Return a gestational age in weeks, rounded to two decimals as in file names, and the problem with it, or ''.
-
-    By `notation`, 24.3 is a decimal (default), or 24 weeks and 3 days.
-    """
-    plain = re.sub(r"\s", "", text.lower())
-    tenths, number = TENTHS.fullmatch(plain), NUMBER.fullmatch(plain)
-    if whole := WEEKS_AND_DAYS.fullmatch(plain):
-        week = int(whole[1] or whole[3]) + int(whole[2] or whole[4]) / 7
-    elif number and notation == "days" and unit == "weeks" and not number[1].isdigit():
-        if tenths is None or int(tenths[1]) > 6:
-            return None, f"found {text}; expected weeks and 0 to 6 days, such as 24.3"
-        week = int(plain[:2]) + int(tenths[1]) / 7
-    elif number:
-        week = float(number[1].replace(",", ".")) / (7 if unit == "days" else 1)
-    else:
-        return None, f"found {text or 'n/a'}; expected {EXPECTED_AGE}"
-    if not WEEK_RANGE[0] <= week <= WEEK_RANGE[1]:
-        return None, f"found {text}; expected gestational weeks, {WEEK_RANGE[0]:g} to {WEEK_RANGE[1]:g}"
-    return round(week, 2), ""
 
 
 def may_be_days(texts: Iterable[str]) -> list[str]:

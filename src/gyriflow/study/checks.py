@@ -1,5 +1,6 @@
 """Checks of sections against each other: names, starts, runs, growth, metrics, studies, calibration."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -9,7 +10,8 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..settings.base import Key, KeyProblem, did_you_mean, messages
+from ..quantities import METRICS
+from ..settings.base import Key, KeyProblem, did_you_mean, messages, unknown_key
 from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
@@ -34,6 +36,12 @@ from .atlases import used_atlases
 
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Ids that brains may not have, since they have another meaning in results, tables or settings."""
+RESULT_COLUMNS = re.compile(
+    "subject|run|week|(whole|left|right)_(.+_)?("
+    + "|".join(f"{metric.name}_{metric.unit.replace('/', '_per_')}".removesuffix("_1") for metric in METRICS.values())
+    + ")"
+)
+"""Columns of `metrics_wide.csv`, which covariates stand in as well."""
 RESERVED_STUDIES = (
     *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
 )
@@ -68,6 +76,11 @@ def names(config: Config) -> Iterator[KeyProblem]:
     for section, taken in reserved.items():
         for name in sorted(set(getattr(config, section)) & set(taken)):
             yield KeyProblem("the name is taken; choose another", (section, name))
+    covariates = {name: number for number, brain in reversed([*enumerate(config.brains)]) for name in brain.covariates}
+    for name, number in covariates.items():
+        if RESULT_COLUMNS.fullmatch(name):
+            text = "is the name of a column of the results (metrics_wide.csv); rename the covariate"
+            yield KeyProblem(text, ("brains", number, "covariates", name))
     schemes = dict.fromkeys([*SCHEMES, *config.schemes])
     for number, brain in enumerate(config.brains):
         if brain.scheme not in (None, *schemes):
@@ -254,7 +267,7 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
         try:
             settings = changed(base, study.changes(combination))
         except KeyError as error:
-            yield KeyProblem("is not a key of folding", places[error.args[0]])
+            yield KeyProblem(_no_key(error.args[0]), places[error.args[0]])
             return
         except ValidationError as error:
             for path, text in messages(error, Run):
@@ -263,6 +276,11 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
         else:
             for problem in value_problems(settings, settings.end_week - 1e-9, {}):
                 yield KeyProblem(problem.text, (*key, "vary", *problem.key))
+
+
+def _no_key(key: str) -> str:
+    text = unknown_key(Run, tuple(key.split(".")))
+    return text if text.startswith("was removed") else "is not a key of folding"
 
 
 def _comparison_problems(settings: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
@@ -308,7 +326,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
             try:
                 changed(base, {key: bound})
             except KeyError:
-                yield "is not a key of folding"
+                yield _no_key(key)
                 return
             except ValidationError as error:
                 yield from dict.fromkeys(text for _, text in messages(error, Run))

@@ -132,9 +132,7 @@ MESH_QUALITY = Kind(
 
 def mesh_quality(study: Study) -> Figure:
     quality = {start.id: MESH["quality"].format(brain=start.id) for start in study.starts}
-    limits = study.config.mesh.model_dump()
-    gates = {key: value for key, value in limits.items() if key.startswith(("min_", "max_"))}
-    return Figure(MESH_QUALITY, {"quality": quality}, {"gates": gates})
+    return Figure(MESH_QUALITY, {"quality": quality}, {"gates": study.config.mesh.gates})
 
 
 # growth
@@ -144,11 +142,8 @@ def _growth_figures(study: Study) -> Iterator[Figure]:
     # for many subjects without simulations, charts of metrics and change.csv show growth; here each would need a panel
     if study.growth_brains and (len(study.series.brains) <= MAX_SERIES or study.run_simulations):
         yield growth_figure(study)
-    if study.config.growth.atlas_ages == "size":
-        for start in dict.fromkeys(run.start for run in study.run_simulations if run.shapes == "atlas"):
-            yield Figure(
-                ATLAS_AGES, {"ages": TARGETS.format(brain=start.id, origin="atlas")}, names={"brain": start.id}
-            )
+    for start in dict.fromkeys(run.start for run in study.run_simulations if run.shapes == "atlas"):
+        yield Figure(ATLAS_AGES, {"ages": TARGETS.format(brain=start.id, origin="atlas")}, names={"brain": start.id})
 
 
 ATLAS_AGES = Kind(

@@ -11,17 +11,11 @@ from ..errors import InputError
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import PROBLEM, Key, line, messages
-from ..settings.folding import VARYING
-from ..settings.participants import ParticipantsSettings
+from ..settings.brains import ParticipantsSettings
 from ..settings.root import Config
-from ..settings.runs import PRESETS
 from .atlases import UsedAtlas, atlas_brains, atlas_problems
 from .checks import problems_between
 from .participants import participants_brains
-
-REFERENCE_RUNS: dict[str, Any] = {"reference": {}}
-FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
-"""Sections that are absent if a study only measures."""
 
 
 def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
@@ -44,8 +38,6 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     """
     folder = Path(base_dir)
     plain = _plain(raw)
-    if any(plain.get(section) is not None for section in FOLDING_SECTIONS):
-        plain = _with_presets({"folding": {}} | plain)
     atlases, problems = _atlases(plain.get("atlas"), folder)
     # None: the ids of brains are incomplete, so checks skip them
     plain["atlas"] = None if problems else [used.settings for used in atlases]
@@ -93,45 +85,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_plain(item) for item in value]
     return value
-
-
-def _with_presets(plain: dict[str, Any]) -> dict[str, Any]:
-    """Return the configuration with complete runs: `folding`, overridden by the run's preset, then by the run's keys.
-
-    Keys of `folding` override its own preset. Values that are not sections are left for validation.
-    """
-    folding, runs = plain["folding"], plain.get("runs") or REFERENCE_RUNS
-    if not isinstance(folding, dict):
-        return plain | {"runs": runs}
-    base = _merge(PRESETS.get(str(folding.get("preset")), {}), folding)
-    if isinstance(runs, dict):
-        runs = {name: _run(folding, base, run) if isinstance(run, dict | None) else run for name, run in runs.items()}
-    return plain | {"folding": base, "runs": runs}
-
-
-def _run(folding: dict[str, Any], base: dict[str, Any], run: dict[str, Any] | None) -> dict[str, Any]:
-    run = run or {}
-    if "preset" not in run:
-        return _merge(base, run)
-    return _merge(_merge(folding, PRESETS.get(str(run["preset"]), {})), run)
-
-
-def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
-    both = dict(base)
-    for key, value in override.items():
-        if key == "growth":
-            both[key] = _merged_growth(base.get(key), value)
-            continue
-        nested = isinstance(value, dict) and isinstance(base.get(key), dict) and key not in VARYING
-        both[key] = _merge(base[key], value) if nested else value
-    return both
-
-
-def _merged_growth(base: Any, override: Any) -> Any:
-    old, new = ({"model": growth} if isinstance(growth, str) else growth for growth in (base, override))
-    if not isinstance(old, dict) or not isinstance(new, dict):
-        return new
-    return new if new.get("model", old.get("model")) != old.get("model") else {**old, **new}
 
 
 def _atlases(raw: Any, folder: Path) -> tuple[list[UsedAtlas], list[str]]:

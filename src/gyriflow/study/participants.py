@@ -13,10 +13,9 @@ from ..errors import InputError
 from ..formats import is_volume
 from ..io.files import read_json, read_text_table
 from ..settings.base import absent_content, located, own_name, path_in
-from ..settings.brains import SOURCES
-from ..settings.participants import ParticipantsSettings, WeekNotation
+from ..settings.brains import SOURCES, ParticipantsSettings
+from ..settings.weeks import EXPECTED_AGE, WeekNotation
 from .ages import (
-    EXPECTED_AGE,
     EXPECTED_COLUMNS,
     OTHER_TYPE,
     AgeColumn,

@@ -7,16 +7,13 @@ from typing import Any, Literal
 
 from ..io.volumes import LabelSource
 from ..settings.brains import BrainConfig
-from ..settings.ensemble import Variation
 from ..settings.folding import VARYING
-from ..settings.runs import Run
+from ..settings.growth import Origin
+from ..settings.runs import Run, members_of
 from ..settings.schemes import FILLED
 from ..settings.terms import MEASURED, Side
 from ..settings.varying import Varying
 from . import paths
-
-Origin = Literal["self", "atlas"]
-"""Source of a run's growth: the start brain's own series, or another population."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +90,10 @@ class Brain:
         return self.config.sides
 
     @property
+    def source(self) -> str:
+        return self.config.source
+
+    @property
     def subject(self) -> str:
         """The subject that was scanned; the brain's own id if none is named."""
         return self.config.subject or self.id
@@ -149,75 +150,52 @@ class Brain:
         )
 
 
-@dataclass(frozen=True)
-class Chain:
-    """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
-
-    `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
-    refers to its posed surface (True) or to the coordinates of its files. Shapes are also computed for `further_weeks`.
-    `variation` is that of a member of an ensemble.
-    """
-
-    origin: Origin
-    brains: tuple[Brain, ...]
-    correspondences: tuple[str, ...]
-    posed: tuple[list[bool], ...]
-    further_weeks: tuple[float, ...] = ()
-    variation: Variation | None = None
-
-    @property
-    def weeks(self) -> list[float]:
-        return [brain.week for brain in self.brains]
-
-    @property
-    def later(self) -> tuple[Brain, ...]:
-        return self.brains[1:]
-
-    @property
-    def later_weeks(self) -> list[float]:
-        return self.weeks[1:]
-
-    @property
-    def growth_weeks(self) -> list[float]:
-        """Weeks of the later brains on the start brain's time axis: their own week minus the age shift."""
-        shift = self.variation.age_shift_gw if self.variation else 0.0
-        return [round(week - shift, 2) for week in self.later_weeks]
-
-
-def chain_name(origin: Origin, run: str = "", member_of: str | None = None) -> str:
-    """Return the name of a start brain's chain: its origin, or ORIGIN.RUN for a member of an ensemble."""
-    return f"{origin}.{run}" if member_of else origin
-
-
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """A run from one start brain.
 
-    The first of the output `weeks` is that of the start brain. `shapes` is the source of the shapes that it grows
-    towards; None for growth by rates or sizes. `series` is the growth series with curves of sizes for the start, and
-    `curves` their table if the run follows one. `base` is the run whose maps it uses: its own or the calibration's.
+    The first of the output `weeks` is that of the start brain. `series` is the growth series with curves of sizes for
+    the start. `base` is the run whose maps it uses: its own or the calibration's.
 
     `observed_brains` are the observed brains of its later weeks, by week, scans of the start's own subject first.
     `observed`: the brain each week is compared with. `kind` is `explained` if that brain's growth was an input, else
     `predicted`. `is_atlas_prediction`: growth came from another population only, without later brains of the start's.
-    `ensemble` has the names of its members; a member is a simulation itself, with `member_of` the name of its run.
+    A member of an ensemble is a simulation itself, with `member_of` the name of its run.
     """
 
     run: str
     start: Brain
     settings: Run
     weeks: tuple[float, ...]
-    shapes: Origin | None
     series: str | None
-    curves: str | list[str]
     base: str
     observed_brains: Mapping[float, tuple[Brain, ...]]
     observed: Mapping[float, Brain]
     kind: Literal["explained", "predicted"]
     is_atlas_prediction: bool
     has_regions: bool
-    ensemble: tuple[str, ...] = ()
     member_of: str | None = None
+
+    @property
+    def shapes(self) -> Origin | None:
+        """The source of the shapes that it grows towards; None for growth by rates or sizes."""
+        return self.settings.growth.shapes
+
+    @property
+    def curves(self) -> str | list[str]:
+        """The table of the curves of measured sizes, if it follows one."""
+        growth = self.settings.growth
+        return paths.CURVES["curves"] if growth.follows_sizes or growth.thickness_mm == "measured" else []
+
+    @property
+    def ensemble(self) -> tuple[str, ...]:
+        """The names of its members."""
+        return tuple(members_of(self.run, self.settings))
+
+    @property
+    def chain(self) -> str | None:
+        """The name of the brains that its growth is measured on, or None (see `Study.chains`)."""
+        return f"{self.shapes}.{self.run}" if self.shapes and self.member_of else self.shapes
 
     @property
     def names(self) -> dict[str, str]:
@@ -246,9 +224,7 @@ class Simulation:
     @property
     def targets(self) -> str | list[str]:
         """The file with the shapes that the run grows towards; empty if there are none."""
-        if self.shapes is None:
-            return []
-        return paths.TARGETS.format(brain=self.start.id, origin=chain_name(self.shapes, self.run, self.member_of))
+        return paths.TARGETS.format(brain=self.start.id, origin=self.chain) if self.chain else []
 
     @property
     def atlas_surface(self) -> str:

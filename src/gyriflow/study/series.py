@@ -1,13 +1,16 @@
-"""Growth series of a study: the brains that growth is measured on, and their correspondences."""
+"""Growth series of a study, and the brains of them that growth for a start brain is measured on."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 from ..errors import InputError
 from ..settings.brains import BrainConfig
+from ..settings.ensemble import SMOOTHING_RANGE, Variation
+from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
-from ..settings.runs import growth_series
+from ..settings.runs import Run, growth_series
 from .atlases import UsedAtlas
 from .paths import MATCHED, REGISTERED, VARIED_REGISTRATION
 from .records import Brain
@@ -145,3 +148,158 @@ def unmatched_reason(brains: Sequence[BrainConfig], assumed: Collection[str] = (
             if expected != found:
                 return f"{brain.id} has other triangles than {read[0].id}"
     return None
+
+
+# brains of a start brain's growth
+
+
+MAX_BEYOND_ATLAS_GW = 0.5
+"""How far the growth of an atlas is extrapolated for members of an ensemble that are older than stated."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
+
+    `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
+    refers to its posed surface (True) or to the coordinates of its files. Shapes are also computed for `further_weeks`.
+    `variation` is that of a member of an ensemble.
+    """
+
+    origin: Origin
+    brains: tuple[Brain, ...]
+    correspondences: tuple[str, ...]
+    posed: tuple[list[bool], ...]
+    further_weeks: tuple[float, ...] = ()
+    variation: Variation | None = None
+
+    @property
+    def weeks(self) -> list[float]:
+        return [brain.week for brain in self.brains]
+
+    @property
+    def later(self) -> tuple[Brain, ...]:
+        return self.brains[1:]
+
+    @property
+    def later_weeks(self) -> list[float]:
+        return self.weeks[1:]
+
+    @property
+    def growth_weeks(self) -> list[float]:
+        """Weeks of the later brains on the start brain's time axis: their own week minus the age shift."""
+        shift = self.variation.age_shift_gw if self.variation else 0.0
+        return [round(week - shift, 2) for week in self.later_weeks]
+
+
+def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
+    """Return the weeks of brains, not shapes, that simulations from a start brain are compared with."""
+    observed = [brain for brain in start.comparable(brains) if not brain.config.synthetic]
+    return sorted({brain.week for brain in observed if brain.week > start.week})
+
+
+def chains_of(start: Brain, end: float, series: Series, brains: Sequence[Brain]) -> dict[tuple[str, str], Chain]:
+    """Return the brains on which growth for a start brain is measured up to a week, by its id and their origin."""
+    atlases = series.from_other_populations(start)
+    names = atlases if len(atlases) == 1 else []
+    atlas = _chain("atlas", _atlas_chain(start, start.week, end, names, series), series)
+    observed = later_observed_weeks(start, brains)
+    further = tuple(week for week in observed if week <= end and week not in atlas.later_weeks)
+    return {
+        (start.id, "self"): _chain("self", _own_chain(start, end, series), series),
+        (start.id, "atlas"): replace(atlas, further_weeks=further),
+    }
+
+
+def member_chain(
+    run: str, start: Brain, settings: Run, variation: Variation, series: Series, brains: Sequence[Brain]
+) -> Chain:
+    """Return the chain of a member of a run's ensemble. InputError if it is that of the run."""
+    end, varied = settings.end_week, (variation.registration_smoothing, variation.seed)
+    if settings.growth.shapes == "self":
+        chain = _chain("self", _own_chain(start, end, series), series, varied, varied)
+        if chain.later and chain == _chain("self", chain.brains, series):
+            raise InputError(
+                f"the members of the ensemble of run {run} would be equal: the surfaces of "
+                f"{start.id} and its later brains are matched by their vertices, so there are no registrations to vary",
+                remedy="Remove ensemble, or set growth.matched_surfaces to false.",
+            )
+        # ages of one series have the same error
+        return replace(chain, variation=replace(variation, age_shift_gw=0.0))
+    atlases = series.from_other_populations(start, all_atlases=True)
+    names = [name for name in atlases if _covers(series.brains[name], start.week, end)]
+    if not names:
+        # the run itself is refused
+        return _chain("atlas", [start], series)
+    round_of_atlases, number = divmod(variation.number, len(names))
+    atlas_weeks = [brain.week for brain in series.brains[names[number]]]
+    # the age of the whole run is shifted, as far as the atlas goes, or a little further
+    low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
+    shift = round(min(max(variation.age_shift_gw, low), high), 2)
+    chain_brains = _atlas_chain(start, start.week + shift, end + shift, names[number : number + 1], series)
+    # one of two, so that members share the registrations between the atlas' brains
+    between_atlas = (SMOOTHING_RANGE[1], 0) if round_of_atlases % 2 else UNVARIED
+    further = sorted({*(week for week in later_observed_weeks(start, brains) if week <= end), end})
+    return replace(
+        _chain("atlas", chain_brains, series, varied, between_atlas),
+        further_weeks=tuple(further),
+        variation=replace(variation, age_shift_gw=shift),
+    )
+
+
+def _chain(
+    origin: Origin,
+    brains: Sequence[Brain],
+    series: Series,
+    first_variation: tuple[float, int] = UNVARIED,
+    later_variation: tuple[float, int] = UNVARIED,
+) -> Chain:
+    """Return a chain, with smoothing and seed of its first registration and of the later ones."""
+    pairs = list(pairwise(brains))
+    variations = [first_variation, *[later_variation] * (len(pairs) - 1)][: len(pairs)]
+    return Chain(
+        origin=origin,
+        brains=tuple(brains),
+        correspondences=tuple(
+            series.correspondence(*pair, variation) for pair, variation in zip(pairs, variations, strict=True)
+        ),
+        posed=tuple(series.posed(*pair) for pair in pairs),
+    )
+
+
+def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:
+    """Return whether growth from a week to an end is known from brains of an atlas."""
+    weeks = {brain.week for brain in brains}
+    return len(weeks) > 1 and min(weeks) <= week + BEFORE_GW and max(weeks) >= end
+
+
+def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
+    """Return a start brain and later brains of its growth series, one a week, up to the first at or past an end week.
+
+    All have label volumes, or surfaces with the same vertices.
+    """
+    # scans of the same subject come first in a population's series
+    members = sorted(series.brains.get(series.with_brain(start), ()), key=lambda brain: brain.subject != start.subject)
+    # growth up to the end week needs the first brain at or past it
+    last = min((brain.week for brain in members if brain.week >= end), default=end)
+    by_week = {start.week: start}
+    for brain in members:
+        have_labels = start.config.has_labels and brain.config.has_labels
+        if start.week < brain.week <= last and (have_labels or series.are_matched(start, brain)):
+            by_week.setdefault(brain.week, brain)
+    return sorted(by_week.values(), key=lambda brain: brain.week)
+
+
+def _atlas_chain(start: Brain, week: float, end: float, names: Iterable[str], series: Series) -> list[Brain]:
+    """Return a start brain of a week and the brains of a series of another population, one for each week.
+
+    They begin with the last week up to that of the start (else with the first week), and end with the first week at or
+    past an end week. There are at least two weeks, if available.
+    """
+    members = [brain for name in names for brain in series.brains[name]]
+    weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
+    if not weekly:
+        return [start]
+    first = max((brain.week for brain in weekly if brain.week <= week), default=weekly[0].week)
+    last = min((brain.week for brain in weekly if brain.week >= end and brain.week > first), default=end)
+    return [start, *(brain for brain in weekly if first <= brain.week <= last)]

@@ -13,8 +13,8 @@ from ..settings.root import Config
 from ..settings.terms import MEASURED, SIDES, Side
 from . import paths
 from .atlases import UsedAtlas
-from .records import Brain, CalibrationRuns, Chain, Measurement, Simulation, Sweep
-from .series import Series, several_subjects
+from .records import Brain, CalibrationRuns, Measurement, Simulation, Sweep
+from .series import Chain, Series, several_subjects
 
 
 @dataclass(frozen=True)
@@ -82,19 +82,6 @@ class Study:
             if not several_subjects(brains) and (brains[0].config.subject or is_of_atlas or starts & {*brains}):
                 used.add(name)
         return [name for name in self.series.brains if name in used]
-
-    @property
-    def with_thickness_curve(self) -> list[str]:
-        """The ids of the brains whose cortical thickness gives a curve, if a run follows it."""
-        is_followed = any(run.growth.thickness_mm == "measured" for run in self.config.runs.values())
-        return [brain.id for _, brain in self.growth_brains if is_followed and brain.has_thickness]
-
-    @property
-    def unmatched_starts(self) -> dict[str, str]:
-        """The reasons why the surfaces of start brains' growth series are not matched, by series."""
-        starts = set(self.starts)
-        reasons = self.series.unmatched
-        return {name: reason for name, reason in reasons.items() if starts & set(self.series.brains[name])}
 
     def growth_source(self, simulation: Simulation) -> str:
         """Describe whose measured growth a simulation follows, or return ""."""
@@ -172,10 +159,6 @@ class Study:
         starts = {simulation.start for simulation in self.validated_registered}
         return [start.id for start in self.starts if start in starts]
 
-    def ceiling_weeks(self, brain: str) -> list[float]:
-        """Return the validated weeks to which a start brain's mesh is carried."""
-        return [week for week in self.chains[brain, "self"].later_weeks if (brain, week) in self.references]
-
     # measurements
 
     @cached_property
@@ -203,15 +186,6 @@ class Study:
                 *(paths.THICKNESS.values() if brain.has_thickness else ()),
             )
         ]
-
-    @property
-    def folded_surfaces(self) -> list[str]:
-        return [
-            simulation.file(file, week=week)
-            for simulation in self.run_simulations
-            for file in paths.folded_of(*simulation.start.sides).values()
-            for week in simulation.weeks
-        ] + [simulation.file(paths.GROWTH_MAPS) for simulation in self.run_simulations if simulation.has_growth_maps]
 
     @cached_property
     def atlases(self) -> dict[str, Atlas]:
@@ -332,21 +306,6 @@ class Study:
         }
 
     # contents of the report and the quality table, other than figures
-
-    @property
-    def used_settings(self) -> dict[str, Any]:
-        """The configuration. Brains of atlases and of the table of participants are already among its brains."""
-        return self.config.model_dump(mode="json", exclude_defaults=True, exclude={"atlas", "participants"})
-
-    @property
-    def brain_descriptions(self) -> list[dict[str, Any]]:
-        """Description of each brain, refused ones too, with the licence of its atlas."""
-        licences = {brain: atlas.licence.name for brain, atlas in self.atlases.items()}
-        keys = ("id", "week", "population", "source", "synthetic", "covariates")
-        return [
-            {**{key: getattr(brain, key) for key in keys}, "licence": licences.get(brain.id)}
-            for brain in self.config.brains
-        ]
 
     @property
     def prediction_facts(self) -> dict[str, Any] | None:

@@ -67,6 +67,7 @@ def tree(folder, labels, tables, sidecar=None):
         ("participant_id ga | sub-01 24", {"ga": {"Units": "completed weeks"}}, 24.0),
         ("participant_id age age_unit | sub-01 170 days", {}, 24.29),
         ("participant_id ga days | sub-01 24 3", {}, 24.43),
+        ("participant_id ga | sub-01 22wks1day", {}, 22.14),
         *((f"participant_id ga | sub-01 {text}", {}, week) for text, week in (("24w", 24.0), ("24.3GW", 24.3),
           ("24+3weeks", 24.43), ("24+3/7", 24.43), ("NaN", Facts("n/a")))),
         ("participant_id Gestational-Weeks | sub-01 24", {}, 24.0),
@@ -100,6 +101,9 @@ def test_the_age_of_a_lone_scan_is_read_from_the_table_or_refused(tmp_path, rows
         ),
         # one age of a subject with two scans is of neither
         (BOTH, {TABLE: "participant_id ga | sub-01 22"}, dict.fromkeys(TWO, Facts("ga 22", "row 2", "session_id"))),
+        # also where only one of two sessions that have no ages is on disk
+        ([FIRST], {TABLE: "participant_id ga | sub-01 24", SESSIONS: "session_id sex | 1 F | 2 F"},
+         {"sub-01_ses-1": Facts("ga 24", "row 2", "session_id 1")}),
         # at the scan comes before at birth, in two tables
         ([FIRST], {TABLE: "participant_id gestational_age | sub-01 33.1", SESSIONS: "session_id scan_age | ses-1 29.4"},
          {"sub-01_ses-1": 29.4}),

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from ellipsoid import RUN, SEMI_AXES
+from ellipsoid import GAP_MM, RUN, SEMI_AXES
 from facts import Facts
 from shapes import ellipsoid_mesh, rigid
 
@@ -43,7 +43,7 @@ def test_a_curve_that_is_missed_is_named_with_how_far():
 def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
     mesh = ellipsoid_mesh(12, SEMI_AXES)
     plain = parameters_from(RUN | GROWING)
-    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, plain), {})
+    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, plain, GAP_MM), {})
     start = inputs.size(mesh.vertices)
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {"area_cm2": {21.0: area, 22.0: 1.13 * area}, "volume_ml": {21.0: volume, 22.0: 1.2 * volume}}
@@ -58,7 +58,7 @@ def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
 def test_free_growth_of_a_body_is_known():
     mesh = ellipsoid_mesh(16, SEMI_AXES)
     p = parameters_from(RUN | GROWING | {"radial_growth_rate_per_s": 1e-7})
-    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, p), {})
+    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, p, GAP_MM), {})
     made, other = free_growth(p, mesh.vertices, inputs, 21)
     # all of it grows by one rate: three directions of the core, two of the cortex
     layer = 3 - made[1].sum()

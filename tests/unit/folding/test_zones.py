@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from ellipsoid import RUN, SEMI_AXES
+from ellipsoid import GAP_MM, RUN, SEMI_AXES
 from facts import Facts
 from shapes import box_mesh, ellipsoid_mesh
+from verification_cases.boxes import box_zones
 
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.checks import refuse_impossible, zone_report, zone_warnings
@@ -18,8 +19,8 @@ ELLIPSOID = {"shift": (0.05, -0.15), "semi_axes": (0.35, 0.40, 0.50)}
 
 def find_zones(mesh, gap_mm=2.5, contact="planes", no_growth=None, **given):
     """Return the zones of a run by the settings that decide them."""
-    values = {"contact": {"gap_mm": gap_mm, "kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
-    return zones_of_run(mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given))
+    values = {"contact": {"kind": contact}, "no_growth": ELLIPSOID | (no_growth or {})}
+    return zones_of_run(mesh, parameters_from(RUN | {"fissure_x_mm": 0.0} | values | given), gap_mm)
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +92,13 @@ def test_walls_between_the_planes_are_warned_of(brain):
         return zone_warnings(zone_report(brain, find_zones(brain, gap_mm), 8.0))
 
     assert warnings(2.5) == []
-    assert warnings(20.0) == [Facts("16%", "folding.contact.gap_mm")]
+    assert warnings(20.0) == [Facts("16%", "folding.contact.kind")]
 
 
 def test_the_sides_of_a_box_slide_in_their_planes():
     box = box_mesh((4, 3, 2), (8.0, 6.0, 4.0))
-    zones = find_zones(box, contact="none", support="box", no_growth={"kind": "none"})
+    values = {"contact": {"kind": "none"}, "support": "free", "no_growth": {"kind": "none"}}
+    zones = box_zones(box, parameters_from(RUN | values))
     x, y, z = box.vertices.T
     low = z == -2.0
     np.testing.assert_array_equal(zones.fixed[:, 0], (np.abs(x) == 4.0) | low)
@@ -175,7 +177,7 @@ def test_a_sliding_wall_alone_leaves_no_rigid_motion():
 
 def test_elements_are_left_right_or_between_the_planes():
     mesh = ellipsoid_mesh(12, SEMI_AXES)
-    tags = cell_tags(mesh, zones_of_run(mesh, parameters_from(RUN)), (mesh.vertices[:, 1] > 0).astype(float))
+    tags = cell_tags(mesh, zones_of_run(mesh, parameters_from(RUN), GAP_MM), (mesh.vertices[:, 1] > 0).astype(float))
     assert set(tags["layer"][mesh.vertices[mesh.tets, 1].min(axis=1) > 0]) == {CORTEX}
     assert set(tags["layer"][mesh.vertices[mesh.tets, 1].max(axis=1) <= 0]) == {CORE}
     x = mesh.vertices[mesh.tets, 0].mean(axis=1)

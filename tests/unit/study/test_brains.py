@@ -148,3 +148,40 @@ def test_what_is_wrong_with_regions_and_references_is_said(folder, metrics, fact
 def test_regions_need_both_hemispheres(folder):
     raw = one(hemisphere=HEMISPHERE, scheme="binary") | {"metrics": {"regions": REGIONS}}
     assert problems(raw, folder) == [Facts("metrics.regions:", "a")]
+
+
+# ages and covariates
+
+
+@pytest.mark.parametrize(
+    ("text", "week"),
+    [("22+3", 22.43), ("22 wks 1 day", 22.14), ("22 weeks and 6 days", 22.86), ("22w2d", 22.29), ("22.4", 22.4)],
+)
+def test_ages_may_be_written_in_weeks_and_days(text, week):
+    curve = {"weeks": {text: 1.5, "30+0": 2.0}}
+    settings = {
+        "brains": [{"id": "a", "week": text, **LABELLED}],
+        "folding": {"end_week": "24+3", "thickness_mm": curve},
+    }
+    config = load(settings | {"start": "a"})
+    assert (config.brains[0].week, config.folding.end_week) == (week, 24.43)
+    assert list(config.folding.thickness_mm.weeks) == pytest.approx([week, 30])
+
+
+@pytest.mark.parametrize(
+    ("text", "facts"), [("22+7", ["24+2"]), ("2+3", ["24+2"]), ("50+1", [15, 45]), ("young", ["24+2"])]
+)
+def test_what_is_no_age_is_refused(text, facts):
+    assert problems(one(**LABELLED, week=text)) == [Facts("brains[0].week:", text, *facts)]
+
+
+@pytest.mark.parametrize("name", ["run", "week", "subject", "whole_area_cm2", "left_frontal_gyrification_index"])
+def test_covariates_named_like_columns_of_results_are_refused_once(name):
+    brains = [{"id": text, "week": 21, "covariates": {"site": "run", name: "x"}, **LABELLED} for text in "ab"]
+    assert problems(study(brains)) == [Facts(f"brains[0].covariates.{name}:", "metrics_wide.csv")]
+
+
+def test_other_covariates_may_have_names_that_begin_like_those_columns():
+    names = ["runs", "weekday", "left_handed", "whole_area", "area_cm2", "region"]
+    config = load(one(**LABELLED, covariates=dict.fromkeys(names, "1")))
+    assert list(config.brains[0].covariates) == names

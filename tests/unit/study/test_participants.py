@@ -199,3 +199,30 @@ def test_a_sidecar_outside_the_data_set_does_not_describe_its_tables(folder):
         config(folder)
     (folder / "participants.json").rename(folder / "bids" / "participants.json")
     assert config(folder).brains[0].week == 24.29
+
+
+def test_ids_and_values_of_a_table_keep_their_text(folder):
+    names = ["021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01"]
+    rows = [(name, str(22 + number), name, "a.nii.gz", "feta-7") for number, name in enumerate(names)]
+    write(folder, ("participant_id", "week", "code", "files", "scheme"), *rows)
+    brains = load(RAW | {"start": "021", "folding": {"end_week": 24}}, folder).brains
+    assert [(brain.id, brain.subject, brain.week) for brain in brains] == [
+        (name, name, 22 + number) for number, name in enumerate(names)
+    ]
+    # these are missing values of BIDS, R and Python
+    assert {brain.id: brain.covariates.get("code") for brain in brains} == {
+        name: None if name in ("NA", "None") else name for name in names
+    }
+
+
+def test_scans_of_a_subject_are_in_the_order_of_their_weeks_not_of_their_names(folder):
+    rows = [("sub-1", session, week, "a.nii.gz") for session, week in (("b", "23.4"), ("c", "21.5"), ("a", "24+6"))]
+    write(folder, ("participant_id", "session_id", "scan_age", "labels"), *rows)
+    section = {"file": "bids/participants.tsv", "columns": {"scheme": "feta-7", "image": "{id}.nii.gz"}}
+    for session in "abc":
+        (folder / "bids" / f"sub-1_ses-{session}.nii.gz").touch()
+    assert refusal(RAW | {"participants": section, "start": "first"}, folder) == Facts("the same files")
+    write(folder, ("participant_id", "session_id", "scan_age"), *(row[:3] for row in rows))
+    section["columns"] = {"labels": "{id}.nii.gz", "scheme": "feta-7"}
+    found = load({"participants": section, "start": "first", "folding": FOLDING}, folder)
+    assert resolve(found).scans == {"sub-1": ["sub-1_ses-c", "sub-1_ses-b", "sub-1_ses-a"]}

@@ -130,3 +130,50 @@ def test_a_start_that_no_brain_leads_to_the_end_is_left_out_alone():
     # a start takes its runs of other growth with it
     found = resolved(brains, ["x24"], **asked)
     assert (found.pairs, list(found.unreachable)) == ([("m", "y21"), ("m", "z21")], ["x21"])
+
+
+def test_of_uneven_weeks_the_nearest_are_taken_and_those_up_to_the_end_are_compared():
+    own = {"population": "own", "subject": "s"}
+    brains = [brain("start", 22.3, **own), brain("later", 23.45, **own), brain("after", 25.2, **own)]
+    atlas = [brain(f"a{week}", week, population="atlas") for week in (21, 22.1, 22.9, 24.4, 26)]
+    runs = {"x": {"preset": "expected", "end_week": 24}}
+    found = resolved([*brains, *atlas], start="start", runs=runs)
+    simulation = found.simulations["x", "start"]
+    # every whole step from the start, the end, and the week of the later scan; the one after the end is left out
+    assert simulation.weeks == (22.3, 23.3, 23.45, 24)
+    assert {week: one.id for week, one in simulation.observed.items()} == {23.45: "later"}
+    # from the last week up to the start's to the first at or past the end
+    assert ids(found.chains["start", "atlas"].later) == ["a22.1", "a22.9", "a24.4"]
+    assert found.chains["start", "atlas"].further_weeks == (23.45,)
+    assert found.atlas_brain(simulation).id == "a24.4"
+    assert {key: ids(pair) for key, pair in found.references.items()} == {("start", 23.45): ["later", "start"]}
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_second_hemisphere_is_of_another_series_norm_and_template(side):
+    other = {"left": "right", "right": "left"}[side]
+    halves = [brain(f"{name}{week}", week, name) for name in ("left", "right") for week in (22, 23.5)]
+    found = resolved([*halves, *labelled(21, 24, names="ab")], start=f"{side}22", metrics={"template": "left22"})
+    assert sorted(map(ids, found.series.brains.values())) == [
+        ["a", "b"],
+        ["left22", "left23.5"],
+        ["right22", "right23.5"],
+    ]
+    assert ids(found.chains[f"{side}22", "self"].brains) == [f"{side}22"]
+    assert found.norm_reference == [f"{side}22", f"{side}23.5"]
+    assert found.measurements[f"brains/{side}22/metrics"].maps == [f"results/brains/{side}22/metrics/{side}.shape.gii"]
+    sides = {one.id: found.template_sides(one.measurement) for one in found.brains.values()}
+    assert [name for name, found_sides in sides.items() if found_sides == ["left"]] == ["left22", "left23.5", "a", "b"]
+    assert sides["right22"] == sides["right23.5"] == []
+    assert other not in str(found.simulations["reference", f"{side}22"].at(23).parts)
+
+
+@pytest.mark.parametrize(("weeks", "similar"), [((22, 26), "x"), ((21, 23.4), "y")])
+def test_thickness_is_that_of_the_brain_with_labels_nearest_in_week_or_else_with_white_surfaces(weeks, similar):
+    pial = {"pial": __file__}
+    brains = [{"id": "bare", "week": 23, **pial}, {"id": "white", "week": 23.1, **pial, "white": __file__}]
+    found = resolved([*brains, *labelled(*weeks, names="xy")], start="bare")
+    assert found.similar_in_thickness(found.brains["bare"]).id == similar
+    alone = resolved(brains, start="bare")
+    assert alone.similar_in_thickness(alone.brains["bare"]).id == "white"
+    assert alone.similar_in_thickness(alone.brains["white"]) is None
