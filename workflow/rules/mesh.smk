@@ -1,4 +1,6 @@
 # Tetrahedral meshes of start brains.
+from gyriflow.running.path_store import PATH_MESH_SETTINGS
+
 rule tetrahedralise:
     input:
         PIAL["whole"],
@@ -16,6 +18,18 @@ rule tetrahedralise:
         refused=f"{BRAIN}/mesh/refused",
     script:
         "../scripts/tetrahedralise.py"
+
+
+# of the first brain of an atlas, for its path: the same in all studies
+use rule tetrahedralise as path_mesh with:
+    output:
+        **PATH_MESH,
+    log:
+        f"{BRAIN}/logs/path_mesh.log",
+    params:
+        settings=PATH_MESH_SETTINGS.model_dump(exclude={"max_surface_distance_mm"}),
+        gates=PATH_MESH_SETTINGS.gates,
+        refused=f"{BRAIN}/path/refused",
 
 
 rule mesh:

@@ -1,5 +1,6 @@
 # Correspondences between brains of successive weeks, and the targets of start brains.
 from gyriflow.running.cost import targets_memory_mib
+from gyriflow.running.path_store import PATH_MESH_SETTINGS, path_store
 
 if workflow.is_main_process:
     for series, cause in study.series.unmatched.items():
@@ -89,7 +90,18 @@ def chain_of(wildcards):
     return study.chains[wildcards.brain, wildcards.origin]
 
 
-# shapes of a start brain's mesh in later weeks, for runs that grow towards them
+def origins(origin):
+    """Return a pattern for the names of the chains of an origin, members of ensembles included."""
+    return one_of(dict.fromkeys(name for (_, name), chain in study.chains.items() if chain.origin == origin))
+
+
+def followers_of(wildcards):
+    """Return the simulations that grow towards the shapes of a start brain."""
+    file = TARGETS.format(brain=wildcards.brain, origin=wildcards.origin)
+    return [simulation for simulation in study.simulations.values() if simulation.targets == file]
+
+
+# shapes of a start brain's mesh in the later weeks of its own series, for runs that grow towards them
 rule targets:
     input:
         mesh=MESH["mesh"],
@@ -98,25 +110,93 @@ rule targets:
         correspondences=lambda w: chain_of(w).correspondences,
         surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
         reports=lambda w: [brain.report for brain in chain_of(w).later],
-        # norms of another study, whose volumes the curve of an atlas follows as well
-        norms=lambda w: CONFIG.metrics.norms if CONFIG.metrics.norms and chain_of(w).origin == "atlas" else [],
     output:
         TARGETS,
     log:
         f"{BRAIN}/logs/targets.{{origin}}.log",
     wildcard_constraints:
-        origin=one_of(dict.fromkeys(name for _, name in study.chains)),
+        origin=origins("self"),
+    priority: 1
+    resources:
+        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
+    params:
+        weeks=lambda w: chain_of(w).weeks,
+        posed=lambda w: chain_of(w).posed,
+        opens_sulci=CONFIG.surface.open_sulci,
+        store=None,
+    script:
+        "../scripts/targets.py"
+
+
+PATHS = {chain.path.brains[0].id: chain.path for chain in study.chains.values() if chain.path}
+
+
+def path_inputs(wildcards):
+    """Return what an atlas' path is made from; nothing where it has been kept."""
+    store = path_store(study, PATHS[wildcards.brain], CONTENTS)
+    if store and store.exists():
+        return {"kept": str(store)}
+    path = PATHS[wildcards.brain]
+    return {
+        "mesh": PATH_MESH["mesh"],
+        "data": PATH_MESH["data"],
+        "report": PIAL["report"],
+        "correspondences": path.correspondences,
+        "surfaces": [brain.pial for brain in path.later],
+        "reports": [brain.report for brain in path.later],
+    }
+
+
+# the same of the first brain of an atlas, which other brains are carried by
+use rule targets as atlas_path with:
+    input:
+        unpack(path_inputs),
+    output:
+        ATLAS_PATH,
+    log:
+        f"{BRAIN}/logs/atlas_path.log",
+    wildcard_constraints:
+        brain=one_of(PATHS),
+    resources:
+        mem_mb=lambda w: targets_memory_mib(brain_of(w), PATH_MESH_SETTINGS),
+    params:
+        weeks=lambda w: PATHS[w.brain].weeks,
+        posed=lambda w: PATHS[w.brain].posed,
+        opens_sulci=CONFIG.surface.open_sulci,
+        store=lambda w: path_store(study, PATHS[w.brain], CONTENTS),
+
+
+def atlas_of(wildcards):
+    """Return the brain of an atlas that a start brain is registered to."""
+    return chain_of(wildcards).later[0]
+
+
+# shapes that a start brain would have in later weeks if it grew as an atlas
+rule predicted_targets:
+    input:
+        mesh=MESH["mesh"],
+        data=MESH["data"],
+        path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path.brains[0].id),
+        correspondence=lambda w: chain_of(w).correspondences,
+        reports=lambda w: [PIAL["report"], atlas_of(w).report],
+        # norms of another study, whose volumes the curve of the atlas follows as well
+        norms=CONFIG.metrics.norms or [],
+    output:
+        TARGETS,
+    log:
+        f"{BRAIN}/logs/targets.{{origin}}.log",
+    wildcard_constraints:
+        origin=origins("atlas"),
     priority: 1
     resources:
         mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.mesh),
     params:
         start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: chain_of(w).growth_weeks,
-        stated_weeks=lambda w: chain_of(w).later_weeks,
+        end_week=lambda w: max(run.settings.end_week for run in followers_of(w)),
+        atlas_week=lambda w: atlas_of(w).week,
         further_weeks=lambda w: chain_of(w).further_weeks,
-        posed=lambda w: chain_of(w).posed,
-        is_own_growth=lambda w: chain_of(w).origin == "self",
+        posed=lambda w: chain_of(w).posed[0],
         opens_sulci=CONFIG.surface.open_sulci,
         variation=lambda w: chain_of(w).variation,
     script:
-        "../scripts/targets.py"
+        "../scripts/predicted_targets.py"

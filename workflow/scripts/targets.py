@@ -1,20 +1,26 @@
-"""Write the targets of a start brain from its own series: the shapes of its mesh in later weeks."""
+"""Write the shapes of a brain's mesh in the later weeks of its own series: targets of a run, or an atlas' path."""
 
+import sys
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
 
+from gyriflow.errors import StorageError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.series_shapes import follow_series, sizes_of
 from gyriflow.io.files import read_json
-from gyriflow.io.registrations import WeeklyShapes, read_correspondence, write_weekly_shapes
+from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
+    if "kept" in dict(files):
+        write_weekly_shapes(snakemake.output[0], read_weekly_shapes(files.kept))
+        sys.exit()
     mesh = read_tetrahedral_mesh(files.mesh)
     surfaces = [read_surface(path) for path in files.surfaces]
     # mesh and surfaces are posed; correspondences are too, or are in the coordinates of the files
@@ -33,3 +39,6 @@ with step(snakemake.log[0]):
     sizes = sizes_of(mesh, found.positions)
     shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, stops=found.stops, tets=mesh.tets)
     write_weekly_shapes(snakemake.output[0], shapes)
+    if params.store:
+        with suppress(StorageError):
+            write_weekly_shapes(params.store, shapes)

@@ -57,8 +57,9 @@ MAX_DRAWS = 2
 """Attempts to draw the boundary to its goals."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
-UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0), 2.0
-"""Lengths over which a displacement is smoothed around faults, and the distance from these, as a multiple of them."""
+UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
+"""Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
+an observed brain), and the distance from these, as a multiple of them."""
 MIN_VOLUME_ON_WAY = 0.2
 """Fraction of an element's volume that it should keep on the way from one shape to the next."""
 STRAIGHTENING_ROUNDS = 4
@@ -208,7 +209,7 @@ class ElasticFit:
         over lengths that increase; the body follows the shape, and is drawn to it, if faults remain.
         """
         motion = self._fit(shape, self.positions_mm)
-        untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion))
+        untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion), UNTANGLING_MM)
         if not len(faults):
             self.positions_mm, self._moved_straight = untangled, True
             return self._move(np.linalg.inv(motion))
@@ -216,13 +217,13 @@ class ElasticFit:
         self.follow(shape)
         return self.draw(shape[self._used])
 
-    def _untangled(self, before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    def _untangled(self, before: Floats, after: Floats, lengths_mm: Sequence[float]) -> tuple[Floats, Floats]:
         """Return the aligned shape `after`, changed around faults on the straight way to it, and those that remain.
 
         Elements that lose most of their volume count as faults in the first round only.
         """
         sizes, displacement, least = vertex_sizes(before, self._pieces), after - before, MIN_VOLUME_ON_WAY
-        for length in UNTANGLING_MM:
+        for length in lengths_mm:
             faults = self._faults_between(before, before + displacement, least)
             if not len(faults):
                 break
@@ -254,7 +255,7 @@ class ElasticFit:
 
     def _stops(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
         """Return the shape `after`, changed around faults, and the shapes to pass before it."""
-        untangled, faults = self._untangled(before, after)
+        untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
         if len(faults) and len(passed):
             ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
             i = int(np.argmin(ways))

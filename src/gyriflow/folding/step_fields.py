@@ -35,13 +35,15 @@ class StepFields:
 
     Fields are computed with the problem of the step, whose mesh stays at the start of the step until the next one
     begins. Without stress memory, stress, strain and contact pressure of a step are proportional to its length, so they
-    are given per week; but a pressure and an elastic change of volume that tissue keeps are given as they are.
+    are given per week; but a pressure and an elastic change of volume that tissue keeps are given as they are. Growth
+    towards shapes leaves no stress and elastic strain but next to contact, where they depend on the mesh: there are none.
     """
 
     def __init__(
         self, problem: NonlinearProblem, contact: SelfContact | None, zones: Zones, parameters: FoldingParameters
     ) -> None:
         self.problem, self.contact, domain = problem, contact, problem.domain
+        self._is_elastic = parameters.growth.definition.measured != "shapes"
         self._remembers = parameters.stress_memory_gw > 0
         self._kept = {"pressure_pa", "elastic_volume_strain"} if parameters.keeps_volume_only else set()
         self._start = domain.local(domain.positions)
@@ -53,15 +55,15 @@ class StepFields:
         """Return those of the named fields that elements have, (m,), averaged over points, equal on every rank."""
         problem, u, domain = self.problem, step.displacement, self.problem.domain
         fields: dict[str, Floats] = {}
-        if set(ELEMENT_FIELDS).isdisjoint(names):
+        if set(ELEMENT_FIELDS).isdisjoint(names) or (not self._is_elastic and {*names} & {*ELEMENT_FIELDS} == {"stress"}):
             return fields
         slopes = problem.points.gradients
         after = domain.local(domain.positions) + u
         total = deformation_gradients(self._start, after, domain.cells, slopes).reshape(-1, 3, 3)
-        if "stress" in names:
+        if "stress" in names and self._is_elastic:
             stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
             fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
-        if "strain" in names:
+        if "strain" in names and self._is_elastic:
             Fe = problem.evaluate("elastic", u).reshape(-1, 3, 3)
             fields |= {"elastic_strain": hencky_equivalent(Fe), "elastic_volume_strain": np.log(np.linalg.det(Fe))}
         fields = self._per_gw(fields, step.step_s)

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from ..geometry.jacobians import lower_bounds
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, radius_ratios, signed_volumes
+from ..geometry.tetrahedra import (
+    MIN_RADIUS_RATIO,
+    TetrahedralMesh,
+    boundary_surface,
+    radius_ratios,
+    signed_volumes,
+)
 from ..geometry.triangles import (
     Floats,
     TriangleMesh,
@@ -192,7 +198,7 @@ def refuse_bad_mesh(
     summary: Mapping[str, Any],
     path: str | PathLike[str] | None = None,
     *,
-    min_radius_ratio: float,
+    min_radius_ratio: float = MIN_RADIUS_RATIO,
     max_surface_distance_mm: float,
     max_volume_change: float = 0.01,
 ) -> None:

@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from ..geometry.matching import crossing_faces
 from ..geometry.remeshing import remesh, untangle
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, radius_ratios, signed_volumes
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, grid, signed_volumes
 from ..geometry.triangles import TriangleMesh, edges, euler_number, face_components, is_closed, signed_volume
 from ..settings.terms import Mesher
+from .improvement import improve_flat_elements
 from .meshers import run_mesher
 from .nodes import curve_edges
 
@@ -26,9 +27,6 @@ EDGE_GROWTH = 0.5
 """... and grow by this part of each mm below."""
 OTHER_VOLUME = 0.05
 """A mesh whose volume differs by more than this part is that of another shape; nearer ones are left to the gates."""
-VOLUME_FACTORS, SLIVER_RATIO = (1.0, 0.9, 0.8), 0.02
-"""TetGen may leave a single sliver, an element with a radius ratio below this; with slightly smaller elements it does
-not."""
 REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 """Volume of the regular tetrahedron, in edges cubed."""
 
@@ -92,12 +90,13 @@ def tetrahedralise(
         raise MeshError("the surface to be filled must be closed and face outwards")
     edge = order * surface_edge_mm
     core = max(order * core_edge_mm, edge)
+    arrays: dict[str, Any]
     if mesher == "tetgen":
         even = even_surface(surface, edge)
-        mesh = _without_slivers(even, REGULAR_VOLUME * core**3, time_limit_s)
+        arrays = {"vertices": even.vertices, "faces": even.faces, "volume": REGULAR_VOLUME * core**3}
     else:
         background, lengths = background_mesh(surface, edge, core, order)
-        arrays: dict[str, Any] = {
+        arrays = {
             "vertices": surface.vertices,
             "faces": surface.faces,
             "bg_vertices": background.vertices,
@@ -106,20 +105,9 @@ def tetrahedralise(
             "edge": core,
             "epsilon": envelope_mm / float(np.linalg.norm(np.ptp(surface.vertices, axis=0))),
         }
-        mesh = run_mesher(mesher, arrays, time_limit_s)
+    mesh = improve_flat_elements(run_mesher(mesher, arrays, time_limit_s))
     _refuse_other_shape(mesh, surface)
     return curve_edges(mesh, surface) if order == 2 else mesh
-
-
-def _without_slivers(even: TriangleMesh, volume_mm3: float, time_limit_s: float) -> TetrahedralMesh:
-    """Return TetGen's mesh inside a surface; with smaller elements inside if it has a sliver, else that of the best."""
-    meshes = []
-    for factor in VOLUME_FACTORS:
-        arrays = {"vertices": even.vertices, "faces": even.faces, "volume": factor * volume_mm3}
-        meshes.append(run_mesher("tetgen", arrays, time_limit_s))
-        if radius_ratios(meshes[-1]).min() >= SLIVER_RATIO:
-            return meshes[-1]
-    return max(meshes, key=lambda mesh: radius_ratios(mesh).min())
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:

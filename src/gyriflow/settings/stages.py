@@ -8,9 +8,6 @@ from .base import FirstIf, InputFile, Settings
 from .brains import GivenRegions
 from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
 
-MIN_RADIUS_RATIO = 0.001
-"""Least accepted quality of an element: 3 × inradius / circumradius, 1 if regular."""
-
 
 class SurfaceSettings(Settings):
     """Extraction and repair of pial surfaces from label volumes and surface files."""
@@ -49,7 +46,7 @@ class MeshSettings(Settings):
     @property
     def gates(self) -> dict[str, float]:
         """The limits on the quality of the mesh."""
-        return {"min_radius_ratio": MIN_RADIUS_RATIO, "max_surface_distance_mm": self.max_surface_distance_mm}
+        return {"max_surface_distance_mm": self.max_surface_distance_mm}
 
 
 Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)]

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from pathlib import PurePath
 
 from ..settings.terms import SIDES, Side
 from ..shipped import SHIPPED
@@ -92,6 +93,9 @@ MESH = {
 }
 CARRIED_MESH = f"{BRAIN}/mesh/carried.h5"
 TARGETS = f"{BRAIN}/mesh/targets.{{origin}}.h5"
+PATH_MESH = {name: f"{BRAIN}/path/{PurePath(file).name}" for name, file in MESH.items()}
+ATLAS_PATH = f"{BRAIN}/path/shapes.h5"
+"""Shapes of the mesh of an atlas' first brain through all its weeks, on which other brains are carried."""
 
 GROWTH = {name: f"{STUDY}/growth/{name}.csv" for name in ("areas", "rates")}
 CURVES = {"curves": f"{STUDY}/growth/curves.csv", "errors": f"{STUDY}/growth/curve_errors.csv"}

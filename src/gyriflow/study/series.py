@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..settings.brains import BrainConfig
-from ..settings.ensemble import SMOOTHING_RANGE, Variation
+from ..settings.ensemble import Variation
 from ..settings.growth import BEFORE_GW, Origin
 from ..settings.root import Config
 from ..settings.runs import Run, growth_series
@@ -162,8 +162,12 @@ class Chain:
     """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
 
     `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
-    refers to its posed surface (True) or to the coordinates of its files. Shapes are also computed for `further_weeks`.
-    `variation` is that of a member of an ensemble.
+    refers to its posed surface (True) or to the coordinates of its files. `variation` is that of a member of an
+    ensemble.
+
+    Growth of an atlas is that along its `path`, the chain of all its weeks from its own first brain; only the first
+    correspondence leads there, from the start to the atlas' brain of its week. Shapes are also computed for
+    `further_weeks`.
     """
 
     origin: Origin
@@ -172,6 +176,7 @@ class Chain:
     posed: tuple[list[bool], ...]
     further_weeks: tuple[float, ...] = ()
     variation: Variation | None = None
+    path: "Chain | None" = None
 
     @property
     def weeks(self) -> list[float]:
@@ -186,10 +191,10 @@ class Chain:
         return self.weeks[1:]
 
     @property
-    def growth_weeks(self) -> list[float]:
-        """Weeks of the later brains on the start brain's time axis: their own week minus the age shift."""
-        shift = self.variation.age_shift_gw if self.variation else 0.0
-        return [round(week - shift, 2) for week in self.later_weeks]
+    def pairs(self) -> list[tuple[tuple[Brain, Brain], list[bool]]]:
+        """The pairs of brains that correspond, those of its path included, and whether each map is posed."""
+        own = list(zip(pairwise(self.brains), self.posed, strict=False))
+        return own + (self.path.pairs if self.path else [])
 
 
 def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
@@ -201,8 +206,8 @@ def later_observed_weeks(start: Brain, brains: Iterable[Brain]) -> list[float]:
 def chains_of(start: Brain, end: float, series: Series, brains: Sequence[Brain]) -> dict[tuple[str, str], Chain]:
     """Return the brains on which growth for a start brain is measured up to a week, by its id and their origin."""
     atlases = series.from_other_populations(start)
-    names = atlases if len(atlases) == 1 else []
-    atlas = _chain("atlas", _atlas_chain(start, start.week, end, names, series), series)
+    name = atlases[0] if len(atlases) == 1 else None
+    atlas = _along_path(start, start.week, end, name, series)
     observed = later_observed_weeks(start, brains)
     further = tuple(week for week in observed if week <= end and week not in atlas.later_weeks)
     return {
@@ -231,17 +236,14 @@ def member_chain(
     if not names:
         # the run itself is refused
         return _chain("atlas", [start], series)
-    round_of_atlases, number = divmod(variation.number, len(names))
-    atlas_weeks = [brain.week for brain in series.brains[names[number]]]
+    name = names[variation.number % len(names)]
+    atlas_weeks = [brain.week for brain in series.brains[name]]
     # the age of the whole run is shifted, as far as the atlas goes, or a little further
     low, high = min(atlas_weeks) - BEFORE_GW - start.week, max(atlas_weeks) + MAX_BEYOND_ATLAS_GW - end
     shift = round(min(max(variation.age_shift_gw, low), high), 2)
-    chain_brains = _atlas_chain(start, start.week + shift, end + shift, names[number : number + 1], series)
-    # one of two, so that members share the registrations between the atlas' brains
-    between_atlas = (SMOOTHING_RANGE[1], 0) if round_of_atlases % 2 else UNVARIED
     further = sorted({*(week for week in later_observed_weeks(start, brains) if week <= end), end})
     return replace(
-        _chain("atlas", chain_brains, series, varied, between_atlas),
+        _along_path(start, start.week + shift, end + shift, name, series, varied),
         further_weeks=tuple(further),
         variation=replace(variation, age_shift_gw=shift),
     )
@@ -290,16 +292,20 @@ def _own_chain(start: Brain, end: float, series: Series) -> list[Brain]:
     return sorted(by_week.values(), key=lambda brain: brain.week)
 
 
-def _atlas_chain(start: Brain, week: float, end: float, names: Iterable[str], series: Series) -> list[Brain]:
-    """Return a start brain of a week and the brains of a series of another population, one for each week.
+def _along_path(
+    start: Brain, week: float, end: float, name: str | None, series: Series, variation: tuple[float, int] = UNVARIED
+) -> Chain:
+    """Return the chain of a start brain of a week by the growth of a series of another population, if there is one.
 
-    They begin with the last week up to that of the start (else with the first week), and end with the first week at or
-    past an end week. There are at least two weeks, if available.
+    Its brains, one for each week, begin with the last week up to that of the start (else with the first week), and end
+    with the first week at or past an end week. There are at least two weeks, if available.
     """
-    members = [brain for name in names for brain in series.brains[name]]
+    members = series.brains[name] if name else ()
     weekly = sorted({brain.week: brain for brain in members}.values(), key=lambda brain: brain.week)
     if not weekly:
-        return [start]
+        return _chain("atlas", [start], series)
     first = max((brain.week for brain in weekly if brain.week <= week), default=weekly[0].week)
     last = min((brain.week for brain in weekly if brain.week >= end and brain.week > first), default=end)
-    return [start, *(brain for brain in weekly if first <= brain.week <= last)]
+    brains = (start, *(brain for brain in weekly if first <= brain.week <= last))
+    to_atlas = _chain("atlas", brains[:2], series, variation)
+    return replace(to_atlas, brains=brains, path=_chain("self", weekly, series))

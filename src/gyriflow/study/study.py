@@ -254,7 +254,7 @@ class Study:
             (simulation.start.id, simulation.shapes) for simulation in self.run_simulations if simulation.shapes
         ]
         for chain in (self.chains[key] for key in dict.fromkeys(followed)):
-            for pair, posed in zip(pairwise(chain.brains), chain.posed, strict=True):
+            for pair, posed in chain.pairs:
                 has_cortex = all(brain.registered.scheme.cortex for brain in pair)
                 for brain in (brain for brain, is_posed in zip(pair, posed, strict=True) if is_posed):
                     similar = "measured" if self.similar_in_thickness(brain) else "typical"

@@ -243,22 +243,6 @@ def test_tetgen_keeps_the_remeshed_surface_exactly(filled):
     assert (signed_volumes(filled) > 0).all()
 
 
-def test_a_mesh_with_a_sliver_is_made_again_with_smaller_elements(monkeypatch, filled):
-    sliver = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 1e-3]])
-    tets = np.vstack([filled.tets, len(filled.vertices) + np.arange(4)])
-    flat = TetrahedralMesh(np.vstack([filled.vertices, sliver]), tets)
-    for made, expected in (([flat, filled], filled), ([flat, flat, flat], flat)):
-        volumes, meshes = [], iter(made)
-
-        def mesher(name, arrays, time_limit_s, volumes=volumes, meshes=meshes):
-            volumes.append(arrays["volume"])
-            return next(meshes)
-
-        monkeypatch.setattr(tetrahedralisation, "run_mesher", mesher)
-        found = tetrahedralisation._without_slivers(BALL, 1.0, 10.0)
-        assert len(found.tets) == len(expected.tets)
-        assert volumes == list(tetrahedralisation.VOLUME_FACTORS[: len(made)])
-
 
 def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
     depth = 8 - np.linalg.norm(filled.vertices[filled.tets].mean(axis=1), axis=1)

@@ -1,0 +1,83 @@
+"""Improve the few flat elements of a mesh by moving their vertices a little."""
+
+import logging
+
+import numpy as np
+
+from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh, boundary_surface, radius_ratios
+from ..geometry.triangles import Floats, Ints
+
+log = logging.getLogger(__name__)
+
+WANTED_RATIO = 1.5 * MIN_RADIUS_RATIO
+"""Radius ratio that elements are improved to."""
+MAX_FLAT = 200
+"""Number of flat elements above which a mesh is not improved but refused as it is."""
+ROUNDS = 10
+STEPS = (0.3, 0.1, 0.03)
+"""Lengths of the moves that are tried, as a fraction of the element's longest edge."""
+MAX_SURFACE_STEP = 0.05
+"""Largest move of a vertex of the surface, likewise."""
+
+
+def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
+    """Return a linear mesh whose flattest elements are improved; the mesh itself if none is flat.
+
+    A vertex of a flat element is moved to or from the opposite face, or along the line between its middle edges, if that
+    raises the least radius ratio of all elements around the vertex, none of which is inverted. Vertices of the surface
+    move less than a twentieth of an edge.
+    """
+    flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
+    if not 0 < len(flat) <= MAX_FLAT:
+        return mesh
+    vertices = mesh.vertices.copy()
+    on_surface = np.zeros(len(vertices), dtype=bool)
+    on_surface[boundary_surface(mesh)[1]] = True
+    for element in flat:
+        for _ in range(ROUNDS):
+            if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
+                break
+            moves = [
+                move for vertex in mesh.tets[element] if (move := _best_move(vertices, mesh.tets, element, vertex, on_surface))
+            ]
+            if not moves:
+                break
+            _, vertex, place = max(moves, key=lambda move: move[0])
+            vertices[vertex] = place
+    improved = TetrahedralMesh(vertices, mesh.tets)
+    before, after = (float(radius_ratios(m)[flat].min()) for m in (mesh, improved))
+    log.info("%d flat elements improved, least radius ratio from %.4f to %.4f", len(flat), before, after)
+    return improved
+
+
+def _best_move(
+    vertices: Floats, tets: Ints, element: int, vertex: int, on_surface: Floats
+) -> tuple[float, int, Floats] | None:
+    """Return the gain in the least ratio around a vertex by its best move, the vertex and its place; None without gain."""
+    star = tets[(tets == vertex).any(axis=1)]
+    others = vertices[tets[element][tets[element] != vertex]]
+    normal = np.cross(others[1] - others[0], others[2] - others[0])
+    across = vertices[vertex] - others.mean(axis=0)
+    edge = float(np.linalg.norm(others - vertices[vertex], axis=1).max())
+    directions = [normal, across, *(vertices[vertex] - other for other in others)]
+    least = _ratios(vertices, star).min()
+    best = None
+    for direction in directions:
+        length = np.linalg.norm(direction)
+        for step in STEPS if length > 0 else ():
+            size = min(step, MAX_SURFACE_STEP) if on_surface[vertex] else step
+            for sign in (1.0, -1.0):
+                trial = vertices[star].copy()
+                place = vertices[vertex] + sign * size * edge / length * direction
+                trial[star == vertex] = place
+                ratio = _ratios(trial.reshape(-1, 3), np.arange(star.size).reshape(-1, 4)).min()
+                if ratio > least and (best is None or ratio - least > best[0]):
+                    best = (float(ratio - least), int(vertex), place)
+    return best
+
+
+def _ratios(vertices: Floats, tets: Ints) -> Floats:
+    """Return the radius ratios of elements, negative for inverted ones."""
+    corners = vertices[tets]
+    signs = np.sign(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    return signs * radius_ratios(TetrahedralMesh(corners.reshape(-1, 3), np.arange(tets.size).reshape(-1, 4)))
