@@ -223,7 +223,8 @@ def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> 
         first = max((week for week in available if week <= weeks[0]), default=available[0])
         last = min((week for week in available if week >= weeks[1]), default=None)
         if last is not None and weeks[0] < weeks[1] and first <= weeks[0] + BEFORE_GW:
-            return {"series": name, "weeks": [week for week in available if first <= week <= last]}
+            # to the last one: a prediction does not depend on where it ends
+            return {"series": name, "weeks": [week for week in available if week >= first]}
     spans = (f"{name}: {min(series.weeks):g} to {max(series.weeks):g} GW" for name, series in atlas.series.items())
     problem = f"no series of the atlas {atlas.name} covers {weeks[0]:g} to {weeks[1]:g} GW"
     remedy = "Choose another --atlas, or another --until, after --week."

@@ -11,7 +11,8 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.varying import WEEK_RANGE, Maps, value_at, value_range
+from ..settings.weeks import WEEK_RANGE
+from ..settings.varying import Maps, value_at, value_range
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact

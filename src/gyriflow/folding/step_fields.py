@@ -55,12 +55,13 @@ class StepFields:
         """Return those of the named fields that elements have, (m,), averaged over points, equal on every rank."""
         problem, u, domain = self.problem, step.displacement, self.problem.domain
         fields: dict[str, Floats] = {}
-        if set(ELEMENT_FIELDS).isdisjoint(names) or (not self._is_elastic and {*names} & {*ELEMENT_FIELDS} == {"stress"}):
+        names = {*names} & {*ELEMENT_FIELDS} - (set() if self._is_elastic else {"stress"})
+        if not names:
             return fields
         slopes = problem.points.gradients
         after = domain.local(domain.positions) + u
         total = deformation_gradients(self._start, after, domain.cells, slopes).reshape(-1, 3, 3)
-        if "stress" in names and self._is_elastic:
+        if "stress" in names:
             stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
             fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
         if "strain" in names and self._is_elastic:
