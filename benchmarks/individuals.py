@@ -38,7 +38,8 @@ from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
-from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, carry_sharply, expected_positions
+from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
+from gyriflow.growth.series_shapes import follow_series
 from gyriflow.io.files import read_table
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
@@ -112,19 +113,20 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
         between_moved(read_correspondence(file), *pair) for file, pair in zip(registered, pairwise(poses), strict=True)
     ]
     surfaces = [read_surface(folder / PIAL["whole"].format(brain=name)) for name in chain[1:]]
-    carried, start = carry_sharply(mesh, pairs, surfaces, open_sulci=True)[1:], min(atlas)
+    weeks, start = sorted(atlas), min(atlas)
+    carried = follow_series(mesh, [start, *weeks], pairs, surfaces, open_sulci=True).positions[1:]
     places = {
-        smoothing: expected_positions(mesh, start, carried, list(atlas), smoothing_mm=smoothing)
+        smoothing: expected_positions(mesh, start, carried, weeks, weeks[1:], smoothing_mm=smoothing)
         for smoothing in (0.0, *dict(GRID))
     }
-    (boundary, used), (weeks, unsmoothed) = boundary_surface(mesh), places[0.0]
+    (boundary, used), unsmoothed = boundary_surface(mesh), places[0.0]
     result: dict[float, dict[str, TriangleMesh]] = {}
     for number, week in enumerate(weeks):
         shapes = {FULL: unsmoothed[number]}
         for smoothing, fading in GRID if week > start else []:
             # linear in the faded part of the finer differences
             faded, faded_by_default = (-np.expm1((start - week) / time) for time in (fading, FADING_GW))
-            change = places[smoothing][1][number] - unsmoothed[number]
+            change = places[smoothing][number] - unsmoothed[number]
             shapes[f"{smoothing:g} mm {fading:g} GW"] = unsmoothed[number] + faded / faded_by_default * change
         result[week] = {name: TriangleMesh(points[used], boundary.faces) for name, points in shapes.items()}
     return result

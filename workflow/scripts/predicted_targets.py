@@ -18,28 +18,22 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     mesh, kept = read_tetrahedral_mesh(files.mesh), read_weekly_shapes(files.path)
     path = AtlasPath(kept.tets, SeriesShapes(kept.weeks.tolist(), kept.positions, kept.stops))
-    poses = [np.eye(4) if posed else read_pose(report).world for report, posed in zip(files.reports, params.posed)]
+    pair_of_poses = zip(files.reports, params.posed, strict=True)
+    poses = [np.eye(4) if is_posed else read_pose(report).world for report, is_posed in pair_of_poses]
     pair = between_moved(read_correspondence(files.correspondence[0]), *poses)
-    options = {"further_weeks": params.further_weeks}
     # labels whose sulci stay fused have none to open; surfaces are taken as they are
     opened = read_json(files.reports[1]).get("sulci", {"sheets": 1}).get("sheets")
-    options["open_sulci"] = bool(params.opens_sulci and opened)
+    options = {"further_weeks": params.further_weeks, "open_sulci": bool(params.opens_sulci and opened)}
     if files.norms:
         weeks = [kept.weeks[number] for number in path.observed]
         options["norm_ml"] = cohort_from_plain(read_json(files.norms)).volumes_ml(weeks)
     if params.variation:
-        names = {"age_shift_gw", "fading_gw"}
-        options |= {name: getattr(params.variation, name) for name in names}
-        options["smoothing_mm"] = params.variation.difference_smoothing_mm
-    found = predict_shapes(mesh, params.start_week, params.end_week, path, pair, params.atlas_week, ElasticFit, **options)
-    by_week = dict(zip(found.shapes.weeks, found.shapes.positions, strict=True)) | dict(found.between)
-    weeks = sorted(by_week)
-    positions = np.stack([by_week[week] for week in weeks])
-    # the baselines have no stops
-    surfaces = {name: dict(zip(found.weeks, at, strict=True)) for name, at in found.baselines.items()}
-    stops = found.shapes.stops
-    at_all = {name: [at[min(at, key=lambda known: abs(known - week))] for week in weeks] for name, at in surfaces.items()}
-    shapes = WeeklyShapes(
-        np.array(weeks), positions, sizes_of(mesh, positions), at_all, found.ages.table(), stops, list(found.between)
-    )
+        varied = params.variation
+        options |= {"age_shift_gw": varied.age_shift_gw, "fading_gw": varied.fading_gw}
+        options["smoothing_mm"] = varied.difference_smoothing_mm
+    growth = params.start_week, params.end_week, path, pair, params.atlas_week
+    found = predict_shapes(mesh, *growth, ElasticFit, **options)
+    sizes, ages = sizes_of(mesh, found.positions), found.ages.table()
+    special = found.shapes.stops, found.between
+    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, found.baselines, ages, *special)
     write_weekly_shapes(snakemake.output[0], shapes)

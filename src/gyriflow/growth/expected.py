@@ -27,15 +27,17 @@ FADING_GW = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """The predicted shapes of a mesh, those `between` them by week (n, 3), and the atlas' ages by size.
+    """The predicted shapes of a mesh at all `weeks`, and the atlas' ages by size.
 
-    The baselines are simpler predictions of the boundary's vertices (m, 3) at `weeks`: `atlas`, the atlas' own brain, and
-    `atlas_deformed`, that brain with the whole individual difference.
+    A path through the `shapes`, stops included, also gives those at the weeks `between`. The baselines are simpler
+    predictions of the boundary's vertices (m, 3): `atlas`, the atlas' own brain, and `atlas_deformed`, that brain with
+    the whole individual difference.
     """
 
-    shapes: SeriesShapes
-    between: Mapping[float, Floats]
     weeks: list[float]
+    positions: Floats
+    shapes: SeriesShapes
+    between: list[float]
     baselines: Mapping[str, list[Floats]]
     ages: AtlasAges
 
@@ -154,10 +156,11 @@ def predict_shapes(
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})
-    weeks = sorted({*found.weeks, *between} - {*found.stops})
+    by_week = dict(zip(found.weeks, found.positions, strict=True)) | {week: way(week) for week in between}
+    weeks = sorted(by_week)
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     baselines = {"atlas": [positions_at(week, carried, path.shapes.weeks, sizes)[used] for week in weeks]}
     individual["smoothing_mm"] = 0
     differing = expected_positions(mesh, start_week, grown, at, weeks[1:], **individual)
     baselines["atlas_deformed"] = [places[used] for places in differing]
-    return Prediction(found, {week: way(week) for week in between}, weeks, baselines, ages)
+    return Prediction(weeks, np.stack([by_week[week] for week in weeks]), found, between, baselines, ages)

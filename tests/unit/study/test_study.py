@@ -274,8 +274,13 @@ def test_a_brain_is_expected_from_the_atlas_week_before_it_to_the_first_past_the
     start = f"own{week}"
     found = study(of_two(week, atlas=weeks), **EXPECTED)
     assert ids(found.chains[start, "atlas"].brains) == [start, *chain]
-    assert list(found.chains[start, "atlas"].correspondences) == [
-        f"results/study/registration/{one}/{two}.h5" for one, two in pairwise([start, *chain])
+    along = found.chains[start, "atlas"]
+    assert list(along.correspondences) == [f"results/study/registration/{start}/{chain[0]}.h5"]
+    # the path is that of the whole atlas, whatever the start and the end
+    path = [f"b{week:g}" for week in weeks]
+    assert ids(along.path.brains) == path
+    assert list(along.path.correspondences) == [
+        f"results/study/registration/{one}/{two}.h5" for one, two in pairwise(path)
     ]
     assert found.simulations["a", start].targets == f"results/brains/{start}/mesh/targets.atlas.h5"
 
@@ -306,17 +311,13 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     assert len({member.targets for member in (simulation, *members)}) == 5
     # the atlases take turns, that of the run first
     assert [chain.later[0].id[:2] for chain in chains] == ["b2", "th", "b2", "th"]
-    firsts, others = zip(*((chain.correspondences[0], chain.correspondences[1:]) for chain in chains), strict=True)
-    assert len({*firsts, found.chains["own22", "atlas"].correspondences[0]}) == 5
-    assert "results/study/registration/b22/b23.h5" in others[0]
-    assert "results/study/registration/third22/third23.h5" in others[1]
-    assert "results/study/registration/b22/b23.smoothing-1.5.seed-0.h5" in others[2]
+    assert len({chain.correspondences for chain in chains} | {found.chains["own22", "atlas"].correspondences}) == 5
+    # all share the paths of the two atlases
+    assert [chain.path for chain in chains[:2]] == [chain.path for chain in chains[2:]]
+    assert found.chains["own22", "atlas"].path == chains[0].path
     shifts = [chain.variation.age_shift_gw for chain in chains]
     assert len(set(shifts)) == 4
     assert all(abs(shift) < 1.2 for shift in shifts)
-    assert [chain.growth_weeks[0] for chain in chains] == pytest.approx(
-        [chain.later_weeks[0] - shift for chain, shift in zip(chains, shifts, strict=True)]
-    )
     # a shifted age needs shapes up to its own end
     assert all(24 in chain.further_weeks for chain in chains)
     assert [chain.variation for chain in chains] == [
@@ -352,7 +353,6 @@ def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
     chain = found.chains["b21", "self.a-member-1"]
     assert chain.weeks == found.chains["b21", "self"].weeks
     assert all(".smoothing-" in file and ".seed-1" in file for file in chain.correspondences)
-    assert chain.growth_weeks == chain.later_weeks
     assert refusal(real, runs={"a": {"ensemble": 3}}) == Facts("runs.a.ensemble", "rates", "shapes")
     taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
     assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
@@ -397,7 +397,8 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
 def test_brains_correspond_in_their_poses_by_masks_and_else_in_the_worlds_of_their_files(of_two, files):
     start = {"id": "own22", "week": 22, "pial": str(files / "pial.gii"), "population": "own"}
     found = study([start, *of_two()], **EXPECTED)
-    assert list(found.chains["own22", "atlas"].posed) == [[True, False], [False, False], [False, False]]
+    assert list(found.chains["own22", "atlas"].posed) == [[True, False]]
+    assert list(found.chains["own22", "atlas"].path.posed) == [[False, False]] * 4
     assert found.brains["own22"].registered.path == "results/brains/own22/surface/filled.nii.gz"
     assert found.brains["own22"].registered.scheme.cortex
     assert found.brains["b21"].registered.path == str(files / "labels.nii.gz")
@@ -419,7 +420,7 @@ def test_brains_without_labels_are_filled_with_a_cortex_that_is_their_own_or_mea
     found = study(map(given, brains), **settings)
     assert found.chains["own22", "atlas"].later_weeks == [22, 23, 24]
     source = "typical" if surfaces == "both" else "measured"
-    ids = [name for name in names[surfaces] if name != "b25"]
+    ids = names[surfaces]
     assert found.filled == [{"ids": ids, "cortex": source, "by_cortex": True}]
     similar = {found.similar_in_thickness(found.brains[name]) for name in ids}
     expected = {"start": "b22", "atlas": "own22", "both": None}[surfaces]
