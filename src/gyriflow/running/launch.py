@@ -12,15 +12,15 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from types import FrameType
 from typing import IO, Any
-from unittest.mock import patch
 
 import psutil
 
@@ -31,6 +31,7 @@ from ..io.yaml_files import read_keys
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, recorded_exit_code
+from .snakemake_internals import dates_before_copy, temporary_records
 
 ENVIRONMENT_VARIABLES = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
@@ -42,11 +43,14 @@ ENVIRONMENT_VARIABLES = {
     "PRTE_MCA_hwloc_default_binding_policy": "none",
 }
 """Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
+TRIGGERS_WITHOUT_DATES = ("params", "input", "software-env")
+"""What Snakemake reruns jobs after where dates mean nothing; otherwise, profiles/default says it."""
+INTERRUPT_S = 0.5
+"""Time for Snakemake to notice an interruption before its jobs are stopped, so that they do not count as failed."""
 MAX_WAIT_S = 3.0
 """Time to wait for a run that is about to end."""
 GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
-SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 READ_ONLY_OPTIONS = (
     *("dryrun", "nolock", "summary", "detailed_summary", "rulegraph", "dag", "filegraph", "list_rules", "lint"),
 )
@@ -227,23 +231,23 @@ def exit_code(code: int, recorded: int | None, directory: Path) -> int:
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
     """Set the environment variables that the Snakefile and the steps of the workflow read."""
     os.environ |= ENVIRONMENT_VARIABLES | os.environ
+    # no module in a working directory is imported in place of another one
+    os.environ["PYTHONSAFEPATH"] = "1"
     # steps call `python`; let it be this one
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ |= {name: "1" for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run)) if is_set}
     os.environ[EXIT_FILE] = str(exit_file)
 
 
-@contextmanager
-def temporary_records(directory: Path) -> Iterator[None]:
-    """Let Snakemake read the records of a directory, which may be read-only, and write them to a temporary folder."""
-    from snakemake import workflow
-    from snakemake.persistence.file import FilePersistence
-
-    with TemporaryDirectory() as scratch:
-        for record in (directory / ".snakemake").glob("*"):
-            Path(scratch, record.name).symlink_to(record.resolve())
-        with patch.object(workflow, "FilePersistence", lambda **kw: FilePersistence(**kw | {"path": Path(scratch)})):
-            yield
+def set_dates(dates: Mapping[Path, float]) -> bool:
+    """Give the results of a copied study the dates (s since the epoch) at which they were made; False if refused."""
+    print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
+    try:
+        for path, date in dates.items():
+            os.utime(path, (date, date))
+    except OSError:
+        return False
+    return True
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
@@ -252,13 +256,14 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     InputError if a target does not exist.
     """
     from snakemake import cli
-    from snakemake.executors.local import Executor
-    from snakemake.scheduling.job_scheduler import JobScheduler
 
     unknown_targets: list[str] = []
     signals: list[int] = []
 
     def is_shown(record: logging.LogRecord) -> bool:
+        if getattr(record, "event", None) == "run_info":
+            # Snakemake's own handler, set by now, waits for running jobs to end
+            signal.signal(signal.SIGTERM, interrupt)
         names = NO_RULE.findall(record.getMessage())
         unknown_targets.extend(names)
         return not names
@@ -266,21 +271,18 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     def interrupt(number: int, frame: FrameType | None) -> None:
         signals.append(number)
         # a closed terminal sends several
+        if len(signals) == 1:
+            # while Snakemake waits for its jobs
+            threading.Timer(INTERRUPT_S, stop_jobs).start()
         if len(signals) == 1 or number == signal.SIGINT:
             raise KeyboardInterrupt
-
-    def cancel(executor: Any) -> None:
-        stop_jobs()
-        executor.shutdown()
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         # `nohup` has SIGHUP ignored
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
-    # Snakemake's own handlers wait for running jobs to end
-    JobScheduler.exit_gracefully = lambda _, number, frame: interrupt(number, frame)
-    Executor.cancel = cancel
-    logging.getLogger("snakemake.logging").addFilter(is_shown)
+    logger = logging.getLogger("snakemake.logging")
+    logger.addFilter(is_shown)
     try:
         cli.main(arguments)
         code = 0
@@ -288,6 +290,8 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         code = 1
+    finally:
+        logger.removeFilter(is_shown)
     if unknown_targets:
         raise unknown_target_error(unknown_targets[0])
     return 128 + signals[0] if code and signals else code
@@ -315,8 +319,12 @@ def main(arguments: Sequence[str]) -> int:
     with suppress(OSError):
         exit_file.unlink()
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
-    has_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
-    complete = [*([] if has_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]
+    complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
+    # a folder of that name may be in the working directory
+    complete += [] if options.workflow_profile else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
+    if dates := dates_before_copy(directory):
+        complete += ["--rerun-triggers", *TRIGGERS_WITHOUT_DATES] if dry_run or not set_dates(dates) else []
+    complete += arguments
     if not dry_run and not any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
         details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]

@@ -12,14 +12,17 @@ from gyriflow.code_hash import code_hash
 from gyriflow.io.files import files_in
 
 SNAKEFILE = """
+import json
 from pathlib import Path
-from gyriflow.running.reruns import benchmark_patterns, remove_stale, rerun_on_changes
+from gyriflow.running.snakemake_internals import (
+    benchmark_patterns, know_inputs_by_content, remove_stale, rerun_on_code_changes
+)
 
 rule target:
     input: "made-a"
 
 rule copy:
-    input: "given"
+    input: json.loads(Path("contents.json").read_text()).keys()
     output: "made-{name}"
     log: "logs/{name}.log"
     benchmark: "benchmarks/{name}.tsv"
@@ -30,7 +33,8 @@ rule coded:
     params: code="own"
     shell: "touch {output}"
 
-rerun_on_changes(workflow.rules, {"given": Path("given").read_text()}, Path("scripts").absolute())
+rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
+know_inputs_by_content(json.loads(Path("contents.json").read_text()), [], [])
 remove_stale(workflow.rules, "tables", "none")
 print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
 """
