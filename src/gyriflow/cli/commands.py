@@ -326,9 +326,11 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import publish_derivatives
+    from ..io.made_files import require_own_data_set
     from .init import store_options, with_earlier_options, write_bids
     from .scans import measured_verdicts
 
+    require_own_data_set(out)
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
     options = work / "bids.json"

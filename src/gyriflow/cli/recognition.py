@@ -14,7 +14,8 @@ from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
-from ..io.files import files_in, read_json, reading
+from ..io.files import files_in, reading
+from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean, own_name
@@ -158,7 +159,7 @@ def recognise(
     if no scan is found, or none of a named participant or session.
     """
     paths = [path.relative_to(folder) for path in files_in(folder)]
-    own = [file.parent for file in paths if file.name == "dataset_description.json" and _is_own(folder / file)]
+    own = [file.parent for file in paths if file.name == "dataset_description.json" and is_own_data_set(folder / file)]
     own += [file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")]
     own += [results.parent / "resources" for results in own]
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
@@ -247,15 +248,6 @@ def _brains_of_scan(
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
     return brains
-
-
-def _is_own(description: Path) -> bool:
-    try:
-        content = read_json(description)
-    except InputError:
-        return False
-    tools = content.get("GeneratedBy") if isinstance(content, dict) else None
-    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
 
 
 def _preferred_files(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:

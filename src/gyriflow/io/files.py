@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import shutil
 import uuid
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -98,12 +97,6 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-
-
-def remove_tree(folder: AnyPath) -> Path:
-    """Remove a folder with its contents; return its path."""
-    shutil.rmtree(folder, ignore_errors=True)
-    return Path(folder)
 
 
 def _plain(value: Any) -> Any:

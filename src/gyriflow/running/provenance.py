@@ -40,6 +40,13 @@ def software() -> dict[str, Any]:
     }
 
 
+def recorded_version(directory: Path) -> str | None:
+    """Return the version of gyriflow that made the report in a working directory, or None if there is none."""
+    with suppress(InputError, KeyError):
+        return str(read_json(directory / "results" / "report" / "provenance.json")["software"]["gyriflow"])
+    return None
+
+
 def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 

@@ -1,5 +1,6 @@
 """What gyriflow uses of Snakemake's internals, tried with the Snakemake that is installed."""
 
+import json
 import os
 import sys
 
@@ -10,6 +11,7 @@ from processes import ran
 
 from gyriflow.code_hash import code_hash
 from gyriflow.io.files import files_in
+from gyriflow.running.snakemake_internals import dates_before_copy
 
 SNAKEFILE = """
 import json
@@ -18,14 +20,19 @@ from gyriflow.running.snakemake_internals import (
     benchmark_patterns, know_inputs_by_content, remove_stale, rerun_on_code_changes
 )
 
+contents = json.loads(Path("contents.json").read_text())
+names = config.get("names", "a").split()
+
 rule target:
-    input: "made-a"
+    input: expand("made-{name}.csv", name=names), "tables/coded.csv"
 
 rule copy:
-    input: json.loads(Path("contents.json").read_text()).keys()
-    output: "made-{name}"
+    input: list(contents)
+    output: "made-{name}.csv"
     log: "logs/{name}.log"
     benchmark: "benchmarks/{name}.tsv"
+    params: files=[("of", path) for path in contents], place=f"{Path.cwd()}/here"
+    wildcard_constraints: name="|".join(names)
     script: "scripts/copy.py"
 
 rule coded:
@@ -34,29 +41,88 @@ rule coded:
     shell: "touch {output}"
 
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
-know_inputs_by_content(json.loads(Path("contents.json").read_text()), [], [])
-remove_stale(workflow.rules, "tables", "none")
+know_inputs_by_content(contents, ["earlier"], [])
+remove_stale(workflow.rules, ".")
 print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
 """
 SCRIPT = "import shutil\nfrom gyriflow.units import ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
 
 
+@pytest.fixture
+def study(tmp_path):
+    """A finished study of one file that is known by its content."""
+    (tmp_path / "study" / "scripts").mkdir(parents=True)
+    (tmp_path / "study" / "Snakefile").write_text(SNAKEFILE)
+    (tmp_path / "study" / "scripts" / "copy.py").write_text(SCRIPT)
+    (tmp_path / "given").write_text("one")
+    known(tmp_path / "study", {tmp_path / "given": "content-1"})
+    done = snakemake(tmp_path / "study", "--config", "names=a b")
+    assert done.returncode == 0, done.stderr
+    patterns = str({"copy": r"benchmarks/(?P<name>(?:a|b))\.tsv$"})
+    assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own"]))
+    assert patterns in done.stdout or "benchmarks/(?P<name>" in done.stdout
+    return tmp_path / "study"
+
+
+def known(folder, contents):
+    (folder / "contents.json").write_text(json.dumps({str(path): content for path, content in contents.items()}))
+
+
+def snakemake(folder, *arguments):
+    triggers = ("--rerun-triggers", "mtime", "params", "input")
+    return ran(sys.executable, "-m", "snakemake", "--cores", "1", *arguments, *triggers, cwd=folder)
+
+
+def reruns(folder):
+    dry = snakemake(folder, "-n", "--config", "names=a b")
+    assert dry.returncode == 0, dry.stderr
+    return "rule copy" in dry.stdout + dry.stderr
+
+
 @pytest.mark.fault(68)
-def test_jobs_run_again_after_a_change_of_code_or_where_an_older_file_takes_the_place_of_their_input(tmp_path):
-    script, given = tmp_path / "scripts" / "copy.py", tmp_path / "given"
-    script.parent.mkdir()
-    (tmp_path / "Snakefile").write_text(SNAKEFILE)
-    script.write_text(SCRIPT)
-    given.write_text("one")
-    touched(tmp_path / "tables", "coded.csv", "volumes.csv", "figures/volumes.png", "study.json")
-    snakemake = [sys.executable, "-m", "snakemake", "--cores", "1"]
-    first = ran(*snakemake, cwd=tmp_path)
-    assert first.returncode == 0, first.stderr
-    said = str({"copy": r"benchmarks/(?P<name>.+)\.tsv$"})
-    assert f"{said} {[None, code_hash(script), 'own']}" in first.stdout
-    given.write_text("two")
-    os.utime(given, ns=(0, 0))
-    again = ran(*snakemake, "-n", cwd=tmp_path)
-    assert again.stdout + again.stderr == Facts("two")
-    # tables and figures that no rule makes any more have been removed
-    assert [path.name for path in files_in(tmp_path / "tables")] == ["coded.csv", "study.json"]
+def test_inputs_are_known_by_their_content_wherever_they_and_the_study_are(study, tmp_path):
+    os.utime(tmp_path / "given", (2e9, 2e9))
+    (tmp_path / "given").rename(tmp_path / "an other")
+    study.rename(tmp_path / "moved")
+    known(tmp_path / "moved", {tmp_path / "an other": "content-1"})
+    assert not reruns(tmp_path / "moved")
+    # a newer file, and one that is older than what was made of it
+    for date in (2e9, 0):
+        os.utime(tmp_path / "an other", (date, date))
+        known(tmp_path / "moved", {tmp_path / "an other": "content-2"})
+        assert reruns(tmp_path / "moved")
+
+
+@pytest.mark.fault(68)
+def test_jobs_run_again_after_a_change_of_their_code_not_of_its_date(study):
+    script = study / "scripts" / "copy.py"
+    os.utime(script, (2e9, 2e9))
+    assert not reruns(study)
+    script.write_text(SCRIPT.replace("ML_PER_MM3", "SECONDS_PER_GW"))
+    assert reruns(study)
+
+
+def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_more(study):
+    touched(study, "mine.csv", "tables/mine.png")
+    # of two that are not made any more, a user has changed one
+    assert snakemake(study, "-n", "--config", "names=c").returncode == 0
+    left = {path.name for path in files_in(study) if path.suffix in (".csv", ".png")}
+    assert left == {"mine.csv", "mine.png", "coded.csv"}
+
+
+def test_files_that_a_user_has_changed_are_left(study):
+    (study / "made-a.csv").write_text("mine")
+    assert snakemake(study, "-n", "--config", "names=c").returncode == 0
+    assert {path.name for path in study.glob("*.csv")} == {"made-a.csv"}
+
+
+def test_the_dates_of_a_copy_are_those_at_which_its_results_were_made(study):
+    made = {path: path.stat().st_mtime for path in (study / "made-a.csv", study / "made-b.csv")}
+    assert dates_before_copy(study) == {}
+    for path in (*made, study / "tables" / "coded.csv"):
+        os.utime(path, (2e9, 2e9))
+    dates = dates_before_copy(study)
+    assert {path: dates[path] for path in made} == pytest.approx(made, abs=1e-6)
+    # a result that was not copied
+    os.utime(study / "made-b.csv", (made[study / "made-b.csv"],) * 2)
+    assert dates_before_copy(study) == {}
