@@ -7,7 +7,7 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import chdir
+from contextlib import ExitStack, chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -144,11 +144,11 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(take)
     # Snakemake makes the working directory, even in a dry run, and changes to it
-    with chdir(Path.cwd()), TemporaryDirectory() as empty:
+    with ExitStack() as end, chdir(Path.cwd()), TemporaryDirectory() as empty:
+        end.callback(logger.removeFilter, take)
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
         code = launch([*options, "--dry-run", *further])
-    logger.removeFilter(take)
     if code:
         sys.exit(code)
     return jobs
@@ -173,8 +173,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
         thickness = simulation.settings.thickness_mm
-        # maps and measured thicknesses are unknown before the surface is made
-        if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
+        # a map's thickness is unknown before the surface is made
+        if isinstance(thickness, Varying) and thickness.map:
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, simulation.start.week)
         elements = through / mesh.surface_edge_mm

@@ -165,7 +165,8 @@ def recognise(
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
     found: dict[str, list[_Candidate]] = defaultdict(list)
-    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)):
+    unreadable = [file for file in files if (folder / file).is_dir()]
+    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files, unreadable), *_folders(unreadable)):
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
     # sessions without labels or surfaces count
@@ -342,19 +343,24 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
             yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
 
 
-def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
+def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[_Candidate]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:
             images[file.parent].append(str(file))
     for file in files:
-        if ENTITY.fullmatch(file.name):
+        if ENTITY.fullmatch(file.name) and file not in unreadable:
             yield _Candidate(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
             yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
+
+
+def _folders(unreadable: Sequence[Path]) -> Iterator[_Candidate]:
+    for folder in unreadable:
+        yield _Candidate(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
 
 
 def _found_brain(

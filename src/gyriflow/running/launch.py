@@ -71,6 +71,8 @@ REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with the path of a JSON file: refused brains and causes. The study is finished without them."""
 MIN_FREE_BYTES = 4 * 2**20
 """If less disk space is left, a run that failed without an exit code of its own has filled the disk."""
+MIN_FREE_FILES = 16
+"""Likewise, for systems that can hold a fixed number of files."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
 
@@ -221,11 +223,34 @@ def exit_code(code: int, recorded: int | None, directory: Path) -> int:
 
     A full disk is reported and gives the code of a StorageError.
     """
-    if code and recorded in (None, 1) and shutil.disk_usage(directory).free < MIN_FREE_BYTES:
-        message = f"{directory.resolve()}: the disk is full. Free some space, then run the same command again"
-        print(f"gyriflow: {message}", file=sys.stderr)
+    if code and recorded in (None, 1) and (full := full_disk(directory)):
+        print(f"gyriflow: {directory.resolve()}: {full}, then run the same command again", file=sys.stderr)
         return StorageError.exit_code
     return (recorded or code) if code else 0
+
+
+def full_disk(directory: Path) -> str:
+    """Return that the disk of a directory is full and what to do, or "" if it is not."""
+    if shutil.disk_usage(directory).free < MIN_FREE_BYTES:
+        return "the disk is full. Free some space"
+    system = os.statvfs(directory)
+    # systems without a fixed number of files have 0 of 0
+    if system.f_files and system.f_favail < MIN_FREE_FILES:
+        return "the disk can hold no more files (inodes). Delete some files"
+    return ""
+
+
+def set_cache(directory: Path, *, dry_run: bool) -> None:
+    """Let libraries keep their caches with a study if the home folder cannot be written or is unknown."""
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "snakemake")
+        cache.mkdir(parents=True, exist_ok=True)
+        usable = os.access(cache, os.W_OK)
+    except (OSError, RuntimeError):
+        usable = False
+    if not usable:
+        scratch = Path(gettempdir(), f"gyriflow-cache-{os.getpid()}") if dry_run else directory.absolute() / ".snakemake"
+        os.environ["XDG_CACHE_HOME"] = str(scratch / "cache")
 
 
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
@@ -318,6 +343,7 @@ def main(arguments: Sequence[str]) -> int:
     # a killed run may have had the same process number, as in containers
     with suppress(OSError):
         exit_file.unlink()
+    set_cache(directory, dry_run=runs_nothing)
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
     complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     # a folder of that name may be in the working directory

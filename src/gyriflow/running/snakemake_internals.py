@@ -81,11 +81,15 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
 
 @contextmanager
 def temporary_records(directory: Path) -> Iterator[None]:
-    """Let Snakemake read the records of a directory, which may be read-only, and write them to a temporary folder."""
+    """Let Snakemake plan in a directory that may be read-only: it writes its records to a temporary folder."""
     from snakemake import workflow
+    from snakemake.jobs import Job
     from snakemake.persistence.file import FilePersistence
 
-    with TemporaryDirectory() as scratch:
+    async def check_nothing(job: Job) -> None:
+        pass
+
+    with TemporaryDirectory() as scratch, patch.object(Job, "check_protected_output", check_nothing):
         # nothing is written to these in a dry run
         for name in ("metadata", "incomplete", "locks"):
             if (record := directory / ".snakemake" / name).is_dir():

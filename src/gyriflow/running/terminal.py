@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
+from .launch import full_disk
 from .jobs import OUT_OF_MEMORY, GrowingFile, cause, events_in, messages_in, read_log
 from .status import REPORT, STATE, format_duration, format_progress
 
@@ -69,7 +70,7 @@ class RunDisplay:
         self.failed: list[dict[str, Any]] = []
         self.shown_warnings: set[tuple[str, str]] = set()
         self.failure_messages: list[str] = []
-        self.interrupted = False
+        self.interrupted = self.has_errors = False
 
     def watch(self, lock: AbstractContextManager) -> None:
         """Follow the jobs and record the state of the run for `gyriflow status`, until it ends."""
@@ -81,6 +82,7 @@ class RunDisplay:
     def show(self, record: logging.LogRecord) -> None:
         """Display a log record of Snakemake's."""
         event = vars(record)
+        self.has_errors |= record.levelno >= logging.ERROR
         match event.get("event"):
             case "run_info":
                 jobs = {rule: count for rule, count in (event["stats"] or {}).items() if rule != "total"}
@@ -120,12 +122,15 @@ class RunDisplay:
         message = str(event["rule_msg"] or "\n".join(self.failure_messages))
         self.failure_messages.clear()
         slurm, signal = SLURM.search(message), SIGNAL.search(message)
+        # Snakemake's text shows the shell command
+        message = "" if "CalledProcessError" in message else message
         if slurm:
             reason = f"Slurm ended job {slurm[1]}: {slurm[2]}"
         elif signal:
             reason = SIGNAL_CAUSES.get(signal[1], f"it crashed ({signal[1]}): please report this with its log")
         else:
-            reason = cause("".join(map(read_log, event["log"]))) or message or "it left no message"
+            reason = cause("".join(map(read_log, event["log"]))) or message or full_disk(Path())
+            reason = reason or f"it left no message in its log; see the end of {self.details}"
         if reason == OUT_OF_MEMORY:
             record_exit_code(KILLED)
         name = job.name if job else event["rule_name"]
@@ -170,9 +175,11 @@ class RunDisplay:
             self.console.print(f"gyriflow: {failed}, {done}; run the same command again to resume")
         elif self.failure_messages:
             self.console.print("\n".join(self.failure_messages))
-        elif self.total and self.done == self.total:
+        elif self.total and not self.has_errors:
             report = f"; report: {REPORT.absolute()}" if REPORT.is_file() else ""
-            self.console.print(f"gyriflow: done in {took}{report}")
+            # with `--until`, some steps are left
+            steps = "" if self.done == self.total else f", {done}"
+            self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
         for event in events_in(job.events.new_text()) if job.events else ():

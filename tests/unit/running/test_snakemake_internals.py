@@ -41,7 +41,7 @@ rule coded:
     shell: "touch {output}"
 
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
-know_inputs_by_content(contents, ["earlier"], [])
+know_inputs_by_content(contents, ["content-1"], [])
 remove_stale(workflow.rules, ".")
 print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
 """
@@ -58,9 +58,8 @@ def study(tmp_path):
     known(tmp_path / "study", {tmp_path / "given": "content-1"})
     done = snakemake(tmp_path / "study", "--config", "names=a b")
     assert done.returncode == 0, done.stderr
-    patterns = str({"copy": r"benchmarks/(?P<name>(?:a|b))\.tsv$"})
     assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own"]))
-    assert patterns in done.stdout or "benchmarks/(?P<name>" in done.stdout
+    assert "'copy': r'benchmarks/(?P<name>" in done.stdout.replace("'benchmarks", "r'benchmarks")
     return tmp_path / "study"
 
 
