@@ -153,7 +153,8 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
 
     path = output or folder / CONFIG
     found = _recognise(folder, **selection)
-    write_configuration(found, folder, path, force=force)
+    if kept := write_configuration(found, folder, path, force=force):
+        click.echo(f"the earlier configuration is now {kept}")
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
     sys.exit(_show_scans(found, may_fill_in=True))
 
@@ -343,13 +344,13 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     """
     from ..io.exports import publish_derivatives
     from ..io.made_files import require_own_data_set
-    from .init import store_options, with_earlier_options, write_bids
+    from .init import BIDS_OPTIONS, store_options, with_earlier_options, write_bids
     from .scans import measured_verdicts
 
     require_own_data_set(out)
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
-    options = work / "bids.json"
+    options = work / BIDS_OPTIONS
     if level == "group":
         selection = with_earlier_options(options, selection)
     folding = {key: selection[key] for key in ("settings", "fold")}

@@ -33,16 +33,8 @@ from ..shipped import SHIPPED
 from ..step import EXIT_FILE, recorded_exit_code
 from .snakemake_internals import dates_before_copy, temporary_records
 
-ENVIRONMENT_VARIABLES = {
-    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
-    "OMPI_MCA_mpi_yield_when_idle": "1",
-    "OMPI_MCA_btl": "self,sm",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "PRTE_MCA_hwloc_default_binding_policy": "none",
-}
-"""Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
+ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
+"""The conda environment, whose variables of MPI and BLAS are defaults in any other one, too, as in `./run`."""
 TRIGGERS_WITHOUT_DATES = ("params", "input", "software-env")
 """What Snakemake reruns jobs after where dates mean nothing; otherwise, profiles/default says it."""
 INTERRUPT_S = 0.5
@@ -255,7 +247,7 @@ def set_cache(directory: Path, *, dry_run: bool) -> None:
 
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
     """Set the environment variables that the Snakefile and the steps of the workflow read."""
-    os.environ |= ENVIRONMENT_VARIABLES | os.environ
+    os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
     # no module in a working directory is imported in place of another one
     os.environ["PYTHONSAFEPATH"] = "1"
     # steps call `python`; let it be this one

@@ -43,7 +43,7 @@ def software() -> dict[str, Any]:
 def recorded_version(directory: Path) -> str | None:
     """Return the version of gyriflow that made the report in a working directory, or None if there is none."""
     with suppress(InputError, KeyError):
-        return str(read_json(directory / "results" / "report" / "provenance.json")["software"]["gyriflow"])
+        return str(read_json(directory / "results" / "report" / "provenance.json")["gyriflow"])
     return None
 
 
