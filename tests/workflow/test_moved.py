@@ -24,7 +24,9 @@ def made(checkout_copy, tmp_path_factory):
     (project / "scans").mkdir()
     workflow.directory.mkdir()
     save_labels(project / "scans" / "b.nii.gz", *phantom(22.0, 2.0))
-    study = SMALL_STUDY | {"brains": [SMALL_STUDY["brains"][0], SMALL_STUDY["brains"][1] | {"labels": "../scans/b.nii.gz"}]}
+    study = SMALL_STUDY | {
+        "brains": [SMALL_STUDY["brains"][0], SMALL_STUDY["brains"][1] | {"labels": "../scans/b.nii.gz"}]
+    }
     arguments = ("--configfile", workflow.write("study.yaml", study))
     workflow.lay_out(*arguments)
     workflow.count_as_made("--forceall", *arguments)

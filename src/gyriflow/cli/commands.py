@@ -27,7 +27,6 @@ REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
 
-
 class Cores(click.IntRange):
     """A number of cores, or `all` that may be used."""
 

@@ -166,7 +166,12 @@ def recognise(
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
     found: dict[str, list[_Candidate]] = defaultdict(list)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files, unreadable), *_folders(unreadable)):
+    for candidate in (
+        *_hemispheres(files),
+        *_whole_surfaces(files),
+        *_volumes(files, unreadable),
+        *_folders(unreadable),
+    ):
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
     # sessions without labels or surfaces count

@@ -18,9 +18,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import gettempdir
 from types import FrameType
-from typing import IO, Any
+from typing import IO
 
 import psutil
 
@@ -241,7 +241,9 @@ def set_cache(directory: Path, *, dry_run: bool) -> None:
     except (OSError, RuntimeError):
         usable = False
     if not usable:
-        scratch = Path(gettempdir(), f"gyriflow-cache-{os.getpid()}") if dry_run else directory.absolute() / ".snakemake"
+        scratch = (
+            Path(gettempdir(), f"gyriflow-cache-{os.getpid()}") if dry_run else directory.absolute() / ".snakemake"
+        )
         os.environ["XDG_CACHE_HOME"] = str(scratch / "cache")
 
 

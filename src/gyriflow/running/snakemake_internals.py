@@ -50,7 +50,7 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
     from snakemake.persistence import PersistenceBase
 
     recorded_input, recorded_params, is_newer = PersistenceBase._input, PersistenceBase._params, _IOFile.is_newer
-    names = {path: f"input {content}" for path, content in contents.items()} 
+    names = {path: f"input {content}" for path, content in contents.items()}
     names |= dict.fromkeys([*folders, str(Path.cwd()), str(SHIPPED)], "a folder")
     # as parameters are written
     names |= {repr(path)[1:-1]: name for path, name in names.items()}
@@ -65,7 +65,9 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
         return sha256_of(path) if path.startswith("/") and Path(path).is_file() else None
 
     def by_content(self: PersistenceBase, job: Any) -> list[str]:
-        return sorted(f"input {content}" if (content := content_of(path)) else path for path in recorded_input(self, job))
+        return sorted(
+            f"input {content}" if (content := content_of(path)) else path for path in recorded_input(self, job)
+        )
 
     def without_places(self: PersistenceBase, job: Any) -> list[str]:
         return sorted(places.sub(lambda match: names[match[0]], text) for text in recorded_params(self, job))
@@ -118,10 +120,10 @@ def remove_stale(rules: Collection[Any], *folders: str) -> None:
     """
     for made in _made_files(Path()):
         is_in_folders = any(made.path.is_relative_to(folder) for folder in folders)
-        if is_in_folders and made.path.suffix in REMOVED and made.has_its_date:
-            if not any(rule.is_producer(str(made.path)) for rule in rules):
-                made.path.unlink()
-                made.record.unlink()
+        is_stale = is_in_folders and not any(rule.is_producer(str(made.path)) for rule in rules)
+        if is_stale and made.path.suffix in REMOVED and made.has_its_date:
+            made.path.unlink()
+            made.record.unlink()
 
 
 class _MadeFile(NamedTuple):

@@ -16,8 +16,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
-from .launch import full_disk
 from .jobs import OUT_OF_MEMORY, GrowingFile, cause, events_in, messages_in, read_log
+from .launch import full_disk
 from .status import REPORT, STATE, format_duration, format_progress
 
 WEIGHTS = {"simulate": 40.0, "simulate_member": 20.0, "tetrahedralise": 15.0, "register": 7.0, "validation": 7.0}

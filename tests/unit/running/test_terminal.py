@@ -245,7 +245,9 @@ def test_the_status_of_a_configuration_with_mistakes_is_told(tmp_path, content):
 
 def test_the_runs_of_a_configuration_are_told_before_they_start_wherever_its_files_are(tmp_path):
     shape = "{id: a, week: 21, shape: {semi_axes_mm: [20, 20, 20]}}"
-    (tmp_path / "gyriflow.yaml").write_text(f"brains: [{shape}]\nstart: a\nfolding: {{end_week: 22}}\nruns: {{x: {{}}}}")
+    (tmp_path / "gyriflow.yaml").write_text(
+        f"brains: [{shape}]\nstart: a\nfolding: {{end_week: 22}}\nruns: {{x: {{}}}}"
+    )
     assert text(tmp_path).splitlines()[-1].split() == ["x", "a", "-", "-", "-", "-"]
 
 
