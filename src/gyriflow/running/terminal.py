@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
-from .jobs import OUT_OF_MEMORY, GrowingFile, cause, events_in, messages_in, read_log
+from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
 from .launch import full_disk
 from .status import REPORT, STATE, format_duration, format_progress
 
@@ -37,13 +37,12 @@ FAILED_JOB_PREFIXES = (
 
 @dataclass
 class Job:
-    """A running job, its log and its progress file."""
+    """A running job and its log, beside which a simulation writes its progress."""
 
     rule: str
     name: str
     began: float
     log: Path | None
-    events: GrowingFile | None
     step: dict[str, Any] | None = None
 
 
@@ -68,7 +67,7 @@ class RunDisplay:
         self.work_done = 0.0
         self.done = self.total = self.next_percent = 0
         self.failed: list[dict[str, Any]] = []
-        self.shown_warnings: set[tuple[str, str]] = set()
+        self.shown: set[str] = set()
         self.failure_messages: list[str] = []
         self.interrupted = self.has_errors = False
 
@@ -93,9 +92,8 @@ class RunDisplay:
             case "job_info":
                 wildcards = " ".join((event["wildcards"] or {}).values())
                 log = Path(event["log"][0]).absolute() if event["log"] else None
-                events = GrowingFile(log.with_suffix(".jsonl")) if log else None
                 name = f"{event['rule_name']} {wildcards}".strip()
-                self.running[event["jobid"]] = Job(event["rule_name"], name, self.clock(), log, events)
+                self.running[event["jobid"]] = Job(event["rule_name"], name, self.clock(), log)
             case "job_finished" if job := self.running.pop(event["job_id"], None):
                 self._show_warnings(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
@@ -182,13 +180,13 @@ class RunDisplay:
             self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
-        for event in events_in(job.events.new_text()) if job.events else ():
+        for event in events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ():
             match event:
                 case {"event": "warning", "message": str(text)}:
-                    self._show_warning(job, text)
+                    self._show_once(f"warning {job.name}: {text}")
                 case {"event": "size", "elements": elements, "ranks": ranks, "memory_mib": mib}:
                     on = f"{ranks} rank{'s' if ranks > 1 else ''}"
-                    self.console.print(f"       {job.name}: {elements} elements, {on}, about {mib} MiB")
+                    self._show_once(f"       {job.name}: {elements} elements, {on}, about {mib} MiB")
                 case {"event": "step"}:
                     job.step = event
 
@@ -196,9 +194,10 @@ class RunDisplay:
         self._follow(job)
         for message in messages_in(read_log(job.log)) if job.log else ():
             if message.by_gyriflow and message.level == "warning":
-                self._show_warning(job, message.text.partition("\n")[0])
+                first_line, _, _ = message.text.partition("\n")
+                self._show_once(f"warning {job.name}: {first_line}")
 
-    def _show_warning(self, job: Job, text: str) -> None:
-        if (job.name, text) not in self.shown_warnings:
-            self.shown_warnings.add((job.name, text))
-            self.console.print(f"warning {job.name}: {text}")
+    def _show_once(self, line: str) -> None:
+        if line not in self.shown:
+            self.shown.add(line)
+            self.console.print(line)
