@@ -232,7 +232,7 @@ def full_disk(directory: Path) -> str:
     return ""
 
 
-def set_cache(directory: Path, *, dry_run: bool) -> None:
+def set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written or is unknown."""
     try:
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "snakemake")
@@ -241,10 +241,7 @@ def set_cache(directory: Path, *, dry_run: bool) -> None:
     except (OSError, RuntimeError):
         usable = False
     if not usable:
-        scratch = (
-            Path(gettempdir(), f"gyriflow-cache-{os.getpid()}") if dry_run else directory.absolute() / ".snakemake"
-        )
-        os.environ["XDG_CACHE_HOME"] = str(scratch / "cache")
+        os.environ["XDG_CACHE_HOME"] = str(directory.absolute() / ".snakemake" / "cache")
 
 
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
@@ -337,7 +334,8 @@ def main(arguments: Sequence[str]) -> int:
     # a killed run may have had the same process number, as in containers
     with suppress(OSError):
         exit_file.unlink()
-    set_cache(directory, dry_run=runs_nothing)
+    if not runs_nothing:
+        set_cache(directory)
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
     complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     # a folder of that name may be in the working directory

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 from base64 import urlsafe_b64decode
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -83,7 +84,7 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
 
 @contextmanager
 def temporary_records(directory: Path) -> Iterator[None]:
-    """Let Snakemake plan in a directory that may be read-only: it writes its records to a temporary folder."""
+    """Let Snakemake plan in a directory that may be read-only: it writes records and caches to a temporary folder."""
     from snakemake import workflow
     from snakemake.jobs import Job
     from snakemake.persistence.file import FilePersistence
@@ -91,7 +92,11 @@ def temporary_records(directory: Path) -> Iterator[None]:
     async def check_nothing(job: Job) -> None:
         pass
 
-    with TemporaryDirectory() as scratch, patch.object(Job, "check_protected_output", check_nothing):
+    with (
+        TemporaryDirectory() as scratch,
+        patch.object(Job, "check_protected_output", check_nothing),
+        patch.dict(os.environ, XDG_CACHE_HOME=scratch),
+    ):
         # nothing is written to these in a dry run
         for name in ("metadata", "incomplete", "locks"):
             if (record := directory / ".snakemake" / name).is_dir():

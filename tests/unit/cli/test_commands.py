@@ -282,7 +282,7 @@ def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(monke
     (tmp_path / "file").touch()
     monkeypatch.setenv("HOME", str(tmp_path / home) if home == "file" else home or str(tmp_path / "home"))
     monkeypatch.setenv("XDG_CACHE_HOME", "")
-    launch.set_cache(tmp_path, dry_run=False)
+    launch.set_cache(tmp_path)
     expected = str(tmp_path / ".snakemake" / "cache") if home else ""
     assert os.environ["XDG_CACHE_HOME"] == expected
 
