@@ -18,10 +18,11 @@ def making_files(folder: AnyPath, record: AnyPath, *subfolders: str) -> Iterator
     with suppress(InputError):
         listed = set(read_json(record))
     removed = {name for name in listed if not subfolders or name.partition("/")[0] in subfolders}
-    for path in (folder / name for name in removed):
-        path.unlink(missing_ok=True)
-        with suppress(OSError):  # of a folder with other files, or that is gone
-            path.parent.rmdir()
+    for name in removed:
+        (folder / name).unlink(missing_ok=True)
+        for parent in Path(name).parents[:-1]:
+            with suppress(OSError):  # of a folder with other files, or that is gone
+                (folder / parent).rmdir()
     others = set(files_below(folder))
     try:
         yield
