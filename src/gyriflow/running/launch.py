@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
@@ -35,8 +35,6 @@ from .snakemake_internals import dates_before_copy, temporary_records
 
 ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one, too, as in `./run`."""
-TRIGGERS_WITHOUT_DATES = ("params", "input", "software-env")
-"""What Snakemake reruns jobs after where dates mean nothing; otherwise, profiles/default says it."""
 INTERRUPT_S = 0.5
 """Time for Snakemake to notice an interruption before its jobs are stopped, so that they do not count as failed."""
 MAX_WAIT_S = 3.0
@@ -255,15 +253,14 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
     os.environ[EXIT_FILE] = str(exit_file)
 
 
-def set_dates(dates: Mapping[Path, float]) -> bool:
-    """Give the results of a copied study the dates (s since the epoch) at which they were made; False if refused."""
-    print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
-    try:
+def restore_dates(directory: Path) -> None:
+    """Give the results of a copied study the dates at which they were made."""
+    if dates := dates_before_copy(directory):
+        print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
+    # files of another user cannot be dated
+    with suppress(OSError):
         for path, date in dates.items():
             os.utime(path, (date, date))
-    except OSError:
-        return False
-    return True
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
@@ -327,6 +324,7 @@ def main(arguments: Sequence[str]) -> int:
     dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
     if not dry_run:
         clear_stale_lock(directory)
+        restore_dates(directory)
     runs_nothing = dry_run and not options.nolock
     # in the working directory, where jobs on other machines of a cluster find it too
     folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
@@ -340,8 +338,6 @@ def main(arguments: Sequence[str]) -> int:
     complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     # a folder of that name may be in the working directory
     complete += [] if options.workflow_profile else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
-    if dates := dates_before_copy(directory):
-        complete += ["--rerun-triggers", *TRIGGERS_WITHOUT_DATES] if dry_run or not set_dates(dates) else []
     complete += arguments
     if not dry_run and not any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
         details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"

@@ -1,4 +1,4 @@
-"""What gyriflow uses of Snakemake beside its public interface, tried with Snakemake 9.27.1."""
+"""What gyriflow uses of Snakemake beside its public interface, tried with Snakemake 9.27.0 and 9.27.1."""
 
 import hashlib
 import json
@@ -39,7 +39,8 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
 def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str], folders: Collection[str]) -> None:
     """Have Snakemake record the content of input files instead of their paths, so that they may be moved.
 
-    Files of gyriflow and of a user count as changed if their content has, whatever their date.
+    Files of gyriflow and of a user count as changed if their content has, whatever their date. Dates of results mean
+    nothing in a copy of a study.
 
     Parameters
     ----------
@@ -56,6 +57,7 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
     # as parameters are written
     names |= {repr(path)[1:-1]: name for path, name in names.items()}
     longest_first = sorted(names, key=len, reverse=True)
+    has_dates = not dates_before_copy(Path())
     places = re.compile(rf"(?<![\w./-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w.-])")
 
     @cache
@@ -74,9 +76,9 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
         return sorted(places.sub(lambda match: names[match[0]], text) for text in recorded_params(self, job))
 
     async def is_newer_or_other(self: Any, time: float) -> bool:
-        if content := content_of(str(self)):
-            return bool(earlier) and str(self) in contents and content not in earlier and await is_newer(self, time)
-        return await is_newer(self, time)
+        content, is_known = content_of(str(self)), str(self) in contents
+        may_be_newer = has_dates if content is None else earlier and is_known and content not in earlier
+        return bool(may_be_newer) and await is_newer(self, time)
 
     PersistenceBase._input, PersistenceBase._params = by_content, without_places
     _IOFile.is_newer = is_newer_or_other

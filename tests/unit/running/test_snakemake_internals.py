@@ -24,7 +24,7 @@ contents = json.loads(Path("contents.json").read_text())
 names = config.get("names", "a").split()
 
 rule target:
-    input: expand("made-{name}.csv", name=names), "tables/coded.csv"
+    input: expand("made-{name}.csv", name=names), "tables/coded.csv", "after.csv"
 
 rule copy:
     input: list(contents)
@@ -38,6 +38,16 @@ rule copy:
 rule coded:
     output: "tables/coded.csv"
     params: code="own"
+    shell: "touch {output}"
+
+# so large that Snakemake makes no checksum of it
+rule large:
+    output: "large.bin"
+    shell: "head -c 2000000 /dev/zero > {output}"
+
+rule after:
+    input: "large.bin"
+    output: "after.csv"
     shell: "touch {output}"
 
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
@@ -58,7 +68,7 @@ def study(tmp_path):
     known(tmp_path / "study", {tmp_path / "given": "content-1"})
     done = snakemake(tmp_path / "study", "--config", "names=a b")
     assert done.returncode == 0, done.stderr
-    assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own"]))
+    assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own", None, None]))
     assert "'copy': r'benchmarks/(?P<name>" in done.stdout.replace("'benchmarks", "r'benchmarks")
     return tmp_path / "study"
 
@@ -106,22 +116,25 @@ def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_mor
     # of two that are not made any more, a user has changed one
     assert snakemake(study, "-n", "--config", "names=c").returncode == 0
     left = {path.name for path in files_in(study) if path.suffix in (".csv", ".png")}
-    assert left == {"mine.csv", "mine.png", "coded.csv"}
+    assert left == {"mine.csv", "mine.png", "coded.csv", "after.csv"}
 
 
 def test_files_that_a_user_has_changed_are_left(study):
     (study / "made-a.csv").write_text("mine")
     assert snakemake(study, "-n", "--config", "names=c").returncode == 0
-    assert {path.name for path in study.glob("*.csv")} == {"made-a.csv"}
+    assert {path.name for path in study.glob("*.csv")} == {"made-a.csv", "after.csv"}
 
 
 def test_the_dates_of_a_copy_are_those_at_which_its_results_were_made(study):
     made = {path: path.stat().st_mtime for path in (study / "made-a.csv", study / "made-b.csv")}
     assert dates_before_copy(study) == {}
-    for path in (*made, study / "tables" / "coded.csv"):
-        os.utime(path, (2e9, 2e9))
+    for number, name in enumerate(("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")):
+        os.utime(study / name, (2e9 + number, 2e9 + number))
     dates = dates_before_copy(study)
     assert {path: dates[path] for path in made} == pytest.approx(made, abs=1e-6)
+    # an input that is newer than what was made of it says nothing then
+    assert "rule after" not in snakemake(study, "-n", "--config", "names=a b").stdout
     # a result that was not copied
     os.utime(study / "made-b.csv", (made[study / "made-b.csv"],) * 2)
     assert dates_before_copy(study) == {}
+    assert "rule after" in snakemake(study, "-n", "--config", "names=a b").stdout
