@@ -65,6 +65,8 @@ MIN_FREE_FILES = 16
 """Likewise, for systems that can hold a fixed number of files."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
+received_signals: list[int] = []
+"""Signals that have interrupted the run of this process."""
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
@@ -271,7 +273,6 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     from snakemake import cli
 
     unknown_targets: list[str] = []
-    signals: list[int] = []
 
     def is_shown(record: logging.LogRecord) -> bool:
         if getattr(record, "event", None) == "run_info":
@@ -282,12 +283,12 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         return not names
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        signals.append(number)
+        received_signals.append(number)
         # a closed terminal sends several
-        if len(signals) == 1:
+        if len(received_signals) == 1:
             # while Snakemake waits for its jobs
             threading.Timer(INTERRUPT_S, stop_jobs).start()
-        if len(signals) == 1 or number == signal.SIGINT:
+        if len(received_signals) == 1 or number == signal.SIGINT:
             raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -307,7 +308,7 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         logger.removeFilter(is_shown)
     if unknown_targets:
         raise unknown_target_error(unknown_targets[0])
-    return 128 + signals[0] if code and signals else code
+    return 128 + received_signals[0] if code and received_signals else code
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -17,11 +17,13 @@ from ..errors import StorageError
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
 from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
-from .launch import full_disk
+from .launch import full_disk, received_signals
 from .status import REPORT, STATE, format_duration, format_progress
 
 WEIGHTS = {"simulate": 40.0, "simulate_member": 20.0, "tetrahedralise": 15.0, "register": 7.0, "validation": 7.0}
 """Relative durations of the slow rules' jobs, for the bar and the remaining time; all others count 1."""
+SIGNAL_S = 0.2
+"""Time to notice a signal."""
 PERCENT_PER_LINE = 5
 """Without a terminal, a line is printed in place of the bar each time this much more is done."""
 SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL)
@@ -98,8 +100,10 @@ class RunDisplay:
                 self._show_warnings(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
             case "job_error":
+                # a signal to all processes may have ended a job before it is noticed here
+                time.sleep(SIGNAL_S)
                 # an interrupted job has not failed
-                if not self.interrupted:
+                if not (self.interrupted or received_signals):
                     self._show_failure(event)
             case "progress":
                 self.done, self.total = event["done"], event["total"]
