@@ -4,13 +4,19 @@ from pathlib import Path
 
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.27")
 # next to this file in a checkout; in an installed package this file is inside the package
 CHECKED_OUT = Path(workflow.basedir, "src").is_dir()
 SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir).parents[1])
 sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
-from gyriflow.running.reruns import complete_rules, remove_stale, rerun_on_changes
+from gyriflow.running.provenance import folders_in
+from gyriflow.running.snakemake_internals import (
+    complete_rules,
+    know_inputs_by_content,
+    remove_stale,
+    rerun_on_code_changes,
+)
 
 # a configuration from the command line replaces that of the demo; they are not merged
 if not workflow.overwrite_configfiles:
@@ -54,6 +60,8 @@ rule all:
 
 # every job runs in the environment and has a benchmark file beside its log
 complete_rules(workflow.rules, ENVIRONMENT)
-rerun_on_changes(workflow.rules, CONTENTS, Path(workflow.basedir, "workflow", "scripts"))
+rerun_on_code_changes(workflow.rules, Path(workflow.basedir, "workflow", "scripts"))
+if workflow.is_main_process:
+    know_inputs_by_content(CONTENTS, EARLIER_CONTENTS.values(), folders_in(CONFIG))
 if RUNS and (REFUSED or CONFIG.left_out):
     remove_stale(workflow.rules, STUDY, REPORT)

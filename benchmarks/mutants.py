@@ -89,13 +89,27 @@ BY_TESTS = {
     "io/test_exports.py": [
         ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),
         ("src/gyriflow/io/exports.py", "_hemi-{side[0].upper()}{desc}_{kind}", "_hemi-L{desc}_{kind}"),
+        ("src/gyriflow/io/made_files.py", " if path not in others}", "}"),
     ],
     # simulations, jobs and exit codes
     "folding/test_stress.py": [("src/gyriflow/folding/stress.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
     "cli/test_scan_ages.py": [
         ("src/gyriflow/study/participants.py", "is_only_scan &= len({*sessions, session} - {None}) < 2", "pass"),
     ],
-    "cli/test_checking.py": [("src/gyriflow/running/cost.py", '"tetgen": 2.2', '"tetgen": 22')],
+    "cli/test_checking.py": [
+        ("src/gyriflow/running/cost.py", '"tetgen": 2.2', '"tetgen": 22'),
+        ("src/gyriflow/cli/check.py", "max((folding_s + other_s) / cores, longest_s)", "(folding_s + other_s) / cores"),
+        ("src/gyriflow/cli/check.py", "needs.seconds / min(job.threads, cores)", "needs.seconds"),
+        ("src/gyriflow/cli/check.py", "for _, needs in foldings), reverse=True)", "for _, needs in foldings))"),
+    ],
+    "running/test_terminal.py": [
+        ("src/gyriflow/running/status.py", '"mesh": "mesh/brain.xdmf"', '"mesh": "surface/pial.surf.gii"'),
+        ("src/gyriflow/running/status.py", '"metrics/week-*/metrics.csv"', '"surfaces/week-*/pial.surf.gii"'),
+    ],
+    "running/test_snakemake_internals.py": [
+        ("src/gyriflow/running/snakemake_internals.py", "in REMOVED and made.has_its_date", "in REMOVED"),
+        ("src/gyriflow/running/snakemake_internals.py", "content not in earlier", "content in earlier"),
+    ],
     "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime < since_s", "st_mtime > since_s")],
     "io/test_files.py": [("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1")],
 }

@@ -11,14 +11,14 @@ IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+(\.*)([\w.]*)[ \t]+)?import[ \t]+(\([^
 
 
 def code_hash(program: Path, *modules: Path) -> str:
-    """Return a hash of all modules of this package that a Python program imports.
+    """Return "code" and a hash of all modules of this package that a Python program imports.
 
     Further `modules` are those that the program imports by a name that it is given. A parameter of a rule, it reruns
     what depends on a change of the code.
     """
     files = modules_behind(program).union(modules, *map(modules_behind, modules))
     named = sorted((path.relative_to(PACKAGE).as_posix(), _digest(path)) for path in files)
-    return hashlib.sha256(repr(named).encode()).hexdigest()[:12]
+    return f"code {hashlib.sha256(repr(named).encode()).hexdigest()[:12]}"
 
 
 def modules_behind(program: Path) -> set[Path]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import GyriflowError
+from .errors import GyriflowError, StorageError
 
 EXIT_FILE = "GYRIFLOW_EXIT_FILE"
 """Environment variable with the path of the file for the first failed step's exit code."""
@@ -46,7 +46,12 @@ def step(log: str, *inputs: str) -> Iterator[None]:
     error ends it with a traceback. The message begins with the step's `inputs` if the error names no file.
     """
     form = "%(asctime)s %(levelname)s %(name)s: %(message)s"
-    logging.basicConfig(level=logging.INFO, format=form, filename=log, filemode="w", force=True)
+    try:
+        logging.basicConfig(level=logging.INFO, format=form, filename=log, filemode="w", force=True)
+    except OSError as error:
+        print(f"gyriflow: {log}: cannot be written: {error.strerror}", file=sys.stderr)
+        record_exit_code(StorageError.exit_code)
+        sys.exit(StorageError.exit_code)
     logging.captureWarnings(True)
     try:
         yield

@@ -80,7 +80,7 @@ class Workflow:
 
     def command(self, *arguments: str) -> list[str]:
         """Return the command that `./run snakemake` runs."""
-        return [sys.executable, "-m", "gyriflow.running.launch", *arguments]
+        return [sys.executable, "-P", "-m", "gyriflow.running.launch", *arguments]
 
     @property
     def environment(self) -> dict[str, str]:

@@ -84,6 +84,24 @@ def test_a_killed_rank_is_memory_that_ran_out_and_an_interrupted_folding_goes_on
     assert summary["steps"] == 42
 
 
+FOREIGN = "import pathlib, sys; pathlib.Path('{0}.ran').touch(); sys.exit('{0}')"
+
+
+@pytest.mark.fault(78)
+def test_nothing_of_the_working_directory_is_run_by_a_study(workflow):
+    workflow.count_ellipsoid_as_meshed(STUDY | {"folding": STUDY["folding"] | {"end_week": 21.02}}, cells=10)
+    for name in ("random", "click", "numpy", "nibabel", "mpi4py"):
+        (workflow.directory / f"{name}.py").write_text(FOREIGN.format(name))
+    (workflow.directory / "Snakefile").write_text("rule all:\n    shell: 'touch snakefile.ran'\n")
+    for profile in ("default", "profiles/default"):
+        (workflow.directory / profile).mkdir(parents=True)
+        (workflow.directory / profile / "config.yaml").write_text("touch: true\n")
+    outcome = workflow.run("--cores", "1", SUMMARY, "--configfile", "study.yaml")
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    assert read_json(workflow.directory / SUMMARY)["weeks"][-1] == 21.02
+    assert not list(workflow.directory.glob("*.ran"))
+
+
 STUBBORN = """
 rule slow:
     output: "slow.txt"
@@ -94,8 +112,8 @@ rule slow:
 @pytest.mark.fault(78)
 @pytest.mark.parametrize(("name", "send"), [("SIGTERM", os.kill), ("SIGTERM", os.killpg), ("SIGHUP", os.kill)])
 def test_a_signal_to_the_launcher_stops_its_jobs(workflow, name, send):
-    (workflow.directory / "Snakefile").write_text(STUBBORN)
-    process, number = launched(workflow, "slow.txt"), signal.Signals[name]
+    (workflow.directory / "stubborn.smk").write_text(STUBBORN)
+    process, number = launched(workflow, "slow.txt", "--snakefile", "stubborn.smk"), signal.Signals[name]
     wait_until(lambda: (workflow.directory / "begun").exists() and len(below(process.pid)) >= 5, process)
     jobs, sent = below(process.pid), time.monotonic()
     send(process.pid, number)

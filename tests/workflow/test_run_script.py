@@ -136,6 +136,21 @@ def test_conda_environment_is_made_once_and_activated(outside, tmp_path, name, c
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
 
 
+def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(outside, tmp_path):
+    (tmp_path / "programs" / "getent").write_text(f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n")
+    (tmp_path / "programs" / "getent").chmod(0o755)
+    env = {name: value for name, value in outside.items() if name not in ("GYRIFLOW_CACHE", "XDG_CACHE_HOME")}
+    assert run("tool", "1", env=env | {"HOME": ""}).stdout == "from the environment: 1\n"
+    assert list((tmp_path / "home" / ".cache" / "gyriflow").glob("conda-*/ready"))
+
+
+def test_no_module_of_the_working_directory_is_imported(outside, tmp_path):
+    (tmp_path / "dolfinx.py").write_text("open('foreign.ran', 'w')")
+    command = ["bash", "-c", f"cd '{tmp_path}' && '{RUN}' true"]
+    assert ran(*command, env=outside | {"VIRTUAL_ENV": "x"}).returncode == 0
+    assert not (tmp_path / "foreign.ran").exists()
+
+
 def test_signals_reach_a_command_in_conda(outside):
     process = start("bash", "-c", "trap 'echo stopped; exit 9' TERM; echo up; while :; do sleep 0.1; done", env=outside)
     assert process.stdout.readline() == "up\n"

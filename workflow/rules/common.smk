@@ -10,14 +10,14 @@ from gyriflow.study.registry import target_files, by_rule, files_in, halves_of, 
 from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to
-from gyriflow.running.reruns import remove_stale
+from gyriflow.running.snakemake_internals import remove_stale
 from gyriflow.step import record_exit_code
 
-# scripts and programs find the package without an installation, also in conda environments of single rules
+# scripts and programs find the package without an installation, also in conda environments of single rules, and import
+# nothing from the working directory
 shell.prefix(
-    f'set -euo pipefail; export PYTHONPATH="{SOURCE}${{{{PYTHONPATH:+:$PYTHONPATH}}}}"; '
-    if CHECKED_OUT
-    else "set -euo pipefail; "
+    "set -euo pipefail; export PYTHONSAFEPATH=1; "
+    + (f'export PYTHONPATH="{SOURCE}${{{{PYTHONPATH:+:$PYTHONPATH}}}}"; ' if CHECKED_OUT else "")
 )
 
 
@@ -26,7 +26,7 @@ RUNS = workflow.is_main_process and DRY_RUN_VAR not in os.environ
 
 
 def validated_study():
-    """Return the study without refused brains, and the contents of the input files.
+    """Return the study without refused brains, and the contents of the input files, now and in the last run.
 
     Ends with a message and exit code 2 if the configuration is not valid.
     """
@@ -45,14 +45,14 @@ def validated_study():
         if workflow.is_main_process:
             files = [Path(workflow.workdir_init, path) for path in workflow.configfiles]
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)
-        return study, input_contents(Path.cwd(), found, study.checksums, record=RUNS)
+        return study, *input_contents(Path.cwd(), found, study.checksums, record=RUNS)
     except GyriflowError as error:
         print(f"gyriflow: {error}", file=sys.stderr)
         record_exit_code(error.exit_code)
         sys.exit(error.exit_code)
 
 
-study, CONTENTS = validated_study()
+study, CONTENTS, EARLIER_CONTENTS = validated_study()
 CONFIG = study.config
 # brains refused in an earlier pass of this call, with the cause; the study is finished without them
 KNOWN = {brain.id for brain in CONFIG.brains}

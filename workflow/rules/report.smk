@@ -2,7 +2,7 @@
 # and tables of the registry.
 from itertools import takewhile
 
-from gyriflow.running.reruns import benchmark_patterns
+from gyriflow.running.snakemake_internals import benchmark_patterns
 from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains

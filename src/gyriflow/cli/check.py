@@ -2,11 +2,12 @@
 
 import logging
 import math
+import re
 import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import chdir
+from contextlib import ExitStack, chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -22,6 +23,7 @@ from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
+from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
@@ -33,6 +35,7 @@ from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
 from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
+from ..version import version
 from .init import commented_scans
 from .recognition import scheme_fits
 from .scans import ScanRow, scan_lines
@@ -40,6 +43,8 @@ from .scans import ScanRow, scan_lines
 NAMED_RUNS = 6
 THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1): 0.67, ("tetgen", 2): 0.27}
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
+CODE_ONLY = re.compile(r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing exclusive>)* $")
+"""End of Snakemake's reason to run a job again whose code has changed and nothing else of its parameters."""
 FOLDINGS = ("simulate", "simulate_member")
 
 
@@ -99,7 +104,7 @@ def work_of(
     yield f"to run: {len(jobs)} step{'s' if len(jobs) > 1 else ''}", False
     rules_by_reason: dict[str, Counter[str]] = defaultdict(Counter)
     for job in jobs:
-        rules_by_reason[job.reason.partition(":")[0]][job.rule] += 1
+        rules_by_reason[_why(job.reason, directory)][job.rule] += 1
     for reason, rules in rules_by_reason.items():
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
@@ -108,6 +113,19 @@ def work_of(
         with _working_in(directory):
             study = resolve(load(read_keys(file), folder_of(file)))
     yield from _needs(jobs, study, directory, cores)
+
+
+def _why(reason: str, directory: Path) -> str:
+    """Return Snakemake's reason to run a job in words, the first of several."""
+    changed, _, files = reason.partition("Updated input files: ")
+    if not changed and files.startswith("/"):
+        return f"changed input {', '.join(Path(file).name for file in files.partition(';')[0].split(', '))}"
+    if reason.startswith("Params have changed"):
+        if not CODE_ONLY.search(reason):
+            return "changed settings"
+        made_by, this = recorded_version(directory), version()
+        return "changed code" if made_by in (None, this) else f"changed code (gyriflow {made_by}, now {this})"
+    return reason.partition(":")[0]
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
@@ -126,11 +144,11 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(take)
     # Snakemake makes the working directory, even in a dry run, and changes to it
-    with chdir(Path.cwd()), TemporaryDirectory() as empty:
+    with ExitStack() as end, chdir(Path.cwd()), TemporaryDirectory() as empty:
+        end.callback(logger.removeFilter, take)
         place = directory.resolve() if directory.is_dir() else empty
         options = ["--configfile", str(config.absolute()), "--directory", str(place)]
         code = launch([*options, "--dry-run", *further])
-    logger.removeFilter(take)
     if code:
         sys.exit(code)
     return jobs
@@ -155,8 +173,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
         thickness = simulation.settings.thickness_mm
-        # maps and measured thicknesses are unknown before the surface is made
-        if isinstance(thickness, str) or (isinstance(thickness, Varying) and thickness.map):
+        # a map's thickness is unknown before the surface is made
+        if isinstance(thickness, Varying) and thickness.map:
             continue
         through = THROUGH_CORTEX[mesh.mesher, mesh.order] * curve_at(thickness, simulation.start.week)
         elements = through / mesh.surface_edge_mm

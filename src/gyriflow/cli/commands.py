@@ -26,6 +26,15 @@ BIDS_LABEL_OPTIONS = ("--participant-label", "--participant_label", "--session-l
 REMOTE_OPTIONS = ("--profile", "--executor", "-e")
 """Options of Snakemake with which jobs run on other machines."""
 
+
+class Cores(click.IntRange):
+    """A number of cores, or `all` that may be used."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number."""
+        return available_cores() if value == "all" else super().convert(value, param, ctx)
+
+
 FOLDER = click.Path(file_okay=False, path_type=Path)
 EXISTING_DIR = click.Path(exists=True, file_okay=False, path_type=Path)
 EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -33,7 +42,7 @@ directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
 cores_option = click.option(
-    "-c", "--cores", type=click.IntRange(1), default=available_cores, show_default="all", help="Cores to use."
+    "-c", "--cores", type=Cores(1), default=available_cores, show_default="all", help="Cores to use, or all."
 )
 stages_option = click.option("-s", "--stage", "stages", multiple=True, help="Stop at this target. May be repeated.")
 scheme_option = click.option("--scheme", help="Label scheme. [default: found from the labels]")
@@ -143,7 +152,8 @@ def init(folder: Path, output: Path | None, force: bool, **selection: Any) -> No
 
     path = output or folder / CONFIG
     found = _recognise(folder, **selection)
-    write_configuration(found, folder, path, force=force)
+    if kept := write_configuration(found, folder, path, force=force):
+        click.echo(f"the earlier configuration is now {kept}")
     click.echo(f"wrote {path}; next: {command_name()} check {shlex.quote(str(path))}")
     sys.exit(_show_scans(found, may_fill_in=True))
 
@@ -207,7 +217,7 @@ def run(
 
     CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
-    named = bool(further) and further[0].endswith((".yaml", ".yml", ".json"))
+    named = bool(further) and _is_config(further[0])
     config = _find_config(Path(further[0]) if named else None, directory)
     # an option of one value stands before the targets
     options = ["--verbose"] if verbose else []
@@ -216,6 +226,12 @@ def run(
     if not (default and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)):
         options += ["--cores", str(cores)]
     sys.exit(_run(config, directory, cores, dry_run, options, *stages, *further[int(named) :]))
+
+
+def _is_config(argument: str) -> bool:
+    # other arguments are options and results
+    is_file = Path(argument).is_file() and not argument.startswith(("-", "results/"))
+    return is_file or argument.lower().endswith((".yaml", ".yml", ".json"))
 
 
 def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list[str], *targets: str) -> int:
@@ -326,12 +342,14 @@ def bids(data: Path, out: Path, level: str, work: Path | None, cores: int, dry_r
     options. Results that are up to date are kept. If a participant fails, the others are finished.
     """
     from ..io.exports import publish_derivatives
-    from .init import store_options, with_earlier_options, write_bids
+    from ..io.made_files import require_own_data_set
+    from .init import BIDS_OPTIONS, store_options, with_earlier_options, write_bids
     from .scans import measured_verdicts
 
+    require_own_data_set(out)
     work = work or out / "work"
     config, exported = work / CONFIG, work / "results" / "export"
-    options = work / "bids.json"
+    options = work / BIDS_OPTIONS
     if level == "group":
         selection = with_earlier_options(options, selection)
     folding = {key: selection[key] for key in ("settings", "fold")}

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..errors import InputError
-from ..io.files import read_json, write_json, write_text
+from ..io.files import read_json, read_text, write_json, write_text
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import own_name, validated
@@ -41,6 +42,8 @@ runs:
 """
 MEASURED_RUN = """
   measured: {preset: measured}"""
+BIDS_OPTIONS = "bids.json"
+BIDS_HEAD = "# Written by `gyriflow bids`, which replaces it.\n"
 SHIPPED_ATLAS = "spina-bifida"
 QUICK: dict[str, Any] = {
     "surface": {"edge_length_mm": 1.2},
@@ -52,11 +55,12 @@ QUICK: dict[str, Any] = {
 
 def write_configuration(
     found: FoundScans, folder: Path, path: Path, *, force: bool = False, only_measured: bool = False
-) -> None:
+) -> Path | None:
     """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
 
-    By default, one of them is folded, and values may be left to fill in. InputError if no scan can be used, or if the
-    configuration already exists and `force` is not set.
+    By default, one of them is folded, and values may be left to fill in. With `force`, an existing configuration is
+    kept under another name, which is returned. InputError if no scan can be used, or if the configuration already
+    exists and `force` is not set.
     """
     if path.exists() and not force:
         raise InputError("already exists", path=path, remedy="Choose another file with --output, or add --force.")
@@ -78,7 +82,18 @@ def write_configuration(
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
     measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
     rest = "" if only_measured else REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
-    write_text(path, HEAD + "".join(lines) + rest)
+    text = HEAD + "".join(lines) + rest
+    kept = _keep_other(path, text)
+    write_text(path, text)
+    return kept
+
+
+def _keep_other(path: Path, text: str) -> Path | None:
+    """Rename a configuration with another text, such as to gyriflow.yaml.1, and return its new path."""
+    if not path.exists() or read_text(path) == text:
+        return None
+    names = (path.with_name(f"{path.name}.{number}") for number in count(1))
+    return path.rename(next(name for name in names if not name.exists()))
 
 
 def commented_scans(path: Path) -> list[str]:
@@ -137,6 +152,8 @@ def write_prediction(
     if shown_path.exists() and shown_path.read_text() != text and not force:
         remedy = "Choose another --directory, or add --force."
         raise InputError("already exists with different content", path=shown_path, remedy=remedy)
+    if kept := _keep_other(path, text):
+        yield f"the earlier configuration is now {kept}"
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
@@ -199,7 +216,11 @@ def write_bids(
     else:
         text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
     text["metrics"] = {"white_surfaces": "all"} | (further.get("metrics") or {})
-    write_text(path, yaml.safe_dump(text, sort_keys=False))
+    is_own = path.with_name(BIDS_OPTIONS).exists() or (path.exists() and read_text(path).startswith(BIDS_HEAD))
+    if path.exists() and not is_own:
+        remedy = "Choose another folder with --work-dir."
+        raise InputError("was not written by gyriflow bids and is not replaced", path=path, remedy=remedy)
+    write_text(path, BIDS_HEAD + yaml.safe_dump(text, sort_keys=False))
     return [brain.entry["id"] for brain in brains]
 
 

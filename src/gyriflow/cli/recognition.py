@@ -14,7 +14,8 @@ from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
-from ..io.files import files_in, read_json, reading
+from ..io.files import files_in, reading
+from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
 from ..settings.base import did_you_mean, own_name
@@ -158,13 +159,19 @@ def recognise(
     if no scan is found, or none of a named participant or session.
     """
     paths = [path.relative_to(folder) for path in files_in(folder)]
-    own = [file.parent for file in paths if file.name == "dataset_description.json" and _is_own(folder / file)]
+    own = [file.parent for file in paths if file.name == "dataset_description.json" and is_own_data_set(folder / file)]
     own += [file.parents[1] for file in paths if file.parts[-2:] == ("study", "study.json")]
     own += [results.parent / "resources" for results in own]
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
     found: dict[str, list[_Candidate]] = defaultdict(list)
-    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files)):
+    unreadable = [file for file in files if (folder / file).is_dir()]
+    for candidate in (
+        *_hemispheres(files),
+        *_whole_surfaces(files),
+        *_volumes(files, unreadable),
+        *_folders(unreadable),
+    ):
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
     # sessions without labels or surfaces count
@@ -247,15 +254,6 @@ def _brains_of_scan(
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
     return brains
-
-
-def _is_own(description: Path) -> bool:
-    try:
-        content = read_json(description)
-    except InputError:
-        return False
-    tools = content.get("GeneratedBy") if isinstance(content, dict) else None
-    return any(isinstance(tool, dict) and tool.get("Name") == "gyriflow" for tool in tools or ())
 
 
 def _preferred_files(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:
@@ -350,19 +348,24 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
             yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
 
 
-def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
+def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[_Candidate]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:
             images[file.parent].append(str(file))
     for file in files:
-        if ENTITY.fullmatch(file.name):
+        if ENTITY.fullmatch(file.name) and file not in unreadable:
             yield _Candidate(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
             yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
+
+
+def _folders(unreadable: Sequence[Path]) -> Iterator[_Candidate]:
+    for folder in unreadable:
+        yield _Candidate(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
 
 
 def _found_brain(

@@ -16,7 +16,8 @@ from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
 from ..quantities import VERTEX_MAPS, VertexMap
 from ..settings.terms import MEASURED, STRUCTURES, Side
-from .files import AnyPath, atomic_write, read_json, write_json, write_text
+from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
+from .made_files import making_files, require_own_data_set
 from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, write_label_volume
 
@@ -223,28 +224,27 @@ def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
 def publish_derivatives(
     exported: AnyPath, folder: AnyPath, source: AnyPath, brains: Sequence[str], whole: bool
 ) -> None:
-    """Bring the BIDS derivative of a study to another folder, where what it has of other subjects stays.
+    """Bring the BIDS derivative of a study to another folder; files there that gyriflow has not made stay.
 
     Beside each subject's files come the quality pages of its `brains`, with the `whole` study its tables, report and
     methods. `source` is the data set that it was made of, which `SourceDatasets` then names by its DOI or its folder.
     """
     exported, folder, source = Path(exported), Path(folder), Path(source)
-    for path in sorted(exported.iterdir()):
-        if path.is_dir():
-            shutil.rmtree(folder / path.name, ignore_errors=True)
-            shutil.copytree(path, folder / path.name)
-        elif whole or path.stem not in OF_STUDY:
-            _copy(path, folder / path.name)
+    require_own_data_set(folder)
+    files = {str(path.relative_to(exported)): path for path in files_below(exported)}
+    subjects = {name.partition("/")[0] for name in files if "/" in name}
+    study_tables = [name for name in files if "/" not in name and Path(name).stem in OF_STUDY and not whole]
     pages = {
         f"{brain.split('_')[0]}/figures/{brain}_quality.png": f"brains/{brain}/figures/quality.png" for brain in brains
     }
     # brains of an atlas have pages, too, to which the report leads
     report = exported.parent / "report"
     names = [*(str(path.relative_to(report)) for path in report.glob("**/*.html")), "methods.rst"]
-    study_pages = {name: f"report/{name}" for name in names if whole}
-    for target, page in (pages | study_pages).items():
-        if (exported.parent / page).is_file():
-            _copy(exported.parent / page, folder / target)
+    pages |= {name: f"report/{name}" for name in names if whole}
+    files |= {target: path for target, page in pages.items() if (path := exported.parent / page).is_file()}
+    with making_files(folder, exported.with_name(".published-files.json"), *subjects):
+        for name in files.keys() - study_tables:
+            _copy(files[name], folder / name)
     description = source / "dataset_description.json"
     source_description = read_json(description) if description.is_file() else {}
     doi = str(source_description.get("DatasetDOI", ""))

@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import shutil
 import uuid
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -98,12 +97,6 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-
-
-def remove_tree(folder: AnyPath) -> Path:
-    """Remove a folder with its contents; return its path."""
-    shutil.rmtree(folder, ignore_errors=True)
-    return Path(folder)
 
 
 def _plain(value: Any) -> Any:
@@ -270,10 +263,17 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice."""
+    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice.
+
+    A folder that cannot be read is returned in place of its files.
+    """
     entered: set[str] = set()
-    found = []
-    for place, folders, names in os.walk(folder, followlinks=True):
+    found: list[Path] = []
+
+    def add_unreadable(error: OSError) -> None:
+        found.extend([Path(error.filename)] * isinstance(error, PermissionError))
+
+    for place, folders, names in os.walk(folder, onerror=add_unreadable, followlinks=True):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []

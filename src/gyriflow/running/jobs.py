@@ -5,7 +5,6 @@ import logging
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,28 +83,6 @@ def events_in(text: str) -> list[dict[str, Any]]:
         with suppress(ValueError):
             events.append(json.loads(line))
     return events
-
-
-@dataclass
-class GrowingFile:
-    """A file that a job is writing, read piece by piece. It may not exist yet."""
-
-    path: Path
-    read: int = 0
-
-    def new_text(self) -> str:
-        """Return the whole lines written since the last call."""
-        try:
-            with self.path.open("rb") as file:
-                # a retried job begins its file anew
-                size = file.seek(0, 2)
-                self.read = file.seek(self.read if self.read <= size else 0)
-                piece = file.read()
-        except OSError:
-            return ""
-        whole = piece[: piece.rfind(b"\n") + 1]
-        self.read += len(whole)
-        return whole.decode("utf-8", errors="replace")
 
 
 def read_log(path: AnyPath) -> str:

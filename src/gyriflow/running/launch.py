@@ -12,15 +12,15 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Sequence
+from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import gettempdir
 from types import FrameType
-from typing import IO, Any
-from unittest.mock import patch
+from typing import IO
 
 import psutil
 
@@ -31,22 +31,16 @@ from ..io.yaml_files import read_keys
 from ..settings.base import did_you_mean
 from ..shipped import SHIPPED
 from ..step import EXIT_FILE, recorded_exit_code
+from .snakemake_internals import dates_before_copy, temporary_records
 
-ENVIRONMENT_VARIABLES = {
-    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
-    "OMPI_MCA_mpi_yield_when_idle": "1",
-    "OMPI_MCA_btl": "self,sm",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "PRTE_MCA_hwloc_default_binding_policy": "none",
-}
-"""Defaults for variables of MPI and BLAS, the same as in `./run` and in the conda environment."""
+ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
+"""The conda environment, whose variables of MPI and BLAS are defaults in any other one, too, as in `./run`."""
+INTERRUPT_S = 0.5
+"""Time for Snakemake to notice an interruption before its jobs are stopped, so that they do not count as failed."""
 MAX_WAIT_S = 3.0
 """Time to wait for a run that is about to end."""
 GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
-SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
 READ_ONLY_OPTIONS = (
     *("dryrun", "nolock", "summary", "detailed_summary", "rulegraph", "dag", "filegraph", "list_rules", "lint"),
 )
@@ -67,8 +61,12 @@ REFUSED_FILE_VAR = "GYRIFLOW_REFUSED_FILE"
 """Environment variable with the path of a JSON file: refused brains and causes. The study is finished without them."""
 MIN_FREE_BYTES = 4 * 2**20
 """If less disk space is left, a run that failed without an exit code of its own has filled the disk."""
+MIN_FREE_FILES = 16
+"""Likewise, for systems that can hold a fixed number of files."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
+received_signals: list[int] = []
+"""Signals that have interrupted the run of this process."""
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
@@ -217,33 +215,54 @@ def exit_code(code: int, recorded: int | None, directory: Path) -> int:
 
     A full disk is reported and gives the code of a StorageError.
     """
-    if code and recorded in (None, 1) and shutil.disk_usage(directory).free < MIN_FREE_BYTES:
-        message = f"{directory.resolve()}: the disk is full. Free some space, then run the same command again"
-        print(f"gyriflow: {message}", file=sys.stderr)
+    if code and recorded in (None, 1) and (full := full_disk(directory)):
+        print(f"gyriflow: {directory.resolve()}: {full}, then run the same command again", file=sys.stderr)
         return StorageError.exit_code
     return (recorded or code) if code else 0
 
 
+def full_disk(directory: Path) -> str:
+    """Return that the disk of a directory is full and what to do, or "" if it is not."""
+    if shutil.disk_usage(directory).free < MIN_FREE_BYTES:
+        return "the disk is full. Free some space"
+    system = os.statvfs(directory)
+    # systems without a fixed number of files have 0 of 0
+    if system.f_files and system.f_favail < MIN_FREE_FILES:
+        return "the disk can hold no more files (inodes). Delete some files"
+    return ""
+
+
+def set_cache(directory: Path) -> None:
+    """Let libraries keep their caches with a study if the home folder cannot be written or is unknown."""
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "snakemake")
+        cache.mkdir(parents=True, exist_ok=True)
+        usable = os.access(cache, os.W_OK)
+    except (OSError, RuntimeError):
+        usable = False
+    if not usable:
+        os.environ["XDG_CACHE_HOME"] = str(directory.absolute() / ".snakemake" / "cache")
+
+
 def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None:
     """Set the environment variables that the Snakefile and the steps of the workflow read."""
-    os.environ |= ENVIRONMENT_VARIABLES | os.environ
+    os.environ |= read_keys(ENVIRONMENT)["variables"] | os.environ
+    # no module in a working directory is imported in place of another one
+    os.environ["PYTHONSAFEPATH"] = "1"
     # steps call `python`; let it be this one
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ |= {name: "1" for name, is_set in ((KEEP_GOING_VAR, keep_going), (DRY_RUN_VAR, dry_run)) if is_set}
     os.environ[EXIT_FILE] = str(exit_file)
 
 
-@contextmanager
-def temporary_records(directory: Path) -> Iterator[None]:
-    """Let Snakemake read the records of a directory, which may be read-only, and write them to a temporary folder."""
-    from snakemake import workflow
-    from snakemake.persistence.file import FilePersistence
-
-    with TemporaryDirectory() as scratch:
-        for record in (directory / ".snakemake").glob("*"):
-            Path(scratch, record.name).symlink_to(record.resolve())
-        with patch.object(workflow, "FilePersistence", lambda **kw: FilePersistence(**kw | {"path": Path(scratch)})):
-            yield
+def restore_dates(directory: Path) -> None:
+    """Give the results of a copied study the dates at which they were made."""
+    if dates := dates_before_copy(directory):
+        print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
+    # files of another user cannot be dated
+    with suppress(OSError):
+        for path, date in dates.items():
+            os.utime(path, (date, date))
 
 
 def call_snakemake(arguments: Sequence[str]) -> int:
@@ -252,35 +271,32 @@ def call_snakemake(arguments: Sequence[str]) -> int:
     InputError if a target does not exist.
     """
     from snakemake import cli
-    from snakemake.executors.local import Executor
-    from snakemake.scheduling.job_scheduler import JobScheduler
 
     unknown_targets: list[str] = []
-    signals: list[int] = []
 
     def is_shown(record: logging.LogRecord) -> bool:
+        if getattr(record, "event", None) == "run_info":
+            # Snakemake's own handler, set by now, waits for running jobs to end
+            signal.signal(signal.SIGTERM, interrupt)
         names = NO_RULE.findall(record.getMessage())
         unknown_targets.extend(names)
         return not names
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        signals.append(number)
+        received_signals.append(number)
         # a closed terminal sends several
-        if len(signals) == 1 or number == signal.SIGINT:
+        if len(received_signals) == 1:
+            # while Snakemake waits for its jobs
+            threading.Timer(INTERRUPT_S, stop_jobs).start()
+        if len(received_signals) == 1 or number == signal.SIGINT:
             raise KeyboardInterrupt
-
-    def cancel(executor: Any) -> None:
-        stop_jobs()
-        executor.shutdown()
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         # `nohup` has SIGHUP ignored
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
-    # Snakemake's own handlers wait for running jobs to end
-    JobScheduler.exit_gracefully = lambda _, number, frame: interrupt(number, frame)
-    Executor.cancel = cancel
-    logging.getLogger("snakemake.logging").addFilter(is_shown)
+    logger = logging.getLogger("snakemake.logging")
+    logger.addFilter(is_shown)
     try:
         cli.main(arguments)
         code = 0
@@ -288,9 +304,11 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         code = 1
+    finally:
+        logger.removeFilter(is_shown)
     if unknown_targets:
         raise unknown_target_error(unknown_targets[0])
-    return 128 + signals[0] if code and signals else code
+    return 128 + received_signals[0] if code and received_signals else code
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -307,6 +325,7 @@ def main(arguments: Sequence[str]) -> int:
     dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
     if not dry_run:
         clear_stale_lock(directory)
+        restore_dates(directory)
     runs_nothing = dry_run and not options.nolock
     # in the working directory, where jobs on other machines of a cluster find it too
     folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
@@ -314,9 +333,13 @@ def main(arguments: Sequence[str]) -> int:
     # a killed run may have had the same process number, as in containers
     with suppress(OSError):
         exit_file.unlink()
+    if not runs_nothing:
+        set_cache(directory)
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
-    has_snakefile = options.snakefile or any(Path(name).is_file() for name in SNAKEFILES)
-    complete = [*([] if has_snakefile else ["--snakefile", str(SHIPPED / "Snakefile")]), *arguments]
+    complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
+    # a folder of that name may be in the working directory
+    complete += [] if options.workflow_profile else ["--workflow-profile", str(SHIPPED / "profiles" / "default")]
+    complete += arguments
     if not dry_run and not any(getattr(options, name, None) for name in VERBOSE_OPTIONS):
         details = directory.resolve() / ".snakemake" / "log" / f"{datetime.now():%Y-%m-%dT%H%M%S.%f}.gyriflow.log"
         complete = ["--logger", "gyriflow", "--logger-gyriflow-details", str(details), *complete]

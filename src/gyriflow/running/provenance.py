@@ -40,6 +40,13 @@ def software() -> dict[str, Any]:
     }
 
 
+def recorded_version(directory: Path) -> str | None:
+    """Return the version of gyriflow that made the report in a working directory, or None if there is none."""
+    with suppress(InputError, KeyError):
+        return str(read_json(directory / "results" / "report" / "provenance.json")["gyriflow"])
+    return None
+
+
 def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 
@@ -72,8 +79,8 @@ def texts_in(value: Any) -> list[str]:
 
 def input_contents(
     directory: Path, config: Config, checksums: Mapping[str, tuple[str, str]], record: bool
-) -> dict[str, str]:
-    """Return the SHA-256 of each input file of a study and of its companions, by path.
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the SHA-256 of each input file of a study and of its companions, by path; and those of the last run.
 
     For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
     the results with sizes and times, so that unchanged files are not read again.
@@ -82,9 +89,20 @@ def input_contents(
     recorded: dict[str, Any] = {}
     with suppress(InputError):
         recorded = read_json(path)
-    files = contents(dict.fromkeys(texts_in(config.model_dump())), recorded)
+    # a word of the configuration may be the name of a file, too
+    named = [text for text in texts_in(config.model_dump()) if "/" in text or "." in text]
+    files = contents(dict.fromkeys(named), recorded)
     if record and files != recorded:
         write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
+    return expected | _with_companions(files), _with_companions(recorded)
+
+
+def folders_in(config: Config) -> list[str]:
+    """Return the absolute paths of the folders that a configuration names."""
+    return [text for text in texts_in(config.model_dump()) if len(text) > 1 and text[0] == "/" and Path(text).is_dir()]
+
+
+def _with_companions(files: Mapping[str, Any]) -> dict[str, str]:
     groups = {name: [path for path in dict.fromkeys([name, *files[name][-1]]) if path in files] for name in files}
-    return expected | {name: " ".join(files[path][0] for path in group) for name, group in groups.items()}
+    return {name: " ".join(files[path][0] for path in group) for name, group in groups.items()}

@@ -1,7 +1,7 @@
 """Progress of a study, read from its working directory: the live or last run, and the results so far."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import chdir, suppress
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from tabulate import tabulate
 
 from ..errors import InputError, StorageError
 from ..io.files import read_json
-from ..io.yaml_files import read_yaml
+from ..io.yaml_files import read_keys
 from ..settings.base import folder_of
 from ..shipped import CONFIG
 from ..study import resolve
@@ -37,7 +37,7 @@ def status(directory: Path) -> Iterator[str]:
     with suppress(InputError):
         state = read_json(directory / STATE)
     configured = _configured(directory)
-    if not results.is_dir() and state is None and not configured:
+    if not results.is_dir() and state is None and not (directory / CONFIG).is_file():
         raise InputError("contains no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
     yield from _lines(state, is_live(directory))
     brains = [
@@ -91,13 +91,13 @@ def find_report(directory: Path) -> Path:
 
 
 def _configured(directory: Path) -> list[tuple[str, str]]:
-    path = directory / CONFIG
-    # problems of the configuration are reported when it is run
-    with suppress(InputError):
-        if (record := directory / STUDY_RECORD).is_file():
-            path = Path(read_json(record)["configuration"][-1])
+    # problems of the configuration are reported when it is run; its paths may be relative to the working directory
+    with suppress(InputError), chdir(directory if directory.is_dir() else Path()):
+        path = Path(CONFIG).absolute()
+        if STUDY_RECORD.is_file():
+            path = Path(read_json(STUDY_RECORD)["configuration"][-1])
         if path.is_file():
-            return resolve(load(read_yaml(path), folder_of(path))).pairs
+            return resolve(load(read_keys(path), folder_of(path))).pairs
     return []
 
 

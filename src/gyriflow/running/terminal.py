@@ -16,11 +16,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from ..errors import StorageError
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
-from .jobs import OUT_OF_MEMORY, GrowingFile, cause, events_in, messages_in, read_log
+from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
+from .launch import full_disk, received_signals
 from .status import REPORT, STATE, format_duration, format_progress
 
 WEIGHTS = {"simulate": 40.0, "simulate_member": 20.0, "tetrahedralise": 15.0, "register": 7.0, "validation": 7.0}
 """Relative durations of the slow rules' jobs, for the bar and the remaining time; all others count 1."""
+SIGNAL_S = 0.2
+"""Time to notice a signal."""
 PERCENT_PER_LINE = 5
 """Without a terminal, a line is printed in place of the bar each time this much more is done."""
 SLURM = re.compile(r"SLURM-job '(\d+)' failed.*SLURM status is: '(?!FAILED)(\w+)'", re.DOTALL)
@@ -36,13 +39,12 @@ FAILED_JOB_PREFIXES = (
 
 @dataclass
 class Job:
-    """A running job, its log and its progress file."""
+    """A running job and its log, beside which a simulation writes its progress."""
 
     rule: str
     name: str
     began: float
     log: Path | None
-    events: GrowingFile | None
     step: dict[str, Any] | None = None
 
 
@@ -67,9 +69,9 @@ class RunDisplay:
         self.work_done = 0.0
         self.done = self.total = self.next_percent = 0
         self.failed: list[dict[str, Any]] = []
-        self.shown_warnings: set[tuple[str, str]] = set()
+        self.shown: set[str] = set()
         self.failure_messages: list[str] = []
-        self.interrupted = False
+        self.interrupted = self.has_errors = False
 
     def watch(self, lock: AbstractContextManager) -> None:
         """Follow the jobs and record the state of the run for `gyriflow status`, until it ends."""
@@ -81,6 +83,7 @@ class RunDisplay:
     def show(self, record: logging.LogRecord) -> None:
         """Display a log record of Snakemake's."""
         event = vars(record)
+        self.has_errors |= record.levelno >= logging.ERROR
         match event.get("event"):
             case "run_info":
                 jobs = {rule: count for rule, count in (event["stats"] or {}).items() if rule != "total"}
@@ -91,15 +94,16 @@ class RunDisplay:
             case "job_info":
                 wildcards = " ".join((event["wildcards"] or {}).values())
                 log = Path(event["log"][0]).absolute() if event["log"] else None
-                events = GrowingFile(log.with_suffix(".jsonl")) if log else None
                 name = f"{event['rule_name']} {wildcards}".strip()
-                self.running[event["jobid"]] = Job(event["rule_name"], name, self.clock(), log, events)
+                self.running[event["jobid"]] = Job(event["rule_name"], name, self.clock(), log)
             case "job_finished" if job := self.running.pop(event["job_id"], None):
                 self._show_warnings(job)
                 self.work_done += WEIGHTS.get(job.rule, 1.0)
             case "job_error":
+                # a signal to all processes may have ended a job before it is noticed here
+                time.sleep(SIGNAL_S)
                 # an interrupted job has not failed
-                if not self.interrupted:
+                if not (self.interrupted or received_signals):
                     self._show_failure(event)
             case "progress":
                 self.done, self.total = event["done"], event["total"]
@@ -120,12 +124,15 @@ class RunDisplay:
         message = str(event["rule_msg"] or "\n".join(self.failure_messages))
         self.failure_messages.clear()
         slurm, signal = SLURM.search(message), SIGNAL.search(message)
+        # Snakemake's text shows the shell command
+        message = "" if "CalledProcessError" in message else message
         if slurm:
             reason = f"Slurm ended job {slurm[1]}: {slurm[2]}"
         elif signal:
             reason = SIGNAL_CAUSES.get(signal[1], f"it crashed ({signal[1]}): please report this with its log")
         else:
-            reason = cause("".join(map(read_log, event["log"]))) or message or "it left no message"
+            reason = cause("".join(map(read_log, event["log"]))) or message or full_disk(Path())
+            reason = reason or f"it left no message in its log; see the end of {self.details}"
         if reason == OUT_OF_MEMORY:
             record_exit_code(KILLED)
         name = job.name if job else event["rule_name"]
@@ -170,18 +177,20 @@ class RunDisplay:
             self.console.print(f"gyriflow: {failed}, {done}; run the same command again to resume")
         elif self.failure_messages:
             self.console.print("\n".join(self.failure_messages))
-        elif self.total and self.done == self.total:
+        elif self.total and not self.has_errors:
             report = f"; report: {REPORT.absolute()}" if REPORT.is_file() else ""
-            self.console.print(f"gyriflow: done in {took}{report}")
+            # with `--until`, some steps are left
+            steps = "" if self.done == self.total else f", {done}"
+            self.console.print(f"gyriflow: done in {took}{steps}{report}")
 
     def _follow(self, job: Job) -> None:
-        for event in events_in(job.events.new_text()) if job.events else ():
+        for event in events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ():
             match event:
                 case {"event": "warning", "message": str(text)}:
-                    self._show_warning(job, text)
+                    self._show_once(f"warning {job.name}: {text}")
                 case {"event": "size", "elements": elements, "ranks": ranks, "memory_mib": mib}:
                     on = f"{ranks} rank{'s' if ranks > 1 else ''}"
-                    self.console.print(f"       {job.name}: {elements} elements, {on}, about {mib} MiB")
+                    self._show_once(f"       {job.name}: {elements} elements, {on}, about {mib} MiB")
                 case {"event": "step"}:
                     job.step = event
 
@@ -189,9 +198,10 @@ class RunDisplay:
         self._follow(job)
         for message in messages_in(read_log(job.log)) if job.log else ():
             if message.by_gyriflow and message.level == "warning":
-                self._show_warning(job, message.text.partition("\n")[0])
+                first_line, _, _ = message.text.partition("\n")
+                self._show_once(f"warning {job.name}: {first_line}")
 
-    def _show_warning(self, job: Job, text: str) -> None:
-        if (job.name, text) not in self.shown_warnings:
-            self.shown_warnings.add((job.name, text))
-            self.console.print(f"warning {job.name}: {text}")
+    def _show_once(self, line: str) -> None:
+        if line not in self.shown:
+            self.shown.add(line)
+            self.console.print(line)

@@ -236,7 +236,12 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     """
     if not info.context:
         return path
-    folder, place = Path(info.context["folder"]), located(info.context["folder"], path)
+    folder = Path(info.context["folder"])
+    try:
+        place = located(folder, path)
+        place.is_file()
+    except PermissionError as error:
+        raise refused(f"cannot be read: {error.filename}: permission denied") from error
     if absent := absent_content(place):
         raise refused(absent)
     if not place.is_file() and path not in info.context.get("awaited", ()):

@@ -15,6 +15,7 @@ from shapes import hemisphere
 from gyriflow.cli import check as checking
 from gyriflow.cli.check import check_study, coarse_cortices, input_problems, plan, work_of
 from gyriflow.errors import InputError
+from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.running.cost import (
@@ -26,6 +27,7 @@ from gyriflow.running.cost import (
     simulation_needs,
     surface_memory_mib,
 )
+from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
@@ -157,6 +159,7 @@ def test_a_study_is_checked_from_its_working_directory(tmp_path):
         list(check_study(folder / "gyriflow.yaml", tmp_path, 1, ["surface"]))
 
 
+PARAMS = "Params have changed since last execution: Union of exclusive params before and now across all output:"
 STUDY = {
     "brains": [{"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}],
     "start": "a",
@@ -198,6 +201,43 @@ def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
     asked = reference(STUDY | {"folding": {"end_week": 40, "step_s": 600, "ranks": 4}})
     needs = simulation_needs(*asked)
     assert job_limits(*asked) == pytest.approx((2 * needs.memory_mib, 2 * needs.seconds / 4 / 60), abs=1)
+
+
+def test_the_time_and_work_of_a_study_are_those_of_its_foldings_and_other_steps(tmp_path, monkeypatch):
+    study = resolve(load(STUDY | {"runs": {"reference": {}, "long": {"end_week": 33, "step_s": 3600, "ranks": 2}}}))
+    long, short = (simulation_needs(study.simulations[run, "a"], study.config.mesh) for run in ("long", "reference"))
+    planned = [("simulate", {"run": "long", "brain": "a"}, 2), ("simulate", {"run": "reference", "brain": "a"}, 1)]
+    planned += [("measure", {}, 1)] * 7
+    jobs = [checking.PlannedJob(*job, "Missing output files: x") for job in planned]
+    monkeypatch.setattr(checking, "plan", lambda *_, **__: jobs)
+    work_s = long.seconds + short.seconds + 7 * 5
+    for cores, seconds in ((1, work_s), (3, max(work_s / 3, long.seconds / 2))):
+        lines = [line for line, _ in work_of(tmp_path / "x.yaml", tmp_path, cores, [], study)]
+        assert lines[:2] == ["to run: 9 steps", "  Missing output files: simulate×2, measure×7"]
+        assert f"time    about {format_duration(seconds)} on {cores} core" in lines[2]
+        assert lines[3] == Facts(f"{work_s / 3600:.2g} core hours", f"{(long.seconds + short.seconds) / work_s:.0%}")
+        # the two largest of the foldings that run at the same time
+        memory = long.memory_mib if cores == 1 else max(long.memory_mib, short.memory_mib)
+        assert lines[4] == Facts("memory", f"{memory / 1024:.1f} GB")
+
+
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        ("Missing output files: a.csv, b.csv", "Missing output files"),
+        ("Updated input files: /data/a b.nii.gz, /data/c.nii", "changed input a b.nii.gz, c.nii"),
+        ("Updated input files: results/a.csv", "Updated input files"),
+        (f"{PARAMS} before: 'code 0123456789ab' now: 'code 0123456789ac' ", "changed code (gyriflow 0.1, now 0.2)"),
+        (f"{PARAMS} before: 'code 01','code 02' now: 'code 03','code 02' ", "changed code (gyriflow 0.1, now 0.2)"),
+        (f"{PARAMS} before: 'code 01',21.0 now: 'code 02',22.0 ", "changed settings"),
+        (f"{PARAMS} before: <nothing exclusive> now: 3 ", "changed settings"),
+    ],
+)
+def test_why_a_step_runs_is_said_in_words(tmp_path, monkeypatch, reason, words):
+    monkeypatch.setattr(checking, "version", lambda: "0.2")
+    write_json(tmp_path / "results" / "report" / "provenance.json", {"gyriflow": "0.1"})
+    monkeypatch.setattr(checking, "plan", lambda *_, **__: [checking.PlannedJob("rule", {}, 1, reason)])
+    assert [line for line, _ in work_of(tmp_path, tmp_path, 1, [], resolve(load(STUDY)))][1] == f"  {words}: rule"
 
 
 def test_the_memory_of_a_surface_follows_the_header(tmp_path):

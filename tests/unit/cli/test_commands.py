@@ -1,5 +1,6 @@
 """What the commands hand on to Snakemake, what they tell to type next, and in which code they end."""
 
+import os
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from gyriflow.cli.commands import main
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.running import launch
+from gyriflow.running.machine import available_cores
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
@@ -41,6 +43,22 @@ def handed_on(monkeypatch, tmp_path):
 def test_a_run_on_this_machine_gets_its_cores(handed_on):
     assert "--cores" in handed_on()
     assert handed_on("--cores", "3")[:2] == ["--cores", "3"]
+    assert handed_on("--cores", "all")[:2] == ["--cores", str(available_cores())]
+
+
+@pytest.mark.parametrize("name", ["my.conf", "C.YAML", "study"])
+def test_any_file_may_be_the_configuration_but_results_are_targets(handed_on, tmp_path, name):
+    result = tmp_path / "results" / "study" / "metrics.csv"
+    result.parent.mkdir(parents=True)
+    for path in (result, tmp_path / name):
+        path.touch()
+    assert handed_on("results/study/metrics.csv")[-1] == "results/study/metrics.csv"
+    got = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
+        assert CliRunner().invoke(main, ["run", name, "--until", "mesh"]).exit_code == 0
+    assert got[:2] == ["--configfile", str(tmp_path / name)]
+    assert got[-2:] == ["--until", "mesh"]
 
 
 def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
@@ -257,6 +275,16 @@ def test_labels_are_predicted_alone(predicted_from):
     for more in (["brain.stl"], ["--white", "brain.stl"]):
         done = predicted_from(labels, *more, "--week", "23")
         assert (done.exit_code, done.output) == (2, Facts("parcellation.nii.gz", "brain.stl"))
+
+
+@pytest.mark.parametrize("home", ["", "/proc/nobody", "file"])
+def test_caches_are_with_the_study_where_the_home_folder_cannot_be_written(monkeypatch, tmp_path, home):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("HOME", str(tmp_path / home) if home == "file" else home or str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", "")
+    launch.set_cache(tmp_path)
+    expected = str(tmp_path / ".snakemake" / "cache") if home else ""
+    assert os.environ["XDG_CACHE_HOME"] == expected
 
 
 @pytest.mark.fault(36)

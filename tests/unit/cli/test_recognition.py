@@ -1,5 +1,6 @@
 """Which files are recognised as brains: names of atlases, sides, ages, label schemes, participants."""
 
+import errno
 import os
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from gyriflow.cli.commands import main
 from gyriflow.cli.init import write_configuration
 from gyriflow.cli.recognition import UNSET, recognise, scheme_fits
 from gyriflow.errors import InputError
+from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.running import launch
@@ -287,6 +289,61 @@ def test_scans_that_cannot_be_used_are_counted_and_the_others_go_on(app, tmp_pat
     assert (done.exit_code, done.output) == (2, Facts("2 of 5 scans"))
     written = yaml.safe_load((tmp_path / "data" / "gyriflow.yaml").read_text())
     assert [brain["id"] for brain in written["brains"]] == ["sub-01_ses-1", "sub-01_ses-2"]
+
+
+@pytest.mark.fault(82)
+def test_folders_that_cannot_be_read_are_named(app, tmp_path, monkeypatch):
+    make_tree(tmp_path / "data", labels=["sub-02/anat/sub-02_dseg.nii.gz", "case-7/week23_dseg.nii.gz"])
+    scandir = os.scandir
+
+    def refuse(path="."):
+        if str(path).endswith(("sub-02/anat", "case-7")):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", refuse)
+    assert app("participant", code=2) == Facts("sub-02", "cannot be read", "not used: case-7", "2 of 3 scans")
+    done = CliRunner().invoke(main, ["init", str(tmp_path / "data")])
+    assert (done.exit_code, done.output) == (2, Facts("case-7", "sub-02", "2 of 4 scans", "cannot be read"))
+
+
+def test_a_file_in_a_folder_that_cannot_be_read_is_a_mistake_of_its_key(tmp_path, monkeypatch):
+    is_file = Path.is_file
+
+    def refuse(path):
+        if path.parent.name == "closed":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return is_file(path)
+
+    monkeypatch.setattr(Path, "is_file", refuse)
+    with pytest.raises(InputError, check=Facts("brains[0].pial", tmp_path / "closed" / "a.stl", "cannot be read")):
+        load({"brains": [{"id": "a", "week": 23, "pial": "closed/a.stl"}]}, tmp_path)
+
+
+def test_what_others_keep_is_not_replaced_by_a_bids_app(app, tmp_path):
+    out = tmp_path / "out"
+    write_json(out / "dataset_description.json", {"GeneratedBy": [{"Name": "dHCP"}]})
+    assert app("participant", code=2) == Facts(out / "dataset_description.json", "OUT")
+    assert [path.name for path in out.iterdir()] == ["dataset_description.json"]
+    (out / "dataset_description.json").unlink()
+    (out / "work").mkdir()
+    (out / "work" / "gyriflow.yaml").write_text("brains: [mine]\n")
+    assert app("participant", code=2) == Facts(out / "work" / "gyriflow.yaml", "--work-dir")
+    assert (out / "work" / "gyriflow.yaml").read_text() == "brains: [mine]\n"
+
+
+def test_a_configuration_that_is_replaced_is_kept(tmp_path):
+    bids_folder(tmp_path)
+    assert CliRunner().invoke(main, ["init", str(tmp_path)]).exit_code == 0
+    path = tmp_path / "gyriflow.yaml"
+    for number in (1, 2):
+        path.write_text(f"mine: {number}")
+        done = CliRunner().invoke(main, ["init", str(tmp_path), "--force"])
+        assert (done.exit_code, done.output) == (0, Facts(f"{path}.{number}"))
+        assert Path(f"{path}.{number}").read_text() == f"mine: {number}"
+    # an equal one is not another one
+    CliRunner().invoke(main, ["init", str(tmp_path), "--force"])
+    assert len(list(tmp_path.glob("gyriflow.yaml*"))) == 3
 
 
 def test_a_folder_is_measured_without_a_start(monkeypatch, tmp_path):

@@ -120,22 +120,38 @@ def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     page.parent.mkdir(parents=True)
     page.touch()
     (folder / "sub-07").mkdir(parents=True)
-    (folder / "sub-01" / "ses-9").mkdir(parents=True)
+    (folder / "sub-01" / "anat").mkdir(parents=True)
+    (folder / "sub-01" / "anat" / "of_another_program.nii").touch()
     source.mkdir()
     publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=False)
     assert {path.name for path in folder.iterdir()} >= {"sub-07", "sub-01", "sub-02", ".bidsignore"}
-    assert not (folder / "sub-01" / "ses-9").exists()
+    assert (folder / "sub-01" / "anat" / "of_another_program.nii").exists()
     assert (folder / "sub-01" / "figures" / "sub-01_ses-1_quality.png").exists()
     assert not (folder / "participants.tsv").exists()
     write_json(source / "dataset_description.json", {"DatasetDOI": "10.1/x"})
     (exported.parent / "report" / "brains").mkdir(parents=True)
     for name in ("sub-01_ses-1", "crl-22"):
         (exported.parent / "report" / "brains" / f"{name}.html").touch()
+    # a session that is no more, of which a user has kept a note
+    for path in (exported / "sub-01" / "ses-2").rglob("*.gii"):
+        path.unlink()
+    (folder / "sub-01" / "ses-2" / "note.txt").touch()
     publish_derivatives(exported, folder, source, ["sub-01_ses-1"], whole=True)
+    left = [path.name for path in (folder / "sub-01" / "ses-2").rglob("*") if path.is_file()]
+    assert left == ["note.txt"]
     assert (folder / "participants.tsv").exists()
     # the report leads to brains of an atlas, too
     assert {path.name for path in (folder / "brains").iterdir()} == {"sub-01_ses-1.html", "crl-22.html"}
     assert read_json(folder / "dataset_description.json")["SourceDatasets"] == [{"URL": "doi:10.1/x"}]
+
+
+def test_a_data_set_of_another_program_is_left(tmp_path, brain):
+    exported, folder = tmp_path / "exported", tmp_path / "out"
+    export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {})
+    write_json(folder / "dataset_description.json", {"GeneratedBy": [{"Name": "fMRIPrep"}]})
+    with pytest.raises(InputError, check=Facts(folder / "dataset_description.json", "OUT")):
+        publish_derivatives(exported, folder, tmp_path, [], whole=True)
+    assert [path.name for path in folder.iterdir()] == ["dataset_description.json"]
 
 
 TABLES_OF_TWO = {

@@ -4,7 +4,7 @@ import io
 import logging
 
 import pytest
-from configurations import LABELLED
+from configurations import LABELLED, touched
 from facts import Facts
 
 from gyriflow.errors import InputError
@@ -137,6 +137,20 @@ def test_what_has_ended_a_program_from_outside_is_told(run, monkeypatch, message
     assert recorded_exit_code(run.folder / "code") == code
 
 
+def test_a_step_without_a_message_is_told_with_where_its_own_is_not_by_the_shell_command(run):
+    run.fail("measure", "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1", [])
+    assert run.lines[0] == Facts("measure", run.display.details)
+    assert "python" not in run.lines[0]
+
+
+def test_a_run_until_a_stage_says_when_it_is_done(run):
+    run.tell("run_info", stats={"measure": 3})
+    run.begin("measure")
+    run.end(done=1, total=3)
+    run.display.end()
+    assert run.lines[-1] == Facts("gyriflow: done in 5 s", "1 of 3 steps")
+
+
 def test_what_was_stopped_is_no_failure(run):
     run.tell("run_info", stats={"simulate": 2})
     run.begin("simulate", run="r", brain="a")
@@ -204,6 +218,37 @@ def test_stages_of_brains_and_runs_are_told_from_their_files(study):
     write_json(study / "results/runs/r/a/folding/summary.json", {"weeks": [21.0, 22.0, 23.0]})
     assert Facts("r", "a", "GW 23.00") in text(study).splitlines()
     assert "report.html" not in text(study)
+
+
+def test_what_is_done_of_each_brain_and_run_is_counted(tmp_path):
+    touched(
+        tmp_path / "results" / "brains" / "a",
+        *("surface/pial.surf.gii", "metrics/metrics.csv"),
+    )
+    touched(tmp_path / "results" / "brains" / "b", "surface/pial.surf.gii", "mesh/brain.xdmf")
+    run = tmp_path / "results" / "runs" / "r" / "a"
+    touched(run, *(f"surfaces/week-{week}/pial.surf.gii" for week in (21, 22, 23)), "figures/x.png")
+    touched(run, *(f"metrics/week-{week}/metrics.csv" for week in (21, 22)))
+    rows = [line.split() for line in text(tmp_path).splitlines() if line]
+    assert rows == [
+        ["nothing", "is", "running"],
+        *(["brain", "surface", "mesh", "metrics"], ["a", "done", "-", "done"], ["b", "done", "done", "-"]),
+        *(["run", "brain", "folding", "surfaces", "metrics", "figures"], ["r", "a", "-", "3", "2", "1"]),
+    ]
+
+
+@pytest.mark.parametrize("content", ["", "- a", "brains: 3", "brains: ["])
+def test_the_status_of_a_configuration_with_mistakes_is_told(tmp_path, content):
+    (tmp_path / "gyriflow.yaml").write_text(content)
+    assert text(tmp_path) == "nothing is running"
+
+
+def test_the_runs_of_a_configuration_are_told_before_they_start_wherever_its_files_are(tmp_path):
+    shape = "{id: a, week: 21, shape: {semi_axes_mm: [20, 20, 20]}}"
+    (tmp_path / "gyriflow.yaml").write_text(
+        f"brains: [{shape}]\nstart: a\nfolding: {{end_week: 22}}\nruns: {{x: {{}}}}"
+    )
+    assert text(tmp_path).splitlines()[-1].split() == ["x", "a", "-", "-", "-", "-"]
 
 
 def test_a_folder_without_a_study_is_named(tmp_path):

@@ -1,0 +1,174 @@
+"""What gyriflow uses of Snakemake beside its public interface, tried with Snakemake 9.27.0 and 9.27.1."""
+
+import hashlib
+import json
+import os
+import re
+from base64 import urlsafe_b64decode
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+from ..code_hash import code_hash
+from ..io.files import files_below, sha256_of
+from ..shipped import SHIPPED
+
+REMOVED = (".csv", ".html", ".png", ".pdf")
+DATE_TOL_S = 0.001
+
+
+def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
+    """Give rules a parameter that changes with their code; Snakemake reruns jobs whose parameters have changed.
+
+    Snakemake itself sees the date of a script, which a new checkout changes, and no package that a script imports. A
+    shell command has to name the code of its program itself. `rules` are those of a workflow, as `workflow.rules` has
+    them; `scripts` is the folder of their scripts.
+    """
+    for rule in rules:
+        if rule.script and not hasattr(rule.params, "code"):
+            rule.set_params(code=code_hash(scripts / Path(rule.script).name))
+        if rule.script or rule.shellcmd:
+            text = rule.shellcmd or (scripts / Path(rule.script).name).read_text()
+            rule.set_params(command=f"code {hashlib.sha256(text.encode()).hexdigest()[:12]}")
+
+
+def complete_rules(rules: Iterable[Any], environment: str) -> None:
+    """Give rules that name no environment the common one, and a benchmark file named like their log.
+
+    For Snakemake's software deployment with conda, `environment` is the path of the environment's file.
+    """
+    for rule in rules:
+        if (rule.script or rule.shellcmd) and not rule.conda_env:
+            rule.conda_env, rule.benchmark_modifier = environment, rule.log_modifier
+            rule.benchmark = rule.log[0].replace("/logs/", "/benchmarks/").removesuffix(".log") + ".tsv"
+
+
+def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str], folders: Collection[str]) -> None:
+    """Have Snakemake record the content of input files instead of their paths, so that they may be moved.
+
+    Files of gyriflow and of a user count as changed if their content has, whatever their date. Dates of results mean
+    nothing in a copy of a study.
+
+    Parameters
+    ----------
+    contents : hashes of the study's input files by path
+    earlier : hashes of the last run
+    folders : folders of the user whose place is not recorded, as that of the working directory and of gyriflow is not
+    """
+    from snakemake.io import _IOFile
+    from snakemake.persistence import PersistenceBase
+
+    recorded_input, recorded_params, is_newer = PersistenceBase._input, PersistenceBase._params, _IOFile.is_newer
+    names = {path: f"input {content}" for path, content in contents.items()}
+    names |= dict.fromkeys([*folders, str(Path.cwd()), str(SHIPPED)], "a folder")
+    # as parameters are written
+    names |= {repr(path)[1:-1]: name for path, name in names.items()}
+    longest_first = sorted(names, key=len, reverse=True)
+    has_dates = not dates_before_copy(Path())
+    places = re.compile(rf"(?<![\w./-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w.-])")
+
+    @cache
+    def content_of(path: str) -> str | None:
+        if path in contents:
+            return contents[path]
+        # files of gyriflow itself
+        return sha256_of(path) if path.startswith("/") and Path(path).is_file() else None
+
+    def by_content(self: PersistenceBase, job: Any) -> list[str]:
+        return sorted(
+            f"input {content}" if (content := content_of(path)) else path for path in recorded_input(self, job)
+        )
+
+    def without_places(self: PersistenceBase, job: Any) -> list[str]:
+        return sorted(places.sub(lambda match: names[match[0]], text) for text in recorded_params(self, job))
+
+    async def is_newer_or_other(self: Any, time: float) -> bool:
+        content, is_known = content_of(str(self)), str(self) in contents
+        may_be_newer = has_dates if content is None else earlier and is_known and content not in earlier
+        return bool(may_be_newer) and await is_newer(self, time)
+
+    PersistenceBase._input, PersistenceBase._params = by_content, without_places
+    _IOFile.is_newer = is_newer_or_other
+
+
+@contextmanager
+def temporary_records(directory: Path) -> Iterator[None]:
+    """Let Snakemake plan in a directory that may be read-only: it writes records and caches to a temporary folder."""
+    from snakemake import workflow
+    from snakemake.jobs import Job
+    from snakemake.persistence.file import FilePersistence
+
+    async def check_nothing(job: Job) -> None:
+        pass
+
+    with (
+        TemporaryDirectory() as scratch,
+        patch.object(Job, "check_protected_output", check_nothing),
+        patch.dict(os.environ, XDG_CACHE_HOME=scratch),
+    ):
+        # nothing is written to these in a dry run
+        for name in ("metadata", "incomplete", "locks"):
+            if (record := directory / ".snakemake" / name).is_dir():
+                Path(scratch, name).symlink_to(record.resolve())
+        with patch.object(workflow, "FilePersistence", lambda **kw: FilePersistence(**kw | {"path": Path(scratch)})):
+            yield
+
+
+def dates_before_copy(directory: Path) -> dict[Path, float]:
+    """Return when the results of a working directory were made (s since the epoch), by path.
+
+    Empty if any of them still has its date, as after a move: then no copy has given all of them new ones.
+    """
+    dates = {}
+    for made in _made_files(directory):
+        if made.has_its_date:
+            return {}
+        dates[made.path] = made.date_s
+    return dates
+
+
+def remove_stale(rules: Collection[Any], *folders: str) -> None:
+    """Remove tables, figures and pages that an earlier run made and no rule makes, such as those of refused brains.
+
+    Files that a user has saved or changed in these `folders` are left.
+    """
+    for made in _made_files(Path()):
+        is_in_folders = any(made.path.is_relative_to(folder) for folder in folders)
+        is_stale = is_in_folders and not any(rule.is_producer(str(made.path)) for rule in rules)
+        if is_stale and made.path.suffix in REMOVED and made.has_its_date:
+            made.path.unlink()
+            made.record.unlink()
+
+
+class _MadeFile(NamedTuple):
+    """A result in a working directory that a job made, Snakemake's record of it, and its date then."""
+
+    path: Path
+    record: Path
+    date_s: float
+
+    @property
+    def has_its_date(self) -> bool:
+        return abs(self.path.lstat().st_mtime - self.date_s) < DATE_TOL_S
+
+
+def _made_files(directory: Path) -> Iterator[_MadeFile]:
+    records = directory / ".snakemake" / "metadata"
+    for record in files_below(records):
+        # a long name is split into folders
+        parts = [part.removeprefix("@") for part in record.relative_to(records).parts]
+        # a record may be torn
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            name = urlsafe_b64decode("".join(parts)).decode()
+            path, date_s = directory / name, float(json.loads(record.read_text())["endtime"])
+            if not Path(name).is_absolute() and path.is_file():
+                yield _MadeFile(path, record, date_s)
+
+
+def benchmark_patterns(rules: Iterable[Any]) -> dict[str, str]:
+    """Return the regular expression of the benchmark files of each rule that has any, with wildcards as groups."""
+    return {rule.name: rule.benchmark.regex().pattern for rule in rules if rule.benchmark}
