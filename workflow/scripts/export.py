@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gyriflow.io.exports import ExportedBrain, export_bids
 from gyriflow.io.files import read_table, remove_tree
-from gyriflow.metrics.tables import wide_names
+from gyriflow.metrics.tables import wide_names, wide_table
 from gyriflow.step import step
 from gyriflow.version import version
 
@@ -12,6 +12,11 @@ files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
     folder = remove_tree(Path(snakemake.output[0]).parent)
     brains = [ExportedBrain(**brain) for brain in params.brains]
-    tables = {"metrics_long": read_table(files.long), "metrics_wide": read_table(files.wide)}
-    units = dict(zip(wide_names(tables["metrics_long"]), tables["metrics_long"]["unit"], strict=True))
+    long = read_table(files.long)
+    # the wide table is not read, since its covariates are texts that may look like numbers
+    tables = {
+        "metrics_long": long,
+        "metrics_wide": wide_table(long, {brain.brain: brain.covariates for brain in brains}),
+    }
+    units = dict(zip(wide_names(long), long["unit"], strict=True))
     export_bids(folder, brains, tables, version(), units)

@@ -32,6 +32,40 @@ AGAIN = "The file may be truncated or of another kind: copy or export it again."
 PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
 PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
+TEXT_COLUMNS = frozenset(
+    (
+        *("subject", "brain", "start", "real", "from_brain", "to_brain", "run", "series", "study", "sides", "page"),
+        *(
+            "population",
+            "real_population",
+            "source",
+            "hemisphere",
+            "region",
+            "tissue",
+            "structure",
+            "metric",
+            "measure",
+        ),
+        *(
+            "quantity",
+            "proxy",
+            "model",
+            "unit",
+            "kind",
+            "verdict",
+            "cause",
+            "outcome",
+            "flag",
+            "resolution",
+            "growth_of",
+        ),
+        *("level", "message", "warnings", "stage", "rule", "nodes", "pose_by", "parameter", "result", "place"),
+    )
+)
+"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids.
+
+Other columns hold numbers, true or false, or texts that are never like these. A cell without a value is empty.
+"""
 
 
 def companion_files(path: AnyPath) -> list[str]:
@@ -186,11 +220,13 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
 
 
 def read_table(path: AnyPath) -> "pd.DataFrame":
-    """Return a CSV table; InputError where it is missing or torn."""
+    """Return a table of `write_table`, the `TEXT_COLUMNS` as text; InputError where it is missing or torn."""
     import pandas as pd
 
     with reading(path, "a CSV table", remedy=None):
-        return pd.read_csv(path)
+        # "NA" and "None" are texts, too
+        types = dict.fromkeys(TEXT_COLUMNS, str)
+        return pd.read_csv(path, dtype=types, keep_default_na=False, na_values=[""])
 
 
 def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":
