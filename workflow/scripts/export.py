@@ -13,10 +13,8 @@ with step(snakemake.log[0]):
     folder = remove_tree(Path(snakemake.output[0]).parent)
     brains = [ExportedBrain(**brain) for brain in params.brains]
     long = read_table(files.long)
-    # the wide table is not read, since its covariates are texts that may look like numbers
-    tables = {
-        "metrics_long": long,
-        "metrics_wide": wide_table(long, {brain.brain: brain.covariates for brain in brains}),
-    }
+    # made anew, since covariates are texts that may look like numbers
+    wide = wide_table(long, {brain.brain: brain.covariates for brain in brains})
+    tables = {"metrics_long": long, "metrics_wide": wide}
     units = dict(zip(wide_names(long), long["unit"], strict=True))
     export_bids(folder, brains, tables, version(), units)

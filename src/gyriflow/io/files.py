@@ -32,35 +32,11 @@ AGAIN = "The file may be truncated or of another kind: copy or export it again."
 PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
 PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
-TEXT_COLUMNS = frozenset(
-    (
-        *("subject", "brain", "start", "real", "from_brain", "to_brain", "run", "series", "study", "sides", "page"),
-        *(
-            "population",
-            "real_population",
-            "source",
-            "hemisphere",
-            "region",
-            "tissue",
-            "structure",
-            "metric",
-            "measure",
-        ),
-        *(
-            "quantity",
-            "proxy",
-            "model",
-            "unit",
-            "kind",
-            "verdict",
-            "cause",
-            "outcome",
-            "flag",
-            "resolution",
-            "growth_of",
-        ),
-        *("level", "message", "warnings", "stage", "rule", "nodes", "pose_by", "parameter", "result", "place"),
-    )
+TEXT_COLUMNS = (
+    *("subject", "brain", "from_brain", "to_brain", "start", "real", "run", "series", "study", "sides", "page"),
+    *("population", "real_population", "source", "hemisphere", "region", "tissue", "structure", "nodes", "metric"),
+    *("measure", "quantity", "proxy", "unit", "model", "kind", "growth_of", "parameter", "result", "place", "pose_by"),
+    *("verdict", "cause", "outcome", "flag", "resolution", "level", "message", "warnings", "stage", "rule"),
 )
 """The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids.
 
