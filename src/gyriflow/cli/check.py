@@ -204,12 +204,9 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
         # files of atlases may be missing yet
         if file != volume and Path(file).is_file():
             # takes half a second, which label volumes need not wait for
-            from ..io.surfaces import read_one_hemisphere, read_surface
+            from ..io.surfaces import read_surface
 
-            if brain.hemisphere is None:
-                read_surface(file)
-            else:
-                read_one_hemisphere(file, brain.hemisphere.side)
+            read_surface(file, brain.hemisphere and brain.hemisphere.side)
 
 
 def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:

@@ -11,6 +11,7 @@ import re
 import shutil
 import uuid
 import zlib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, StorageError
+from ..formats import START_BYTES, foreign_format
 from ..settings.base import absent_content
 
 if TYPE_CHECKING:
@@ -57,18 +59,24 @@ def companion_files(path: AnyPath) -> list[str]:
     return [str(path.parent / html.unescape(name.decode(errors="replace"))) for name in sorted(names)]
 
 
+def _start_of(path: AnyPath) -> bytes:
+    with suppress(OSError), Path(path).open("rb") as file:
+        return file.read(START_BYTES)
+    return b""
+
+
 def require_content(path: AnyPath) -> None:
     """Raise InputError if the content of a file of git-annex or Git LFS is not here."""
-    start = b""
-    with suppress(OSError), Path(path).open("rb") as file:
-        start = file.read(64)
-    if absent := absent_content(Path(path), start):
+    if absent := absent_content(Path(path), _start_of(path)):
         raise InputError(absent, path=path)
 
 
 @contextmanager
 def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
-    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
+    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`.
+
+    A file of a known other format is named as such, with what to do.
+    """
     require_content(path)
     try:
         yield
@@ -80,6 +88,8 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair, the missing file
         path = getattr(error, "filename", None) or path
+        if foreign := foreign_format(path, _start_of(path)):
+            reason, remedy = f"it is {foreign.name}", foreign.remedy
         raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
 
 
@@ -162,14 +172,20 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
 def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     """Return the rows of a table with a heading, separated by tabs, semicolons or commas, as texts by column.
 
-    InputError for other files, and if a column occurs twice with different values.
+    It may be in UTF-8 or UTF-16, and name its separator first (`sep=;`), as Excel does. InputError for other files, and
+    if a column occurs twice with different values.
     """
-    with reading(path, "a table of text", remedy=None):
-        text = Path(path).read_text(encoding="utf-8-sig")
+    with reading(path, "a table of text", "text in UTF-8 or UTF-16", remedy=None):
+        content = Path(path).read_bytes()
+        # Excel's "Unicode text"
+        text = content.decode("utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
         if not text.strip():
             raise InputError("is empty", path=path, expected="a heading and a row for each brain")
+        # Excel's own line about the separator, which it does not show
+        if named := re.match(r"sep=(.)\s*\n", text, re.IGNORECASE):
+            text = text[named.end() :]
         separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
-        lines = csv.reader(text.splitlines(keepends=True), delimiter=separator)
+        lines = csv.reader(text.splitlines(keepends=True), delimiter=named[1] if named else separator)
         head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]
     # R writes names of rows in a first column without a heading
     has_names = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)

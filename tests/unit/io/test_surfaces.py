@@ -14,7 +14,6 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import is_closed, signed_volume
 from gyriflow.io.surfaces import (
     read_hemispheres,
-    read_one_hemisphere,
     read_surface,
     read_surface_map,
     read_surface_maps,
@@ -153,9 +152,9 @@ def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
     write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
     write_geometry(tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume())
     for name in ("a.surf.gii", "rh.pial"):
-        assert len(read_one_hemisphere(tmp_path / name, "right").faces) == len(ball.faces)
+        assert len(read_surface(tmp_path / name, "right").faces) == len(ball.faces)
         with pytest.raises(InputError, check=Facts(f"{name}:", "CortexRight", "CortexLeft", "left", "right")):
-            read_one_hemisphere(tmp_path / name, "left")
+            read_surface(tmp_path / name, "left")
     # the matrix of a file is told once
     files = [in_spaces(tmp_path / name, ball, (U, SCANNER, TURN)) for name in ("b.gii", "c.gii")]
     assert read_hemispheres(*files)[2]
