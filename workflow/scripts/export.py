@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gyriflow.io.exports import ExportedBrain, export_bids
 from gyriflow.io.files import read_table, remove_tree
-from gyriflow.metrics.tables import wide_names, wide_table
+from gyriflow.metrics.tables import described_columns, wide_table
 from gyriflow.step import step
 from gyriflow.version import version
 
@@ -16,5 +16,4 @@ with step(snakemake.log[0]):
     # made anew, since covariates are texts that may look like numbers
     wide = wide_table(long, {brain.brain: brain.covariates for brain in brains})
     tables = {"metrics_long": long, "metrics_wide": wide}
-    units = dict(zip(wide_names(long), long["unit"], strict=True))
-    export_bids(folder, brains, tables, version(), units)
+    export_bids(folder, brains, tables, version(), described_columns(long))

@@ -17,7 +17,7 @@ from ..anatomy.layout import layout_of, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
-from ..io.volumes import names_unit, read_label_volume
+from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
@@ -63,7 +63,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         study, problems = resolve(config), list(input_problems(config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
-        without_unit = sum(not names_unit(volume) for volume in volumes) if valid else 0
+        without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
     yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
