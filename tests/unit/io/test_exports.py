@@ -192,7 +192,7 @@ def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
     place = tmp_path / "bids" / "sub-case1" / "anat"
     found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
     np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
-    assert list(read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")) == ["sulcal_depth_mm"]
+    assert list(read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")) == ["sulc"]
     assert "desc-white" in (tmp_path / "bids" / "descriptions.tsv").read_text()
 
 
@@ -202,7 +202,7 @@ def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
     scans = [replace(one, template="sub-01_ses-1", template_maps={"left": path}) for one in scans_of_two(brain)]
     export_bids(folder, [*scans, replace(scans[1], run="a", week=25.0)], {}, "1", {})
     place = folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_space-sub01ses1_den-5_sulc.shape.gii"
-    assert read_vertex_maps(place)["sulcal_depth_mm"] == pytest.approx(np.arange(5))
+    assert read_vertex_maps(place)["sulc"] == pytest.approx(-np.arange(5))
     assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
     assert read_json(folder / "space-sub01ses1_sulc.json") == {
         **{"Description": read_json(folder / "sulc.json")["Description"], "Units": "mm"},
