@@ -4,6 +4,7 @@ An impossible size reveals files in metres, micrometres or centimetres.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume
@@ -24,6 +25,8 @@ WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
 CUT_SHARES = ((21.0, 0.23), (23.0, 0.17), (27.0, 0.15), (31.0, 0.12), (36.0, 0.103))
 # a share above this multiple of it is doubtful: individuals vary more than atlases
 MAX_CUT_FACTOR = 2.0
+# a median cortical thickness, also of bodies that are no brains
+THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
@@ -58,6 +61,20 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
         remedy=f"The file seems to be in {guess}: give it in mm, with mm in the header."
         if guess
         else "Check the file's unit, its week, and which labels belong to the cerebrum.",
+    )
+
+
+def require_plausible_thickness(values_mm: NDArray, path: str) -> None:
+    """Raise InputError, with a guess of the unit, if the median of a map's positive values is no thickness in mm."""
+    known = values_mm[np.isfinite(values_mm) & (values_mm > 0)]
+    median, (low, high) = float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
+    if low <= median <= high:
+        return
+    unit = next((unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high), None)
+    remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check what the map holds and its unit."
+    problem = "holds values that are no cortical thickness"
+    raise InputError(
+        problem, path=path, found=f"a median of {median:.3g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
     )
 
 

@@ -64,9 +64,15 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
         without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
+        from .inputs import check_other_files, input_facts
+
+        further, facts = list(check_other_files(study)), list(input_facts(study))
+        valid = valid and not further
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
     yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
+    yield from ((f"  {owner}: {text}", bad) for owner, text, bad in further)
+    yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     if without_unit:
         yield f"  note: {without_unit} of {len(volumes)} label volumes give no unit of length, taken as mm", False
@@ -200,13 +206,10 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
         yield from _check_labels(volume, brain, label_scheme(config, brain))
-    for file in brain.files:
-        # files of atlases may be missing yet
-        if file != volume and Path(file).is_file():
-            # takes half a second, which label volumes need not wait for
-            from ..io.surfaces import read_surface
+    # takes half a second, which other commands need not wait for
+    from .inputs import check_brain_files
 
-            read_surface(file, brain.hemisphere and brain.hemisphere.side)
+    yield from check_brain_files(brain)
 
 
 def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:
