@@ -19,7 +19,12 @@ for suffix, maps in (("", {}), ("_with_maps", {"maps": MAPS})):
         name:
             f"prepare{suffix}"
         input:
-            lambda w: [file for files in map_sources(w).values() for kind in ("map", "surface") for file in files[kind]],
+            lambda w: [
+                file
+                for files in map_sources(w).values()
+                for kind in ("map", "surface")
+                for file in files[kind]
+            ],
             mesh=MESH["mesh"],
             data=MESH["data"],
             surface=PIAL["report"],
