@@ -30,6 +30,8 @@ THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
+# shift of one hemisphere along the mid-plane, in cube roots of its volume
+MAX_USUAL_SHIFT = 0.08
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
 
@@ -171,6 +173,18 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coor
     if ratio > DOUBTFUL_RATIO:
         return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: do they belong to one brain?"]
     return []
+
+
+def facing_warnings(left: TriangleMesh, right: TriangleMesh, to_right: Floats) -> list[str]:
+    """Return a warning if the centres of two hemispheres are shifted against each other along the mid-plane.
+
+    `to_right` (3,) is the unit normal of the plane.
+    """
+    between = right.vertices.mean(axis=0) - left.vertices.mean(axis=0)
+    shift = float(np.linalg.norm(between - (between @ to_right) * to_right))
+    if shift <= MAX_USUAL_SHIFT * float(np.cbrt(abs(signed_volume(left)))):
+        return []
+    return [f"the medial walls do not face each other: they are shifted by {shift:.1f} mm. Are both in one space?"]
 
 
 def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
