@@ -137,8 +137,8 @@ def _apart_warning(to_left: Floats, to_right: Floats, left: Hemisphere) -> str:
     distance = float(np.linalg.norm(difference[:3, :3] @ centre + difference[:3, 3]))
     angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
     return (
-        f"the medial walls do not face each other in the files' coordinates: {distance:.1f} mm and {angle:.0f}° off, so "
-        "each hemisphere was posed by its own shape. Are both files in one space?"
+        f"the medial walls do not face each other in the files' coordinates: {distance:.1f} mm and {angle:.0f}° off: "
+        "each was posed by its own shape. Are both files in one space?"
     )
 
 
