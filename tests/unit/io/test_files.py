@@ -137,6 +137,15 @@ def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
             assert read_table(tmp_path / "a.csv")[column].tolist() == [name] * 2
 
 
+@pytest.mark.parametrize("key", ["021", "true", "no", "~", "0x1F", "1_000"])
+def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
+    (tmp_path / "a.yaml").write_text(f"runs:\n  {key}: {{}}\n")
+    with pytest.raises(InputError, check=Facts(tmp_path / "a.yaml", "line 2", key)):
+        read_keys(tmp_path / "a.yaml")
+    (tmp_path / "a.yaml").write_text(f'runs:\n  "{key}": {{}}\n  1: {{}}\n  21.50: {{}}\n')
+    assert list(read_keys(tmp_path / "a.yaml")["runs"]) == [key, 1, 21.5]
+
+
 def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):
     one, other, gone = tmp_path / "one", tmp_path / "other", tmp_path / "gone"
     one.write_text("a brain")
