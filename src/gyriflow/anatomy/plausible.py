@@ -76,7 +76,7 @@ def require_plausible_thickness(values_mm: NDArray, path: str) -> None:
     remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check what the map holds and its unit."
     problem = "holds values that are no cortical thickness"
     raise InputError(
-        problem, path=path, found=f"a median of {median:.3g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
+        problem, path=path, found=f"a median of {median:.4g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
     )
 
 

@@ -50,7 +50,7 @@ def describe(path: str) -> str:
     if path.lower().endswith((".shape.gii", ".func.gii", ".label.gii")):
         image = load_gifti(path)
         values = [np.asarray(array.data) for array in image.darrays]
-        span = ", ".join(f"{part.min(initial=np.inf):.4g} to {part.max(initial=-np.inf):.4g}" for part in values)
+        span = ", ".join(f"{part.min():.4g} to {part.max():.4g}" for part in values if part.size)
         return f"{', '.join(str(len(part)) for part in values)} values, {span}{_side(structure_of(image, path))}"
     mesh, space, structure = surface_space_structure(path)
     size = " x ".join(f"{extent:.3g}" for extent in np.ptp(mesh.vertices, axis=0))
