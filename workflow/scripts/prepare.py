@@ -31,7 +31,7 @@ with step(snakemake.log[0]):
             maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
         if name == "thickness_mm":
-            require_plausible_thickness(maps[name] * source["curve"], path)
+            require_plausible_thickness(maps[name], source["curve"], path)
     if files.targets:
         targets = read_weekly_shapes(files.targets)
         weekly = targets.weeks.tolist()

@@ -66,10 +66,13 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
     )
 
 
-def require_plausible_thickness(values_mm: NDArray, path: str) -> None:
-    """Raise InputError, with a guess of the unit, if the median of a map's positive values is no thickness in mm."""
-    known = values_mm[np.isfinite(values_mm) & (values_mm > 0)]
-    median, (low, high) = float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
+def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
+    """Raise InputError, with a guess of the unit, if a map's positive values times a factor are no thickness in mm.
+
+    Their median counts.
+    """
+    known = values[np.isfinite(values) & (values > 0)]
+    median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
     if low <= median <= high:
         return
     unit = next((unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high), None)

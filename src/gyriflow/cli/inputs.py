@@ -194,4 +194,4 @@ def _check_map(name: str, value: Any) -> None:
     else:
         values = [read_volume_map(path).values.ravel() for path in paths]
     if name == "thickness_mm":
-        require_plausible_thickness(np.concatenate(values) * mean_of_curve(value), ", ".join(paths))
+        require_plausible_thickness(np.concatenate(values), mean_of_curve(value), ", ".join(paths))

@@ -167,6 +167,8 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> 
         stem = "_".join(filter(None, (subject, session)))
         simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
+        if subject == "sub-":
+            raise InputError("a subject has no BIDS name", found=brain.subject, expected="letters or digits")
         places.append(place)
         if (first := taken.setdefault(place, brain)) is not brain:
             brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"

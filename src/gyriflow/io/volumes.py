@@ -226,14 +226,14 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Fl
     if isinstance(image, nib.AnalyzeImage):
         problem = "is in the Analyze format, which holds no orientation, so left and right are unknown"
         raise InputError(problem, path=path, expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)")
-    if isinstance(image, nib.MGHImage) and not _has_directions(image, path):
+    if isinstance(image, nib.MGHImage) and not _has_directions(path):
         problem = "has no valid directions (goodRASFlag), so left and right are unknown"
         remedy = "Set them with mri_convert, for example --in_orientation, or give the volume as NIfTI."
         raise InputError(problem, path=path, found=0, expected=1, remedy=remedy)
     return image.affine
 
 
-def _has_directions(image: nib.MGHImage, path: AnyPath) -> bool:
+def _has_directions(path: AnyPath) -> bool:
     # nibabel takes FreeSurfer's usual ones where they are not valid, and sets the flag
     opener: Any = gzip.open if str(path).lower().endswith(GZIP_SUFFIXES) else open
     with opener(path, "rb") as file:
