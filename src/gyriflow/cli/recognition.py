@@ -355,7 +355,7 @@ def _volumes(files: Sequence[Path]) -> Iterator[_Candidate]:
             images[file.parent].append(str(file))
     for file in files:
         if ENTITY.fullmatch(file.name):
-            yield _Candidate(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
+            yield _Candidate(file, {"labels": str(file)}, "", "is a folder that is not there or may not be read")
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}

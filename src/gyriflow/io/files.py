@@ -298,10 +298,18 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice."""
+    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice.
+
+    Folders that may not be read are among them.
+    """
     entered: set[str] = set()
-    found = []
-    for place, folders, names in os.walk(folder, followlinks=True):
+    found: list[Path] = []
+
+    def name_unreadable(error: OSError) -> None:
+        if isinstance(error, PermissionError):
+            found.append(Path(error.filename))
+
+    for place, folders, names in os.walk(folder, onerror=name_unreadable, followlinks=True):
         here, real = Path(place), os.path.realpath(place)
         # a folder goes before the links to it
         folders[:] = sorted(folders, key=lambda name: (here / name).is_symlink()) if real not in entered else []

@@ -123,7 +123,7 @@ def read_header(path: AnyPath) -> VolumeHeader:
         names = [image.header.get_value_label(f"{name}_code") for name in ("sform", "qform")]
         space = next((name for name in names if name != "unknown"), "unknown")
     size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
-    return VolumeHeader(tuple(map(int, image.shape[:3])), tuple(size.tolist()), unit, space)
+    return VolumeHeader(tuple(map(int, image.shape[:3])), tuple(map(float, size)), unit, space)
 
 
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:

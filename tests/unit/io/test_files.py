@@ -137,6 +137,22 @@ def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
             assert read_table(tmp_path / "a.csv")[column].tolist() == [name] * 2
 
 
+def test_folders_that_may_not_be_read_are_among_the_files(tmp_path, monkeypatch):
+    for name in ("sub-01", "sub-02"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.nii").touch()
+    scan = os.scandir
+
+    def refused(path):
+        if str(path).endswith("sub-02"):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    assert files_below(tmp_path) == [tmp_path / "sub-01" / "a.nii", tmp_path / "sub-02"]
+    assert files_below(tmp_path / "lost") == []
+
+
 @pytest.mark.parametrize("key", ["021", "true", "no", "~", "0x1F", "1_000"])
 def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
     (tmp_path / "a.yaml").write_text(f"runs:\n  {key}: {{}}\n")
