@@ -101,12 +101,12 @@ def check_brain_files(brain: BrainConfig) -> Iterator[str]:
         left, right, declared = read_hemispheres(brain.hemispheres.left, brain.hemispheres.right)
         yield from _check_pair(brain, left, right, declared=declared)
     elif brain.files:
-        side = brain.hemisphere.side if brain.hemisphere else None
-        mesh = _outward(read_surface(brain.files[0], side))
+        own_side = brain.hemisphere.side if brain.hemisphere else None
+        mesh = _outward(read_surface(brain.files[0], own_side))
         yield from _check_size(brain, mesh)
-        if side and is_closed(mesh):
+        if own_side and is_closed(mesh):
             require_single_hemisphere(mesh)
-            yield from pose_of_hemisphere(mesh, side, brain.coordinates).warnings
+            yield from pose_of_hemisphere(mesh, own_side, brain.coordinates).warnings
         elif is_closed(mesh):
             yield from pose_of_surface(mesh, brain.coordinates).warnings
 

@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
 Layer = Literal["Pial", "GrayWhite"]
-SIDES_BY_STRUCTURE = {structure: side for side, structure in STRUCTURES.items()}
+SIDES_BY_STRUCTURE: dict[str, Side] = {structure: side for side, structure in STRUCTURES.items()}
 SURFACE_NAMES = f"a file that ends in {', '.join(SURFACE_SUFFIXES)}"
 RawSurface = tuple[Floats, NDArray, str | None, str | None]
 """Points and faces of a file, the space of the points and the structure (each None if the file has none)."""
