@@ -90,6 +90,17 @@ BY_TESTS = {
         ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),
         ("src/gyriflow/io/exports.py", "_hemi-{side[0].upper()}{desc}_{kind}", "_hemi-L{desc}_{kind}"),
         ("src/gyriflow/io/made_files.py", " if path not in others}", "}"),
+        ("src/gyriflow/quantities.py", "export_sign=-1", "export_sign=1"),
+    ],
+    "io/test_volumes.py": [
+        ("src/gyriflow/io/volumes.py", "moved[:3, 3] += moved[:3, :3] @", "moved[:3, 3] += np.abs(moved[:3, :3]) @"),
+        ("src/gyriflow/io/volumes.py", "int(filled[0]) - 1, 0", "int(filled[0]), 0"),
+        ("src/gyriflow/io/volumes.py", "nib.MGHImage) and not", "nib.MGHImage) and"),
+    ],
+    "io/test_surfaces.py": [
+        ("src/gyriflow/io/surfaces.py", "STRUCTURES.values() and structure !=", "STRUCTURES.values() and structure =="),
+        ("src/gyriflow/io/surfaces.py", "REAL_RAS, start.end() + 8", "REAL_RAS, start.end() + 4"),
+        ("src/gyriflow/io/vtk_files.py", 'content, "<i4"', 'content, ">i4"'),
     ],
     # simulations, jobs and exit codes
     "folding/test_stress.py": [("src/gyriflow/folding/stress.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
@@ -111,7 +122,11 @@ BY_TESTS = {
         ("src/gyriflow/running/snakemake_internals.py", "content not in earlier", "content in earlier"),
     ],
     "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime < since_s", "st_mtime > since_s")],
-    "io/test_files.py": [("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1")],
+    "io/test_files.py": [
+        ("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1"),
+        ("src/gyriflow/io/files.py", "dtype=types, keep", "keep"),
+        ("src/gyriflow/io/files.py", "keep_default_na=False", "keep_default_na=True"),
+    ],
 }
 MUTANTS = [Mutant(file, old, new, TESTS + tests) for tests, rows in BY_TESTS.items() for file, old, new in rows]
 

@@ -1,11 +1,12 @@
-"""The file formats of surfaces and volumes that can be given: how the names of their files end.
+"""The file formats of surfaces and volumes that can be given, by the ends of names, and some that cannot, by content.
 
 Each format has a reader of its `name` in `io.surfaces` or `io.volumes`.
 """
 
+import re
 from dataclasses import dataclass
 from os import PathLike
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Content = Literal["surface", "volume"]
 
@@ -53,3 +54,45 @@ def format_of(path: str | PathLike[str], content: Content) -> FileFormat | None:
 def is_volume(path: str | PathLike[str]) -> bool:
     """Return whether a file is named as a volume."""
     return format_of(path, "volume") is not None
+
+
+SIDE_NAME = re.compile(
+    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=[._])L)|(right|rh|hemi-R|(?<=[._])R))(?=[._-])", re.IGNORECASE
+)
+
+
+def side_in_name(name: str) -> Literal["left", "right"] | None:
+    """Return the hemisphere that a file's name has, such as `lh.pial` or `sub-01_hemi-R_pial.surf.gii`, or None."""
+    found = {"left" if left else "right" for left, _ in SIDE_NAME.findall(name)}
+    return found.pop() if len(found) == 1 else None  # type: ignore[return-value]
+
+
+class ForeignFormat(NamedTuple):
+    """What the first bytes of a file show it to be, and what to do with it unless its name ends in `suffixes`."""
+
+    start: bytes
+    name: str
+    remedy: str
+    suffixes: tuple[str, ...] = ()
+
+
+START_BYTES = 512
+"""How much of a file shows its format."""
+TO_NIFTI = "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
+TO_TABLE = "Save it as text separated by tabs (.tsv)."
+FOREIGN_FORMATS = (
+    ForeignFormat(rb"NRRD\d{4}", "an NRRD volume", TO_NIFTI),
+    ForeignFormat(rb"(Comment[^\n]*\n)?(ObjectType|NDims) *=", "a MetaImage volume", TO_NIFTI),
+    ForeignFormat(rb".{128}DICM", "a DICOM file", "Convert the series to NIfTI, for example with dcm2niix."),
+    ForeignFormat(rb"PK\x03\x04", "an Excel workbook or another ZIP archive", TO_TABLE),
+    ForeignFormat(rb"\xd0\xcf\x11\xe0", "an Excel workbook", TO_TABLE),
+    ForeignFormat(rb"(?i)\s*(<!doctype html|<html)", "a web page", "Download the file itself; it may need a login."),
+    ForeignFormat(rb"\x1f\x8b", "compressed by gzip", "Add .gz to its name.", (".gz", ".mgz")),
+    ForeignFormat(rb".{344}(n\+1|ni1)\0", "NIfTI without compression", "Name it .nii.", (".nii", ".hdr")),
+)
+
+
+def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | None:
+    """Return the format that a file's first `START_BYTES` show, None if its name says the same or it is not known."""
+    shown = (form for form in FOREIGN_FORMATS if re.match(form.start, start, re.DOTALL))
+    return next((form for form in shown if not str(path).lower().endswith(form.suffixes)), None)

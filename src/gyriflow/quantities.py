@@ -19,9 +19,10 @@ class Registry[Record](dict[str, Record]):
 class VertexMap:
     """A value at each vertex of a surface.
 
-    `name` is that of the array in its file; `bids_suffix` and `description` are used in the export. `is_averaged`: its
-    mean is given by region. A map with `colours`, a colour map of Matplotlib, is drawn, between `limits` or else from 0
-    to the `quantile` of the vertices, and as far below 0 if it `is_signed` or has negative values. The colour bar has
+    `name` is that of the array in its file; `bids_suffix` and `description` are used in the export, whose values are
+    those of our file times `export_sign`, so that names of other tools have their signs. `is_averaged`: its mean is
+    given by region. A map with `colours`, a colour map of Matplotlib, is drawn, between `limits` or else from 0 to the
+    `quantile` of the vertices, and as far below 0 if it `is_signed` or has negative values. The colour bar has
     the `label` with the unit, or with what the `ends` of the scale mean.
     """
 
@@ -30,6 +31,7 @@ class VertexMap:
     label: str
     bids_suffix: str
     description: str
+    export_sign: int = 1
     is_averaged: bool = True
     colours: str = ""
     limits: tuple[float, float] | None = None
@@ -72,7 +74,7 @@ _BRAIN_MAPS = (
         unit="1",
         label="shape index",
         bids_suffix="shapeIndex",
-        description="Shape index",
+        description="Shape index, -1 in pits, -0.5 in sulci, 0.5 on gyri, 1 on caps",
         colours=SIGNED_COLOURS,
         limits=(-1.0, 1.0),
         ends="sulci −½, gyri +½",
@@ -91,14 +93,14 @@ _BRAIN_MAPS = (
         unit="1/mm",
         label="mean curvature",
         bids_suffix="curv",
-        description="Mean curvature, positive on gyri: FreeSurfer's files named curv have the opposite sign",
+        description="Mean curvature, positive on gyri as in HCP's files; FreeSurfer's have the opposite sign",
     ),
     VertexMap(
         name="gaussian_curvature",
         unit="1/mm2",
         label="Gaussian curvature",
         bids_suffix="gaussCurv",
-        description="Gaussian curvature",
+        description="Gaussian curvature, positive on caps and in pits, negative on saddles",
         is_averaged=False,
     ),
     VertexMap(
@@ -106,7 +108,9 @@ _BRAIN_MAPS = (
         unit="mm",
         label="sulcal depth",
         bids_suffix="sulc",
-        description="Sulcal depth: distance to the convex hull of the hemisphere",
+        description="Minus the distance to the convex hull of the hemisphere: 0 on gyri and negative in sulci, "
+        "so larger on gyri as in HCP's files; FreeSurfer's have the opposite sign",
+        export_sign=-1,
         colours=POSITIVE_COLOURS,
     ),
     VertexMap(
@@ -117,7 +121,12 @@ _BRAIN_MAPS = (
         description="Local gyrification index",
     ),
     VertexMap(
-        name="reliable", unit="1", label="reliable", bids_suffix="reliable", description="Reliable", is_averaged=False
+        name="reliable",
+        unit="1",
+        label="reliable",
+        bids_suffix="reliable",
+        description="1 where the maps can be relied on, 0 near a cut",
+        is_averaged=False,
     ),
     VertexMap(
         name="thickness_mm",
@@ -167,7 +176,7 @@ _DEVIATION_MAPS = (
         unit="1",
         label="logarithm of the area's ratio",
         bids_suffix="logArea",
-        description="Logarithm of the real over the expected area",
+        description="Logarithm of the real over the expected area, positive where the real one is larger",
         colours=SIGNED_COLOURS,
         is_signed=True,
     ),
@@ -176,7 +185,7 @@ _DEVIATION_MAPS = (
         unit="mm",
         label="difference of thickness",
         bids_suffix="thicknessDifference",
-        description="Real less expected cortical thickness",
+        description="Real less expected cortical thickness, positive where the real one is thicker",
         colours=SIGNED_COLOURS,
         is_signed=True,
     ),
@@ -196,7 +205,7 @@ _SIMULATION_MAPS = (
         unit="% per week",
         label="growth of area",
         bids_suffix="areaGrowth",
-        description="Growth of area",
+        description="Growth of area, positive where it grows",
         is_averaged=False,
         colours=POSITIVE_COLOURS,
     ),
@@ -205,7 +214,7 @@ _SIMULATION_MAPS = (
         unit="% per week",
         label="growth across the surface",
         bids_suffix="thicknessGrowth",
-        description="Growth along the normal of the surface",
+        description="Growth along the normal of the surface, positive where it grows",
         is_averaged=False,
     ),
     VertexMap(

@@ -1,14 +1,14 @@
 # Simulations: each run from each of its start brains.
 from gyriflow.io.files import read_json
 from gyriflow.running.cost import job_limits
-from gyriflow.settings.varying import files_of
+from gyriflow.settings.varying import files_of, mean_of_curve
 
 
 def map_sources(wildcards):
-    """Return, for each parameter with a map, the user's files as "map" and "surface"."""
-    mapped = simulation_of(wildcards).mapped
+    """Return, for each parameter with a map, the user's files as "map" and "surface", and its mean "curve"."""
     return {
-        name: {"map": files_of(value.map), "surface": files_of(value.surface)} for name, value in mapped.items()
+        name: {"map": files_of(value.map), "surface": files_of(value.surface), "curve": mean_of_curve(value)}
+        for name, value in simulation_of(wildcards).mapped.items()
     }
 
 
@@ -26,7 +26,9 @@ def prepared_runs(*, with_maps):
 
 rule prepare:
     input:
-        lambda w: [file for files in map_sources(w).values() for kind in files.values() for file in kind],
+        lambda w: [
+            file for files in map_sources(w).values() for kind in ("map", "surface") for file in files[kind]
+        ],
         mesh=MESH["mesh"],
         data=MESH["data"],
         surface=PIAL["report"],

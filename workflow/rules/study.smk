@@ -83,7 +83,6 @@ rule export:
             for path in (volume["labels"].path, volume["surface"], volume["thickness"])
         ],
         long=rules.metrics_tables.output.metrics_long,
-        wide=rules.metrics_tables.output.metrics_wide,
     output:
         # a file, since Snakemake writes its own file into an output folder
         "results/export/dataset_description.json",

@@ -6,13 +6,11 @@ from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import (
     read_hemispheres,
-    read_one_hemisphere,
     read_pose,
     read_surface,
     write_brain,
     write_vertex_maps,
 )
-from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params
@@ -31,8 +29,9 @@ with step(snakemake.log[0], *files, *snakemake.input.white):
     elif params.source == "shape":
         surface = from_shape(read_surface(files[0]), **settings)
     else:
-        mesh = read_one_hemisphere(files[0], params.side) if params.side else read_surface(files[0])
-        surface = from_surface(mesh, params.side, coordinates=params.coordinates, **settings)
+        surface = from_surface(
+            read_surface(files[0], params.side), params.side, coordinates=params.coordinates, **settings
+        )
     write_brain(output, surface.whole, surface.left, surface.right)
     write_json(output.report, surface.report | volumes)
     if output.get("thickness"):
@@ -40,10 +39,7 @@ with step(snakemake.log[0], *files, *snakemake.input.white):
         if labels:
             thickness = thickness_from_labels(volume.labels, volume.affine, labels.scheme, pial, pose, fissure)
         else:
-            whites = {
-                side: read_one_hemisphere(path, side) if side in SIDES else read_surface(path)
-                for side, path in params.white.items()
-            }
+            whites = {side: read_surface(path, side) for side, path in params.white.items()}
             thickness = thickness_from_white(pial, pose, fissure, whites)
         write_vertex_maps(output.thickness, {"cortical thickness (mm)": thickness.values_mm})
         write_vertex_maps(output.measured, {"thickness_mm": thickness.measured_mm})

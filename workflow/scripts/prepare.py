@@ -1,6 +1,7 @@
 """Prepare a run: write its parameters, their maps on the start mesh, and the mesh's zones and fields."""
 
 from gyriflow.anatomy.fissure import nearer_left
+from gyriflow.anatomy.plausible import require_plausible_thickness
 from gyriflow.folding.start_regions import start_regions
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
 from gyriflow.growth.following import run_parameters
@@ -29,6 +30,8 @@ with step(snakemake.log[0]):
             volume, motion = read_volume_map(path, params.affine_from), pose.of_volume(path)
             maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
         on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
+        if name == "thickness_mm":
+            require_plausible_thickness(maps[name], source["curve"], path)
     if files.targets:
         targets = read_weekly_shapes(files.targets)
         passed, stops = targets.passed, targets.stops

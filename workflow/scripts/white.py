@@ -4,7 +4,6 @@ from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import (
     STRUCTURES,
-    read_one_hemisphere,
     read_pose,
     read_surface,
     write_surface,
@@ -23,13 +22,10 @@ with step(snakemake.log[0], *files.given):
         volume = labels.read(cropped=True)
         sides = white_from_labels(volume.labels, volume.affine, labels.scheme, pial, pose, **settings)
     else:
-        whites = {
-            name: read_one_hemisphere(path, name) if name in SIDES else read_surface(path)
-            for name, path in params.white.items()
-        }
+        whites = {name: read_surface(path, name) for name, path in params.white.items()}
         sides = white_from_surfaces(whites, pial, pose, max_hole_mm=max_hole_mm, **settings)
     table, maps = measure_white(sides, params.curvature_radius_mm)
     write_table(output.metrics, table.assign(**params.columns)[[*params.columns, *table.columns]])
     for side, mesh in sides.items():
-        write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side])
+        write_surface(output[f"{side}_surface"], mesh, STRUCTURES[side], "GrayWhite")
         write_vertex_maps(output[f"{side}_maps"], maps[side], STRUCTURES[side])

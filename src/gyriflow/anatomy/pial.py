@@ -70,6 +70,7 @@ from .layout import layout_of, scheme_contradictions
 from .plausible import (
     DOUBTFUL_RATIO,
     cut_warnings,
+    facing_warnings,
     max_cut_share,
     proportion_warnings,
     require_common_pose,
@@ -373,7 +374,7 @@ def _two_pieces(
     is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
     gap, to_right = smallest_gap(left, right), plane.normal
     left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
-    warnings = list(surface.warnings)
+    warnings = [*surface.warnings, *logged(facing_warnings(left, right, to_right))]
     if moved > 0:
         warnings += logged([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
         plane = mid_plane(merged(left, right), named=named)

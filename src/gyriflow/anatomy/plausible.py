@@ -4,6 +4,7 @@ An impossible size reveals files in metres, micrometres or centimetres.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume
@@ -24,9 +25,13 @@ WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
 CUT_SHARES = ((21.0, 0.23), (23.0, 0.17), (27.0, 0.15), (31.0, 0.12), (36.0, 0.103))
 # a share above this multiple of it is doubtful: individuals vary more than atlases
 MAX_CUT_FACTOR = 2.0
+# a median cortical thickness, also of bodies that are no brains
+THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
+# shift of one hemisphere along the mid-plane, in cube roots of its volume
+MAX_USUAL_SHIFT = 0.08
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
 
@@ -58,6 +63,23 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
         remedy=f"The file seems to be in {guess}: give it in mm, with mm in the header."
         if guess
         else "Check the file's unit, its week, and which labels belong to the cerebrum.",
+    )
+
+
+def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
+    """Raise InputError, with a guess of the unit, if a map's positive values times a factor are no thickness in mm.
+
+    Their median counts.
+    """
+    known = values[np.isfinite(values) & (values > 0)]
+    median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
+    if low <= median <= high:
+        return
+    unit = next((unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high), None)
+    remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check what the map holds and its unit."
+    problem = "holds values that are no cortical thickness"
+    raise InputError(
+        problem, path=path, found=f"a median of {median:.4g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
     )
 
 
@@ -154,6 +176,18 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coor
     if ratio > DOUBTFUL_RATIO:
         return [f"the hemispheres' volumes differ by {100 * (ratio - 1):.0f} %: do they belong to one brain?"]
     return []
+
+
+def facing_warnings(left: TriangleMesh, right: TriangleMesh, to_right: Floats) -> list[str]:
+    """Return a warning if the centres of two hemispheres are shifted against each other along the mid-plane.
+
+    `to_right` (3,) is the unit normal of the plane.
+    """
+    between = right.vertices.mean(axis=0) - left.vertices.mean(axis=0)
+    shift = float(np.linalg.norm(between - (between @ to_right) * to_right))
+    if shift <= MAX_USUAL_SHIFT * float(np.cbrt(abs(signed_volume(left)))):
+        return []
+    return [f"the medial walls do not face each other: they are shifted by {shift:.1f} mm. Are both in one space?"]
 
 
 def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:

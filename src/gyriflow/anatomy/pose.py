@@ -118,7 +118,9 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         },
         "mirror_residual": round(fit.residual, DIGITS),
     }
-    unclear = "left and right are those of the configuration: the shapes do not show whether the files are swapped"
+    doubts = [] if together else [_apart_warning(*motions, mirrored_left)]
+    if _mean_side_ratio(shapes) < MIN_SIDE_RATIO:
+        doubts.append("left and right are those of the configuration: the shapes do not show if the files are swapped")
     # volumes of the brain are in RAS+
     return Pose(
         np.eye(4) if frame else whole,
@@ -126,7 +128,17 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         "file" if frame else "shape",
         together,
         evidence,
-        (unclear,) if _mean_side_ratio(shapes) < MIN_SIDE_RATIO else (),
+        tuple(doubts),
+    )
+
+
+def _apart_warning(to_left: Floats, to_right: Floats, left: Hemisphere) -> str:
+    centre, difference = MIRROR[:3, :3] @ left.shape.centre, to_left - to_right
+    distance = float(np.linalg.norm(difference[:3, :3] @ centre + difference[:3, 3]))
+    angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
+    return (
+        f"the medial walls do not face each other in the files' coordinates: {distance:.1f} mm and {angle:.0f}° off: "
+        "each was posed by its own shape. Are both files in one space?"
     )
 
 

@@ -18,7 +18,7 @@ from ..anatomy.layout import layout_of, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
-from ..io.volumes import names_unit, read_label_volume
+from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
 from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
@@ -68,10 +68,16 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         study, problems = resolve(config), list(input_problems(config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
-        without_unit = sum(not names_unit(volume) for volume in volumes) if valid else 0
+        without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
+        from .inputs import check_other_files, input_facts
+
+        further, facts = list(check_other_files(study)), list(input_facts(study))
+        valid = valid and not further
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
     yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
+    yield from ((f"  {owner}: {text}", bad) for owner, text, bad in further)
+    yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     if without_unit:
         yield f"  note: {without_unit} of {len(volumes)} label volumes give no unit of length, taken as mm", False
@@ -218,16 +224,10 @@ def _check_files(brain: BrainConfig, config: Config, checksums: dict[str, tuple[
     volume = brain.label_volume
     if volume is not None and Path(volume).is_file():
         yield from _check_labels(volume, brain, label_scheme(config, brain))
-    for file in brain.files:
-        # files of atlases may be missing yet
-        if file != volume and Path(file).is_file():
-            # takes half a second, which label volumes need not wait for
-            from ..io.surfaces import read_one_hemisphere, read_surface
+    # takes half a second, which other commands need not wait for
+    from .inputs import check_brain_files
 
-            if brain.hemisphere is None:
-                read_surface(file)
-            else:
-                read_one_hemisphere(file, brain.hemisphere.side)
+    yield from check_brain_files(brain)
 
 
 def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Iterator[str]:

@@ -81,7 +81,9 @@ def write_configuration(
     weeks, several = _weeks(series), series is not usable
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
     measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
-    rest = "" if only_measured else REST.format(start=series[0].entry["id"], end=end, measured=measured_run)
+    # an id may look like a number, which YAML writes in quotes
+    start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
+    rest = "" if only_measured else REST.format(start=start, end=end, measured=measured_run)
     text = HEAD + "".join(lines) + rest
     kept = _keep_other(path, text)
     write_text(path, text)

@@ -13,8 +13,8 @@ import numpy as np
 from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
-from ..io.files import files_in, reading
+from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
+from ..io.files import files_in, read_json, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES
@@ -25,9 +25,6 @@ from ..study.ages import MAX_DIFFERENCE_WEEKS, ScanAge, week_in_name
 from ..study.participants import TABLE_NAME, ScanTables, ambiguity_of, covariates, data_set_of
 
 LABEL_NAME = re.compile(r"(?!.*probseg).*(label|seg|parcellation|tissue)", re.IGNORECASE)
-SIDE_NAME = re.compile(
-    r"(?:(?<=[._-])|^)(?:(left|lh|hemi-L|(?<=[._])L)|(right|rh|hemi-R|(?<=[._])R))(?=[._-])", re.IGNORECASE
-)
 LAYER_NAME = re.compile(r"(?<=[._-])(?:(pial)|(white|wm))(?=[._-]|$)", re.IGNORECASE)
 NO_BRAIN_NAME = re.compile(
     r"sphere|inflated|midthickness|flat|graymid|smoothwm|orig|cerebell|stem|skull|scalp|head|hull|ventric|white|wm",

@@ -18,7 +18,7 @@ from ..quantities import VERTEX_MAPS, VertexMap
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
 from .made_files import making_files, require_own_data_set
-from .surfaces import read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
+from .surfaces import Layer, read_pose, read_surface, read_vertex_maps, write_surface, write_vertex_maps
 from .volumes import LabelVolume, write_label_volume
 
 BIDS_VERSION = "1.10.0"
@@ -53,6 +53,18 @@ Pial surfaces of fetal brains, maps of folding on them, and simulated brains of 
 PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
+}
+COLUMNS = {
+    "brain": PEOPLE["brain"],
+    "run": {"Description": f"Run of the simulation; {MEASURED}: the observed brain"},
+    "week": {"Description": "Gestational age", "Units": "weeks"},
+}
+COLUMNS_OF_NUMBERS = {
+    "hemisphere": {"Description": "left, right, or whole: both together"},
+    "region": {"Description": "Region of the cortex; n/a: all of it"},
+    "metric": {"Description": "Name of the metric"},
+    "value": {"Description": "Value of the metric, in the unit of its row"},
+    "unit": {"Description": "Unit of the value; 1: none"},
 }
 LABELS_FILE = "{}{}_dseg.nii.gz"
 EXPORTED_TISSUES = ((1, "cerebrum within the cortex"), (2, "cortex"))
@@ -95,13 +107,14 @@ def export_bids(
     brains: Sequence[ExportedBrain],
     tables: Mapping[str, pd.DataFrame],
     version: str,
-    units: Mapping[str, str],
+    columns: Mapping[str, tuple[str, str]],
 ) -> None:
     """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
     Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
     Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables` have
-    the columns subject, run and week; `units` are those of `metrics_wide`. InputError where two brains have one name.
+    the columns subject, run and week; `columns` has the metric's description and unit of each in `metrics_wide`.
+    InputError where two brains have one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]
@@ -130,7 +143,11 @@ def export_bids(
         table.insert(0, "participant_id", [subject for subject, _ in ids])
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
-    write_json(folder / "metrics_wide.json", {column: {"Units": unit} for column, unit in units.items()})
+    wide = dict.fromkeys(map(str, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
+    wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
+    wide.pop("subject", None)
+    write_json(folder / "metrics_wide.json", wide)
+    write_json(folder / "metrics_long.json", COLUMNS | COLUMNS_OF_NUMBERS)
     made_by = {"Name": "gyriflow", "Version": version, "Description": "Pial surfaces, maps and simulations of folding"}
     dataset = {"Name": "gyriflow", "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative", "GeneratedBy": [made_by]}
     # the last file: where it is there, all is
@@ -151,6 +168,8 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> 
         stem = "_".join(filter(None, (subject, session)))
         simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
+        if subject == "sub-":
+            raise InputError("a subject has no BIDS name", found=brain.subject, expected="letters or digits")
         places.append(place)
         if (first := taken.setdefault(place, brain)) is not brain:
             brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
@@ -172,11 +191,12 @@ def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[Place]) -> d
 
 def _write_surfaces(place: Place, brain: ExportedBrain, back: Floats) -> dict[str, dict[str, Any]]:
     prefix, simulated = place
-    kinds = {"pial": (brain.surfaces, simulated)} | ({"white": (brain.white, "")} if brain.white else {})
-    for kind, (files, desc) in kinds.items():
+    kinds: dict[str, tuple[Mapping[Side, str], str, Layer]] = {"pial": (brain.surfaces, simulated, "Pial")}
+    kinds |= {"white": (brain.white, "", "GrayWhite")} if brain.white else {}
+    for kind, (files, desc, layer) in kinds.items():
         for side, path in files.items():
             named = f"{prefix}_hemi-{side[0].upper()}{desc}_{kind}.surf.gii"
-            write_surface(named, transformed(read_surface(path), back), STRUCTURES[side])
+            write_surface(named, transformed(read_surface(path), back), STRUCTURES[side], layer)
     for side, path in brain.regions.items():
         _copy(path, f"{prefix}_hemi-{side[0].upper()}{simulated or '_desc-regions'}_dseg.label.gii")
     return {kind: {"Description": f"{kind.capitalize()} surface, RAS+ mm", "Units": "mm"} for kind in kinds}
@@ -196,11 +216,12 @@ def _write_maps(
     for files, entity, desc, more in kinds:
         for side, path in files.items():
             for name, values in read_vertex_maps(path).items():
-                suffix, about = VERTEX_MAPS[name].bids_suffix, _described(VERTEX_MAPS[name])
-                sidecars["_".join(filter(None, (entity, suffix)))] = {**about, **more}
+                quantity = VERTEX_MAPS[name]
+                suffix, sign = quantity.bids_suffix, quantity.export_sign
+                sidecars["_".join(filter(None, (entity, suffix)))] = {**_described(quantity), **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
-                write_vertex_maps(named, {name: values}, STRUCTURES[side])
+                write_vertex_maps(named, {suffix if sign < 0 else name: sign * values}, STRUCTURES[side])
     return sidecars
 
 
@@ -283,9 +304,12 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
 
 
 def _described(quantity: VertexMap) -> dict[str, Any]:
-    # BIDS writes powers with ^, and "arbitrary" for no unit
-    unit = "arbitrary" if quantity.unit == "1" else quantity.unit.replace("mm2", "mm^2")
-    return {"Description": quantity.description, "Units": unit}
+    return {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
+
+
+def bids_unit(unit: str) -> str:
+    """Return a unit as BIDS writes it: powers with ^, and "arbitrary" for none."""
+    return "arbitrary" if unit == "1" else re.sub(r"([cm]m)(\d)", r"\1^\2", unit)
 
 
 def _alphanumeric(text: str) -> str:

@@ -10,6 +10,7 @@ import os
 import re
 import uuid
 import zlib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, StorageError
+from ..formats import START_BYTES, foreign_format
 from ..settings.base import absent_content
 
 if TYPE_CHECKING:
@@ -31,6 +33,16 @@ AGAIN = "The file may be truncated or of another kind: copy or export it again."
 PAIR = re.compile(r"\.(?:hdr|img)(\.gz)?$", re.IGNORECASE)
 PAIR_ENDINGS = (".hdr", ".img", ".HDR", ".IMG")
 EXTERNAL = re.compile(rb"""ExternalFileName\s*=\s*["']([^"']+)["']""")
+TEXT_COLUMNS = (
+    *("subject", "brain", "from_brain", "to_brain", "start", "real", "run", "series", "study", "sides", "page"),
+    *("population", "real_population", "source", "hemisphere", "region", "tissue", "structure", "nodes", "metric"),
+    *("measure", "quantity", "proxy", "unit", "model", "kind", "growth_of", "parameter", "result", "place", "pose_by"),
+    *("verdict", "cause", "outcome", "flag", "resolution", "level", "message", "warnings", "stage", "rule"),
+)
+"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids.
+
+Other columns hold numbers, true or false, or texts that are never like these. A cell without a value is empty.
+"""
 
 
 def companion_files(path: AnyPath) -> list[str]:
@@ -46,18 +58,24 @@ def companion_files(path: AnyPath) -> list[str]:
     return [str(path.parent / html.unescape(name.decode(errors="replace"))) for name in sorted(names)]
 
 
+def _start_of(path: AnyPath) -> bytes:
+    with suppress(OSError), Path(path).open("rb") as file:
+        return file.read(START_BYTES)
+    return b""
+
+
 def require_content(path: AnyPath) -> None:
     """Raise InputError if the content of a file of git-annex or Git LFS is not here."""
-    start = b""
-    with suppress(OSError), Path(path).open("rb") as file:
-        start = file.read(64)
-    if absent := absent_content(Path(path), start):
+    if absent := absent_content(Path(path), _start_of(path)):
         raise InputError(absent, path=path)
 
 
 @contextmanager
 def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
-    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`."""
+    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`.
+
+    A file of a known other format is named as such, with what to do.
+    """
     require_content(path)
     try:
         yield
@@ -69,6 +87,8 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
         reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair, the missing file
         path = getattr(error, "filename", None) or path
+        if foreign := foreign_format(path, _start_of(path)):
+            reason, remedy = f"it is {foreign.name}", foreign.remedy
         raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
 
 
@@ -145,14 +165,20 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
 def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     """Return the rows of a table with a heading, separated by tabs, semicolons or commas, as texts by column.
 
-    InputError for other files, and if a column occurs twice with different values.
+    It may be in UTF-8 or UTF-16, and name its separator first (`sep=;`), as Excel does. InputError for other files, and
+    if a column occurs twice with different values.
     """
-    with reading(path, "a table of text", remedy=None):
-        text = Path(path).read_text(encoding="utf-8-sig")
+    with reading(path, "a table of text", "text in UTF-8 or UTF-16", remedy=None):
+        content = Path(path).read_bytes()
+        # Excel's "Unicode text"
+        text = content.decode("utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig")
         if not text.strip():
             raise InputError("is empty", path=path, expected="a heading and a row for each brain")
+        # Excel's own line about the separator, which it does not show
+        if named := re.match(r"sep=(.)\s*\n", text, re.IGNORECASE):
+            text = text[named.end() :]
         separator = next((mark for mark in "\t;," if mark in text.partition("\n")[0]), "\t")
-        lines = csv.reader(text.splitlines(keepends=True), delimiter=separator)
+        lines = csv.reader(text.splitlines(keepends=True), delimiter=named[1] if named else separator)
         head, *body = [cells for cells in ([cell.strip() for cell in line] for line in lines) if any(cells)]
     # R writes names of rows in a first column without a heading
     has_names = separator == "\t" and bool(body) and all(len(cells) > len(head) and cells[len(head)] for cells in body)
@@ -179,11 +205,13 @@ def read_text_table(path: AnyPath) -> list[dict[str, str]]:
 
 
 def read_table(path: AnyPath) -> "pd.DataFrame":
-    """Return a CSV table; InputError where it is missing or torn."""
+    """Return a table of `write_table`, the `TEXT_COLUMNS` as text; InputError where it is missing or torn."""
     import pandas as pd
 
     with reading(path, "a CSV table", remedy=None):
-        return pd.read_csv(path)
+        # "NA" and "None" are texts, too
+        types = dict.fromkeys(TEXT_COLUMNS, str)
+        return pd.read_csv(path, dtype=types, keep_default_na=False, na_values=[""])
 
 
 def read_tables(paths: Iterable[AnyPath]) -> "pd.DataFrame":

@@ -7,6 +7,7 @@ at half the size.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import h5py
@@ -17,7 +18,7 @@ from ..errors import InputError
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from ..geometry.triangles import TriangleMesh
 from ..units import week_tag
-from .files import AnyPath, new_hdf5, write_text
+from .files import AnyPath, new_hdf5, reading_hdf5, write_text
 from .tetmeshes import document, grid
 
 POSITIONS = "positions"
@@ -55,7 +56,7 @@ def join_frames(path: AnyPath, tets: NDArray, frames: Sequence[AnyPath]) -> None
     with new_hdf5(path) as file:
         file["tets"] = tets.astype(np.int32)
         for frame in frames:
-            with h5py.File(frame) as source:
+            with _reading(frame) as source:
                 for name in source:
                     source.copy(name, file)
         text = document(_time_series(path.name, file))
@@ -75,33 +76,41 @@ def _time_series(data_name: str, file: h5py.File) -> str:
     return f'<Grid Name="folding" GridType="Collection" CollectionType="Temporal">{"".join(grids)}</Grid>'
 
 
+def _reading(path: AnyPath) -> AbstractContextManager[h5py.File]:
+    return reading_hdf5(path, "frames of a simulation", "a whole HDF5 file of a run", "Simulate the run again.")
+
+
+def _weeks(file: h5py.File) -> list[float]:
+    return sorted(float(name.removeprefix("week_")) for name in file if name.startswith("week_"))
+
+
 def read_weeks(path: AnyPath) -> list[float]:
-    """Return the gestational weeks of the frames, ascending."""
-    with h5py.File(path) as file:
-        return sorted(float(name.removeprefix("week_")) for name in file if name.startswith("week_"))
+    """Return the gestational weeks of the frames, ascending; InputError, as of all readers here, for a torn file."""
+    with _reading(path) as file:
+        return _weeks(file)
 
 
 def read_tets(path: AnyPath) -> NDArray[np.int64]:
     """Return the (m, 4) or (m, 10) tetrahedra."""
-    with h5py.File(path) as file:
+    with _reading(path) as file:
         return file["tets"][:].astype(np.int64)
 
 
 def read_field(path: AnyPath, week: float, field: str) -> NDArray:
     """Return a field at the vertices at a week; InputError, which names the weeks there are, where there is none."""
-    with h5py.File(path) as file:
+    with _reading(path) as file:
         name = f"{group_name(week)}/{field}"
         if name not in file:
-            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {read_weeks(path)}")
+            raise InputError(f"has no {field} of week {week}", path=path, found=f"weeks {_weeks(file)}")
         return file[name][:]
 
 
 def read_pial_frames(path: AnyPath) -> dict[float, tuple[TriangleMesh, dict[str, NDArray]]]:
     """Return by week the outer surface of the mesh in mm, with the fields at its vertices by name."""
-    tets = read_tets(path)
     frames: dict[float, tuple[TriangleMesh, dict[str, NDArray]]] = {}
-    with h5py.File(path) as file:
-        for week in read_weeks(path):
+    with _reading(path) as file:
+        tets = file["tets"][:].astype(np.int64)
+        for week in _weeks(file):
             values = {name: data[:] for name, data in file[group_name(week)].items() if name != CELL_FIELDS}
             if not frames:
                 surface, pial = boundary_surface(TetrahedralMesh(values[POSITIONS], tets))

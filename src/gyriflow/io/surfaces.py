@@ -5,6 +5,7 @@ Coordinates are transformed to scanner space if the file defines their space.
 
 import hashlib
 import logging
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -20,38 +21,42 @@ from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..formats import SURFACE_SUFFIXES, format_of
+from ..formats import SURFACE_SUFFIXES, format_of, side_in_name
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
-from ..settings.terms import NO_REGION, STRUCTURES, Side
+from ..settings.terms import NO_REGION, SIDES, STRUCTURES, Side
 from .files import AnyPath, atomic_write, read_json, reading, require_finite
+from .vtk_files import read_vtk
 
 log = logging.getLogger(__name__)
 
 Structure = Literal["CortexLeft", "CortexRight", "Cortex"]
+Layer = Literal["Pial", "GrayWhite"]
+SIDES_BY_STRUCTURE: dict[str, Side] = {structure: side for side, structure in STRUCTURES.items()}
 SURFACE_NAMES = f"a file that ends in {', '.join(SURFACE_SUFFIXES)}"
-FREESURFER_SIDES = {"lh": "CortexLeft", "rh": "CortexRight"}
 RawSurface = tuple[Floats, NDArray, str | None, str | None]
 """Points and faces of a file, the space of the points and the structure (each None if the file has none)."""
 System = tuple[str, str, Floats]
 """A space of coordinates, the space that a matrix leads to, and the (4, 4) matrix."""
 
 
-def read_surface(path: AnyPath) -> TriangleMesh:
+def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
     """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY, OBJ or OFF file, in the order of corners of the file.
 
     Coordinates of GIFTI and FreeSurfer files are transformed to scanner space if the file defines how. InputError for
-    missing, truncated or empty files, NaN or infinite coordinates, faces with missing vertices, and coordinates of
-    another space than the subject's.
+    missing, truncated or empty files, NaN or infinite coordinates, faces with missing vertices, coordinates of another
+    space than the subject's, and where `side` is "left" or "right" and the file names the other hemisphere.
     """
-    return surface_space_structure(path)[0]
+    mesh, _, structure = surface_space_structure(path)
+    require_side(path, structure, side)
+    return mesh
 
 
 def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, str | None]:
     """Return a surface as `read_surface` does, the space of its coordinates and its structure.
 
     Both are None if the file has none. The space is a NIfTI transform code's name, such as
-    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft".
+    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft", from the file's content or its name.
     """
     path = Path(path)
     found = format_of(path, "surface")
@@ -69,33 +74,41 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
         indices = f"indices {faces.min():.6g} to {faces.max():.6g}"
         expected = f"whole numbers from 0 to {len(vertices) - 1}"
         raise InputError("has faces that name vertices which do not exist", path=path, found=indices, expected=expected)
-    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space, structure
+    return TriangleMesh(vertices, np.rint(faces).astype(np.int64)), space, structure or structure_in_name(path)
+
+
+def structure_in_name(path: AnyPath) -> str | None:
+    """Return the structure of the hemisphere that a file's name has, such as `lh.pial` or `sub-01_hemi-R_dseg.gii`."""
+    side = side_in_name(Path(path).name)
+    return STRUCTURES[side] if side else None
+
+
+def require_side(path: AnyPath, structure: str | None, side: str | None) -> None:
+    """Raise InputError if a file's structure is the other hemisphere than `side`, "left" or "right"."""
+    expected = next((name for key, name in STRUCTURES.items() if key == side), None)
+    if expected and structure in STRUCTURES.values() and structure != expected:
+        remedy = "Swap left and right, or correct the file's own side (AnatomicalStructurePrimary, or its name)."
+        raise InputError("is the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
     """Return the surfaces of two hemispheres, and whether both files name one and the same coordinate system.
 
-    InputError as for `read_surface`, and where a file names the other hemisphere as its structure.
+    InputError as for `read_surface`. Warns if only one file names its space, or both name different ones.
     """
-    (left_mesh, left_space), (right_mesh, right_space) = _read_side(left, "left"), _read_side(right, "right")
-    return left_mesh, right_mesh, left_space is not None and left_space == right_space
+    read = [surface_space_structure(path) for path in (left, right)]
+    for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
+        require_side(path, structure, side)
+    meshes, spaces, _ = zip(*read, strict=True)
+    if spaces[0] != spaces[1]:
+        words = " and ".join(f"{path} {space or 'no space'}" for path, space in zip((left, right), spaces, strict=True))
+        log.warning("the files of the hemispheres name different spaces: %s; are they in the same coordinates?", words)
+    return meshes[0], meshes[1], spaces[0] is not None and spaces[0] == spaces[1]
 
 
-def read_one_hemisphere(path: AnyPath, side: Side) -> TriangleMesh:
-    """Return the surface of a hemisphere; InputError as for `read_surface`, and where its file names the other one."""
-    return _read_side(path, side)[0]
-
-
-def _read_side(path: AnyPath, side: Side) -> tuple[TriangleMesh, str | None]:
-    mesh, space, structure = surface_space_structure(path)
-    expected = STRUCTURES[side]
-    if structure in STRUCTURES.values() and structure != expected:
-        remedy = "Swap `left` and `right`, or correct the file's own side (AnatomicalStructurePrimary, lh or rh)."
-        raise InputError("is the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
-    return mesh, space
-
-
-def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None) -> None:
+def write_surface(
+    path: AnyPath, mesh: TriangleMesh, structure: Structure | None = None, layer: Layer | None = None
+) -> None:
     """Write a surface as GIFTI (float32, int32, RAS+ mm), STL (binary) or PLY, by the suffix of `path`."""
     suffix = Path(path).suffix.lower()
     if suffix in (".stl", ".ply", ".obj", ".off"):
@@ -111,7 +124,7 @@ def write_surface(path: AnyPath, mesh: TriangleMesh, structure: Structure | None
         mesh.vertices.astype(np.float32),
         intent="NIFTI_INTENT_POINTSET",
         coordsys=GiftiCoordSystem("NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_SCANNER_ANAT", np.eye(4)),
-        meta=GiftiMetaData({"GeometricType": "Anatomical"} | _named(structure)),
+        meta=GiftiMetaData({"GeometricType": "Anatomical"} | _named(structure, layer)),
     )
     triangles = GiftiDataArray(
         mesh.faces.astype(np.int32),
@@ -131,7 +144,7 @@ def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, righ
     sides: dict[Side, TriangleMesh | None] = {"left": left, "right": right}
     for side, mesh in sides.items():
         if mesh is not None:
-            write_surface(files[side], mesh, STRUCTURES[side])
+            write_surface(files[side], mesh, STRUCTURES[side], "Pial")
     if stl := files.get("stl"):
         write_surface(stl, whole)
 
@@ -146,8 +159,9 @@ def write_vertex_maps(path: AnyPath, maps: dict[str, NDArray], structure: Struct
         nib.save(GiftiImage(darrays=arrays, meta=GiftiMetaData(_named(structure))), temporary)
 
 
-def _named(structure: Structure | None) -> dict[str, str]:
-    return {"AnatomicalStructurePrimary": structure} if structure else {}
+def _named(structure: Structure | None, layer: Layer | None = None) -> dict[str, str]:
+    names = {"AnatomicalStructurePrimary": structure, "AnatomicalStructureSecondary": layer}
+    return {key: name for key, name in names.items() if name}
 
 
 def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
@@ -156,23 +170,27 @@ def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
     return {array.meta.get("Name") or f"map {n}": np.asarray(array.data, dtype=float) for n, array in arrays}
 
 
-def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh, Floats]:
+def read_surface_map(path: AnyPath, surface_path: AnyPath, side: str | None = None) -> tuple[TriangleMesh, Floats]:
     """Return a surface and the values of a GIFTI shape or func file at its vertices.
 
     InputError for missing or truncated files, more than one array, another number of values than of vertices, NaN and
-    infinite values, and STL surfaces, which have no order of vertices.
+    infinite values, STL surfaces, which have no order of vertices, and where map and surface name different hemispheres
+    or another one than `side`.
     """
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
         expected = f"the GIFTI, PLY, OBJ or OFF file that {path} was made on"
         raise InputError(problem, path=surface_path, expected=expected)
-    surface = read_surface(surface_path)
-    arrays = load_gifti(path).darrays
+    surface, _, structure = surface_space_structure(surface_path)
+    image = load_gifti(path)
+    arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.dtype.kind not in "biuf" or arrays[0].data.size != len(arrays[0].data):
         kinds = [f"{intent_codes.niistring[array.intent]} {array.data.shape}" for array in arrays]
         problem, expected = "is not a map of one value per vertex", "one array of numbers (.shape.gii, .func.gii)"
         raise InputError(problem, path=path, found=", ".join(kinds) or "none", expected=expected)
+    require_side(surface_path, structure, side)
+    require_side(path, structure_of(image, path), side or SIDES_BY_STRUCTURE.get(structure or ""))
     values = np.asarray(arrays[0].data, dtype=float).ravel()
     if len(values) != len(surface.vertices):
         expected = f"{len(surface.vertices)}, the number of vertices of {surface_path}"
@@ -182,8 +200,12 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath) -> tuple[TriangleMesh
 
 
 def read_surface_maps(paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]) -> tuple[TriangleMesh, Floats]:
-    """Return surfaces side by side as one and the values of their maps, each read as by `read_surface_map`."""
-    pieces = [read_surface_map(*files) for files in zip(paths, surface_paths, strict=True)]
+    """Return surfaces side by side as one and the values of their maps, each read as by `read_surface_map`.
+
+    Two are those of left and right.
+    """
+    sides = SIDES if len(paths) == 2 else (None,)
+    pieces = [read_surface_map(*files) for files in zip(paths, surface_paths, sides, strict=True)]
     return merged(*(surface for surface, _ in pieces)), np.concatenate([values for _, values in pieces])
 
 
@@ -194,6 +216,12 @@ def load_gifti(path: AnyPath) -> GiftiImage:
     if not isinstance(image, GiftiImage):
         raise InputError("is not a GIFTI file", path=path, found=type(image).__name__, expected="a .gii file")
     return image
+
+
+def structure_of(image: GiftiImage, path: AnyPath) -> str | None:
+    """Return the structure that a GIFTI file names, in its arrays, as a whole or in its name, or None."""
+    named = (meta.get("AnatomicalStructurePrimary") for meta in (*(array.meta for array in image.darrays), image.meta))
+    return next(filter(None, named), None) or structure_in_name(path)
 
 
 def _read_gifti_surface(path: Path) -> RawSurface:
@@ -207,8 +235,7 @@ def _read_gifti_surface(path: Path) -> RawSurface:
     if space is None:
         _warn_of_tkr_ras(points[0].meta, path)
     vertices = np.asarray(points[0].data, dtype=float) @ matrix[:3, :3].T + matrix[:3, 3]
-    structure = points[0].meta.get("AnatomicalStructurePrimary") or image.meta.get("AnatomicalStructurePrimary")
-    return vertices, np.asarray(triangles[0].data), space, structure
+    return vertices, np.asarray(triangles[0].data), space, structure_of(image, path)
 
 
 def _read_with_trimesh(path: Path) -> RawSurface:
@@ -220,14 +247,9 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
 
 
-def _read_with_pyvista(path: Path) -> RawSurface:
-    import pyvista as pv
-
-    data = pv.read(path)
-    # VTK may crash on damaged cells, so these are read without its filters
-    if not isinstance(data, pv.PolyData) or not data.n_points or not data.is_all_triangles:
-        raise InputError("holds no surface", path=path, found=type(data).__name__, expected="triangles (PolyData)")
-    return np.asarray(data.points, dtype=float), np.asarray(data.regular_faces), None, None
+def _read_vtk_surface(path: Path) -> RawSurface:
+    points, faces = read_vtk(path)
+    return np.asarray(points, dtype=float), faces, None, None
 
 
 def read_pose(path: AnyPath) -> Pose:
@@ -257,12 +279,14 @@ UNNAMED = ("", "???", "unknown", "Unknown", "none")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#F0E442")
 
 
-def read_vertex_labels(path: AnyPath) -> tuple[Ints, dict[int, str]]:
+def read_vertex_labels(path: AnyPath, side: str | None = None) -> tuple[Ints, dict[int, str]]:
     """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
 
-    InputError for missing or truncated files, for other than one array, and for non-integer values.
+    InputError for missing or truncated files, for other than one array, for non-integer values, and where `side` is
+    "left" or "right" and the file names the other hemisphere.
     """
     image = load_gifti(path)
+    require_side(path, structure_of(image, path), side)
     arrays = image.darrays
     if len(arrays) != 1 or arrays[0].data.ndim != 1:
         shapes = ", ".join(str(array.data.shape) for array in arrays) or "no arrays"
@@ -368,28 +392,36 @@ def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
         log.warning(text, path, *centre)
 
 
+REAL_RAS = b"\0\0\0\2\0\0\0\1"
+"""FreeSurfer's tag, behind the faces, of a surface in scanner coordinates."""
+
+
 def _read_freesurfer_surface(path: Path) -> RawSurface:
     """Return vertices (mm) and faces of a FreeSurfer file such as lh.pial, their space and structure.
 
-    Its coordinates are relative to the centre of a volume (tkr RAS). They are transformed to scanner space by the
-    volume's geometry at the end of the file; without it they stay relative to that centre, with a warning.
+    Its coordinates are relative to the centre of a volume (tkr RAS), unless it is marked as in scanner space. They are
+    transformed to scanner space by the volume's geometry at the end of the file; without it they stay relative to that
+    centre, with a warning.
     """
-    structure = FREESURFER_SIDES.get(path.name.split(".")[0])
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
         vertices, faces, info = read_geometry(str(path), read_metadata=True)
+    # two lines, the numbers of vertices and faces, and these
+    start = re.match(rb"[^\n]*\n[^\n]*\n", content := path.read_bytes())
+    if start and content.startswith(REAL_RAS, start.end() + 8 + 12 * (len(vertices) + len(faces))):
+        return np.asarray(vertices, dtype=float), faces, SCANNER, None
     if not str(info.get("valid", "")).startswith("1") or not {"xras", "yras", "zras", "cras"} <= set(info):
         log.warning("%s: has no volume geometry: its coordinates are relative to the volume's centre (tkr RAS)", path)
-        return np.asarray(vertices, dtype=float), faces, None, structure
+        return np.asarray(vertices, dtype=float), faces, None, None
     axes = np.column_stack([info["xras"], info["yras"], info["zras"]]).astype(float)
     # tkr RAS has the axes of a coronal volume, with columns to the left, rows down, slices forward
     rotation = axes @ np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER, structure
+    return np.asarray(vertices @ rotation.T + info["cras"], dtype=float), faces, SCANNER, None
 
 
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "GIFTI": _read_gifti_surface,
-    "VTK": _read_with_pyvista,
+    "VTK": _read_vtk_surface,
     "STL": _read_with_trimesh,
     "PLY": _read_with_trimesh,
     "OBJ": _read_with_trimesh,

@@ -35,6 +35,8 @@ WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform
 MAX_LABEL_ERROR = 0.05
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
+GOOD_RAS_OFFSET = 28
+"""Where MGH's header says whether its directions are valid, in bytes."""
 MAX_COMPRESSION = 1100
 """How many times shorter gzip makes a file at most (1032 times), with some room."""
 
@@ -101,18 +103,27 @@ def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[N
     return values[tuple(box)], moved
 
 
-def voxels_of(path: AnyPath) -> tuple[int, float]:
-    """Return the number of voxels of a volume and the volume of one in mm³, from its header alone."""
-    image = _load(path)
-    unit = _length_unit(image.header, path) if isinstance(image, nib.Nifti1Pair) else "mm"
+class VolumeHeader(NamedTuple):
+    """The numbers of voxels along three axes, their sizes in mm, the unit of length ("unknown": mm) and the space.
+
+    The space is the name of a NIfTI code, such as "scanner" or "mni"; MGH has mm and scanner space always.
+    """
+
+    shape: tuple[int, ...]
+    voxel_mm: tuple[float, ...]
+    unit: str
+    space: str
+
+
+def read_header(path: AnyPath) -> VolumeHeader:
+    """Return what the header of a volume says, without reading its values; InputError where it cannot be read."""
+    image, unit, space = _load(path), "mm", "scanner"
+    if isinstance(image, nib.Nifti1Pair):
+        unit = _length_unit(image.header, path)
+        names = [image.header.get_value_label(f"{name}_code") for name in ("sform", "qform")]
+        space = next((name for name in names if name != "unknown"), "unknown")
     size = MM_PER_NIFTI_UNIT[unit] * np.array(image.header.get_zooms()[:3], dtype=float)
-    return math.prod(map(int, image.shape[:3])), float(size.prod())
-
-
-def names_unit(path: AnyPath) -> bool:
-    """Return whether a volume's header names its unit of length; MGH has mm always."""
-    image = _load(path)
-    return not isinstance(image, nib.Nifti1Pair) or _length_unit(image.header, path) != "unknown"
+    return VolumeHeader(tuple(map(int, image.shape[:3])), tuple(map(float, size)), unit, space)
 
 
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
@@ -215,7 +226,18 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Fl
     if isinstance(image, nib.AnalyzeImage):
         problem = "is in the Analyze format, which holds no orientation, so left and right are unknown"
         raise InputError(problem, path=path, expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)")
+    if isinstance(image, nib.MGHImage) and not _has_directions(path):
+        problem = "has no valid directions (goodRASFlag), so left and right are unknown"
+        remedy = "Set them with mri_convert, for example --in_orientation, or give the volume as NIfTI."
+        raise InputError(problem, path=path, found=0, expected=1, remedy=remedy)
     return image.affine
+
+
+def _has_directions(path: AnyPath) -> bool:
+    # nibabel takes FreeSurfer's usual ones where they are not valid, and sets the flag
+    opener: Any = gzip.open if str(path).lower().endswith(GZIP_SUFFIXES) else open
+    with opener(path, "rb") as file:
+        return int.from_bytes(file.read(GOOD_RAS_OFFSET + 2)[GOOD_RAS_OFFSET:], "big") == 1
 
 
 def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> Floats:

@@ -1,5 +1,6 @@
 """YAML files: configurations, read strictly, the parameters of a run, and the label schemes of the folder `schemes`."""
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,10 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
             raise yaml.constructor.ConstructorError(None, None, "keys must be scalars", key.start_mark)
+        kind = key.tag.rpartition(":")[2]
+        if kind in ("bool", "null") or (kind == "int" and not re.fullmatch(r"-?(0|[1-9]\d*)", key.value)):
+            problem = f"the key {key.value} is another value to YAML; write it in quotes"
+            raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
         if key.value in first and key.tag != "tag:yaml.org,2002:merge":
             problem = f"duplicate key {key.value!r} (first on line {first[key.value]})"
             raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)

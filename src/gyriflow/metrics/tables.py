@@ -35,6 +35,16 @@ def wide_names(table: pd.DataFrame) -> list[str]:
     return ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
 
 
+def described_columns(table: pd.DataFrame) -> dict[str, tuple[str, str]]:
+    """Return what each of the `wide_names` of a table as of `long_table` means, and its unit."""
+    rows = table[["hemisphere", "region", "metric", "unit"]].fillna("").itertuples(index=False, name=None)
+    columns = {}
+    for name, (hemisphere, region, metric, unit) in zip(wide_names(table), rows, strict=True):
+        place = f"{hemisphere} hemisphere" if hemisphere in SIDES else "both hemispheres"
+        columns[name] = f"{METRICS[metric].label}, {f'region {region}, ' if region else ''}{place}", unit
+    return columns
+
+
 def wide_table(table: pd.DataFrame, covariates: Mapping[str, Mapping[str, str]]) -> pd.DataFrame:
     """Return a table as of `long_table` with a row per brain, run and week, and the columns of `wide_names`.
 

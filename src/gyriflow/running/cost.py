@@ -1,12 +1,12 @@
 """Predict time, memory and disk space of simulations, within a factor of two."""
 
-from math import ceil
+from math import ceil, prod
 from typing import NamedTuple
 
 from ..anatomy.plausible import expected_volume_ml
 from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
-from ..io.volumes import voxels_of
+from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
 from ..study.records import Brain, Simulation
 from ..units import ML_PER_MM3, SECONDS_PER_GW
@@ -72,8 +72,9 @@ def surface_memory_mib(labels: str, week: float) -> int:
     A file that does not exist yet is assumed to be of usual size.
     """
     try:
-        voxels, voxel_mm3 = voxels_of(labels)
+        header = read_header(labels)
     except InputError:
         return MIN_SURFACE_MIB
+    voxels, voxel_mm3 = prod(header.shape), prod(header.voxel_mm)
     inside = min(voxels, expected_volume_ml(week) / (voxel_mm3 * ML_PER_MM3))
     return max(MIN_SURFACE_MIB, ceil((16 * voxels + 800 * inside) / 2**20))

@@ -163,6 +163,9 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
         text = unknown_key(kind, path)
     elif details["type"] not in (PROBLEM, "missing"):
         text += f"; found {details['input']!r}"
+    # YAML reads 021 as the number 17
+    if details["type"] == "string_type" and isinstance(details["input"], int | float):
+        text += "; write it in quotes"
     return path, text
 
 

@@ -119,6 +119,12 @@ def curve_at(value: float | Varying, week: float) -> float:
     return float(np.interp(week, list(curve), list(curve.values()))) if curve else 1.0
 
 
+def mean_of_curve(value: float | Varying) -> float:
+    """Return the mean of a parameter's curve over its weeks, 1 without a curve: about what its map is multiplied by."""
+    curve = weeks_of(value)
+    return float(np.mean([*curve.values()])) if curve else 1.0
+
+
 def value_at(value: float | Varying, week: float, maps: Maps) -> float | NDArray[np.float64]:
     """Return a parameter's value at a week: a number, or (n,) values if it has a map."""
     name = map_of(value)

@@ -194,7 +194,7 @@ def _norms_problems(path: str, expected: Mapping[str, Any]) -> Iterator[str]:
         yield str(error)
         return
     found = content.get("made_with") if isinstance(content, dict) else None
-    if not isinstance(found, dict) or not isinstance(content.get("norms"), list):
+    if not isinstance(found, dict) or not isinstance(content.get("norms"), list) or not content["norms"]:
         yield f"{path}: expected the results/study/norms.json of a study"
         return
     for name, value in expected.items():

@@ -18,6 +18,7 @@ from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import smallest_gap
 from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.pial import from_hemispheres
+from gyriflow.anatomy.plausible import facing_warnings
 from gyriflow.anatomy.pose import (
     hemisphere_by_shape,
     hemisphere_warnings,
@@ -91,7 +92,12 @@ def test_axes_of_the_file_are_kept(halves, frame, axes):
 
 def test_files_that_name_one_system_stay_together_however_they_lie(halves):
     lower = transformed(halves[0], motion(shift=[0.0, 0.0, -9.0]))
-    assert not pose_of_pair(lower, halves[1]).together
+    apart = pose_of_pair(lower, halves[1])
+    assert not apart.together
+    (warning,) = apart.warnings
+    assert 8.0 < float(re.search(r"([\d.]+) mm", warning)[1]) < 10.0
+    assert facing_warnings(lower, halves[1], np.array([1.0, 0.0, 0.0])) == [Facts("9.0 mm")]
+    assert facing_warnings(*halves, np.array([1.0, 0.0, 0.0])) == []
     pose = pose_of_pair(lower, halves[1], declared=True)
     assert pose.together
     np.testing.assert_array_equal(pose.of_file("left"), np.eye(4))

@@ -8,6 +8,7 @@ import nibabel as nib
 import numpy as np
 import pytest
 import yaml
+from atlas_brains import atlas_halves
 from configurations import LABELLED
 from facts import Facts
 from shapes import hemisphere
@@ -15,8 +16,10 @@ from shapes import hemisphere
 from gyriflow.cli import check as checking
 from gyriflow.cli.check import check_study, coarse_cortices, input_problems, plan, work_of
 from gyriflow.errors import InputError
+from gyriflow.geometry.alignment import MIRROR
+from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.io.files import write_json
-from gyriflow.io.surfaces import write_surface
+from gyriflow.io.surfaces import write_surface, write_vertex_labels, write_vertex_maps
 from gyriflow.io.volumes import LabelVolume, write_label_volume
 from gyriflow.running.cost import (
     ERROR_FACTOR,
@@ -61,6 +64,91 @@ def test_the_surface_of_one_hemisphere_is_of_its_side(tmp_path):
     assert problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "right"}) == []
     found = problems(tmp_path, hemisphere={"file": "r.surf.gii", "side": "left"})
     assert found == [Facts(tmp_path / "r.surf.gii", "CortexRight", "CortexLeft")]
+
+
+def checked(folder, monkeypatch, **keys):
+    """Return the lines of check on a configuration of a pair of hemispheres of 23 GW, and those that are problems."""
+    monkeypatch.setattr(checking, "work_of", lambda *_: iter(()))
+    for side, sign in (("left", -1), ("right", 1)):
+        if not (folder / f"{side}.surf.gii").exists():
+            write_surface(folder / f"{side}.surf.gii", hemisphere(sign), f"Cortex{side.title()}")
+    pair = {side: f"{side}.surf.gii" for side in ("left", "right")}
+    brain = {"id": "sub-1", "week": 23, "hemispheres": pair, "coordinates": "ras"} | keys.pop("brain", {})
+    config = {"brains": [brain], "start": "sub-1", "folding": {"end_week": 25} | keys.pop("folding", {}), **keys}
+    (folder / "study.yaml").write_text(yaml.safe_dump(config))
+    lines = list(check_study(folder / "study.yaml", folder, 1))
+    return [line for line, _ in lines], [line for line, bad in lines if bad]
+
+
+def test_every_file_is_told_with_its_size_side_and_number_of_vertices(tmp_path, monkeypatch):
+    count = len(hemisphere(1).vertices)
+    write_vertex_maps(tmp_path / "thick.shape.gii", {"t": np.full(count, 2.5)}, "CortexLeft")
+    mapped = {"map": ["thick.shape.gii", "right.shape.gii"], "surface": ["left.surf.gii", "right.surf.gii"]}
+    write_vertex_maps(tmp_path / "right.shape.gii", {"t": np.full(count, 1.5)}, "CortexRight")
+    write_label_volume(tmp_path / "regions.nii.gz", LabelVolume(np.ones((4, 5, 6), np.int32), np.diag([2, 1, 0.5, 1])))
+    regions = {"sub-1": {"volume": "regions.nii.gz", "names": {1: "a"}}}
+    lines, bad = checked(tmp_path, monkeypatch, folding={"thickness_mm": mapped}, metrics={"regions": regions})
+    assert bad == []
+    assert Facts("left.surf.gii", count, "mm", "left", "scanner_anat") in lines
+    assert Facts("thick.shape.gii", count, 2.5, "left") in lines
+    assert Facts("regions.nii.gz", "4 x 5 x 6", "2 x 1 x 0.5 mm") in lines
+
+
+@pytest.mark.parametrize(
+    ("metres", "facts"), [(1e-3, [0.0025, "metres"]), (1e3, [2500, "micrometres"]), (0.0, ["thickness"])]
+)
+def test_a_thickness_map_in_another_unit_is_refused(tmp_path, monkeypatch, metres, facts):
+    count = len(hemisphere(1).vertices)
+    write_vertex_maps(tmp_path / "thick.shape.gii", {"t": np.full(count, 2.5 * metres)})
+    mapped = {"map": "thick.shape.gii", "surface": "left.surf.gii"}
+    _, bad = checked(tmp_path, monkeypatch, folding={"thickness_mm": mapped})
+    assert bad == [Facts("thickness_mm", tmp_path / "thick.shape.gii", *facts)]
+    # a map that a curve multiplies
+    if metres:
+        curve = {"weeks": {22: 0.5 / metres, 24: 1.5 / metres}}
+        assert checked(tmp_path, monkeypatch, folding={"thickness_mm": mapped | curve})[1] == []
+
+
+def test_files_of_regions_and_white_surfaces_are_opened(tmp_path, monkeypatch):
+    count = len(hemisphere(1).vertices)
+    for side, structure, number in (("l", "CortexLeft", count), ("r", "CortexRight", count - 1)):
+        write_vertex_labels(tmp_path / f"{side}.label.gii", np.ones(number, int), {1: "a"}, structure)
+    given = {side: {"labels": f"{side[0]}.label.gii", "surface": f"{side}.surf.gii"} for side in ("left", "right")}
+    _, bad = checked(tmp_path, monkeypatch, metrics={"regions": {"sub-1": given}})
+    assert bad == [Facts("regions of sub-1", tmp_path / "r.label.gii", count, count - 1)]
+    given["left"]["labels"] = "r.label.gii"
+    _, bad = checked(tmp_path, monkeypatch, metrics={"regions": {"sub-1": given}})
+    assert bad == [Facts("r.label.gii", "CortexRight", "CortexLeft")]
+    (tmp_path / "white.surf.gii").write_text("torn")
+    _, bad = checked(tmp_path, monkeypatch, brain={"white": ["white.surf.gii", "white.surf.gii"]})
+    assert bad == [Facts("brain sub-1", tmp_path / "white.surf.gii")]
+
+
+@pytest.mark.parametrize("scale", [1e-3, 10.0])
+def test_surfaces_in_other_units_are_refused_before_a_run(tmp_path, monkeypatch, scale):
+    for side, sign in (("left", -1), ("right", 1)):
+        mesh = hemisphere(sign)
+        write_surface(tmp_path / f"{side}.surf.gii", TriangleMesh(mesh.vertices * scale, mesh.faces))
+    _, bad = checked(tmp_path, monkeypatch)
+    assert bad == [Facts("brain sub-1", "metres" if scale < 1 else 23)]
+
+
+def test_mirrored_hemispheres_are_refused_before_a_run(tmp_path, monkeypatch):
+    for side, half in zip(("left", "right"), atlas_halves(), strict=True):
+        write_surface(tmp_path / f"{side}.surf.gii", transformed(half, MIRROR))
+    _, bad = checked(tmp_path, monkeypatch, brain={"week": 24})
+    assert bad == [Facts("brain sub-1", "Swap `left` and `right`")]
+    _, bad = checked(tmp_path, monkeypatch, brain={"week": 24, "coordinates": "auto"})
+    assert bad == [Facts("brain sub-1", "swapped")]
+
+
+def test_files_named_as_of_another_subject_or_space_are_told(tmp_path, monkeypatch):
+    name = "sub-2_space-MNI152_hemi-L_pial.surf.gii"
+    write_surface(tmp_path / name, hemisphere(-1))
+    lines, bad = checked(tmp_path, monkeypatch, brain={"hemispheres": {"left": name, "right": "right.surf.gii"}})
+    assert bad == []
+    doubts = [line for line in lines if "warning: brain" in line and name in line]
+    assert doubts == [Facts(name, "sub-2"), Facts(name, "MNI152")]
 
 
 @pytest.mark.parametrize(("mm", "doubts"), [(1.0, [(Facts("%", 38), False)]), (1.7, [])])

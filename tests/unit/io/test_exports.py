@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 
+import nibabel as nib
 import numpy as np
 import pandas as pd
 import pytest
@@ -52,7 +53,7 @@ def brain(tmp_path):
 def test_bids_derivatives(tmp_path, brain):
     folder = tmp_path / "bids"
     simulated = replace(brain, run="run-a", week=24.0)
-    export_bids(folder, [brain, simulated], TABLES, "1.2.3", {"area": "cm2"})
+    export_bids(folder, [brain, simulated], TABLES, "1.2.3", {"area": ("pial area, both hemispheres", "cm2")})
     described = read_json(folder / "dataset_description.json")
     assert described["DatasetType"] == "derivative"
     assert described["GeneratedBy"][0]["Version"] == "1.2.3"
@@ -64,15 +65,18 @@ def test_bids_derivatives(tmp_path, brain):
     # in the world of the volumes
     turned = hemisphere(1).vertices @ POSE[:3, :3].T + POSE[:3, 3]
     write_surface(brain.surfaces["right"], replace(hemisphere(1), vertices=turned))
-    export_bids(folder, [brain], TABLES, "1.2.3", {})
+    export_bids(folder, [brain], TABLES, "1.2.3", {"area": ("pial area, both hemispheres", "cm2")})
     np.testing.assert_allclose(
         read_surface(place / "sub-case1_hemi-R_pial.surf.gii").vertices, hemisphere(1).vertices, atol=1e-5
     )
     depth = read_vertex_maps(place / "sub-case1_hemi-L_sulc.shape.gii")
-    assert list(depth) == ["sulcal_depth_mm"]
-    np.testing.assert_allclose(depth["sulcal_depth_mm"][:3], [0, 1 / 7, 2 / 7], rtol=1e-6)
+    assert list(depth) == ["sulc"]
+    np.testing.assert_allclose(depth["sulc"][:3], [0, -1 / 7, -2 / 7], rtol=1e-6)
+    wide = read_json(folder / "metrics_wide.json")
+    assert wide["area"] == {"Description": "pial area, both hemispheres", "Units": "cm^2"}
+    assert set(wide) == {"brain", "run", "week", "area", "depth"}
     assert read_json(folder / "sulc.json")["Units"] == "mm"
-    write_vertex_maps(brain.maps["left"], {"unheard_of": depth["sulcal_depth_mm"]})
+    write_vertex_maps(brain.maps["left"], {"unheard_of": depth["sulc"]})
     with pytest.raises(KeyError, match="unheard_of"):
         export_bids(folder, [brain], TABLES, "1.2.3", {})
     _, regions = read_vertex_labels(place / "sub-case1_hemi-L_desc-regions_dseg.label.gii")
@@ -80,6 +84,31 @@ def test_bids_derivatives(tmp_path, brain):
     wide = (folder / "metrics_wide.tsv").read_text()
     assert wide == "participant_id\tsession_id\tbrain\tarea\tdepth\nsub-case1\tn/a\tcase_1\t3.5\tn/a\n"
     assert (folder / "descriptions.tsv").read_text().splitlines()[1] == Facts("desc-runagw2400\t", "run-a", 24)
+
+
+# as the HCP and smriprep's inverted maps have them: larger on gyri, thickness positive, lengths in mm
+OTHER_TOOLS = {"curv": (1, "1/mm"), "sulc": (1, "mm"), "thickness": (1, "mm"), "shapeIndex": (1, "arbitrary")}
+
+
+def test_maps_under_names_of_other_tools_have_their_signs_and_units(tmp_path, brain):
+    on_gyri = np.where(np.arange(len(hemisphere(-1).vertices)) % 3 == 0, 1.0, -1.0)
+    ours = {"mean_curvature": 0.3 * on_gyri, "sulcal_depth_mm": 4 - 4 * on_gyri, "thickness_mm": 2 + 0.5 * on_gyri}
+    for path in brain.maps.values():
+        write_vertex_maps(path, ours | {"shape_index": 0.5 * on_gyri})
+    white = replace(brain, white=brain.surfaces, white_maps=brain.maps)
+    export_bids(tmp_path / "bids", [white], {}, "1", {})
+    for name, (sign, unit) in OTHER_TOOLS.items():
+        described = read_json(tmp_path / "bids" / f"{name}.json")
+        assert described["Units"] == unit
+        for side, structure in (("L", "CortexLeft"), ("R", "CortexRight")):
+            path = tmp_path / "bids" / "sub-case1" / "anat" / f"sub-case1_hemi-{side}_{name}.shape.gii"
+            (values,) = read_vertex_maps(path).values()
+            assert (np.sign(values - values.mean()) == sign * on_gyri).all()
+            assert nib.load(path).meta["AnatomicalStructurePrimary"] == structure
+        assert name == "thickness" or any(word in described["Description"] for word in ("gyri", "sulci"))
+    for layer, secondary in (("pial", "Pial"), ("white", "GrayWhite")):
+        points, _ = nib.load(tmp_path / "bids/sub-case1/anat" / f"sub-case1_hemi-L_{layer}.surf.gii").darrays
+        assert points.meta["AnatomicalStructureSecondary"] == secondary
 
 
 def scans_of_two(brain):
@@ -115,7 +144,7 @@ def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
 
 def test_subjects_are_handed_over_beside_others(tmp_path, brain):
     exported, folder, source = (tmp_path / name for name in ("exported", "out", "source"))
-    export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {"area": "cm2"})
+    export_bids(exported, scans_of_two(brain), TABLES_OF_TWO, "1", {"area": ("pial area", "cm2")})
     page = tmp_path / "brains" / "sub-01_ses-1" / "figures" / "quality.png"
     page.parent.mkdir(parents=True)
     page.touch()
@@ -179,7 +208,7 @@ def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
     place = tmp_path / "bids" / "sub-case1" / "anat"
     found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
     np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
-    assert list(read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")) == ["sulcal_depth_mm"]
+    assert list(read_vertex_maps(place / "sub-case1_hemi-L_desc-white_sulc.shape.gii")) == ["sulc"]
     assert "desc-white" in (tmp_path / "bids" / "descriptions.tsv").read_text()
 
 
@@ -189,7 +218,7 @@ def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
     scans = [replace(one, template="sub-01_ses-1", template_maps={"left": path}) for one in scans_of_two(brain)]
     export_bids(folder, [*scans, replace(scans[1], run="a", week=25.0)], {}, "1", {})
     place = folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_space-sub01ses1_den-5_sulc.shape.gii"
-    assert read_vertex_maps(place)["sulcal_depth_mm"] == pytest.approx(np.arange(5))
+    assert read_vertex_maps(place)["sulc"] == pytest.approx(-np.arange(5))
     assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
     assert read_json(folder / "space-sub01ses1_sulc.json") == {
         **{"Description": read_json(folder / "sulc.json")["Description"], "Units": "mm"},
@@ -218,7 +247,7 @@ def test_the_bids_validator_finds_no_error(tmp_path, brain):
     more = {"white": brain.surfaces, "white_maps": brain.maps, "template": "sub-01_ses-1", "template_maps": brain.maps}
     scans = [replace(one, **more) for one in scans_of_two(brain)]
     simulated = replace(scans[0], white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path))
-    export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": "cm2"})
+    export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": ("pial area", "cm2")})
     done = ran(VALIDATOR, folder, "--format", "json")
     found = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in found if issue["severity"] == "error"] == []

@@ -6,6 +6,7 @@ import os
 
 import nibabel as nib
 import numpy as np
+import pandas as pd
 import pytest
 from configurations import refusal
 from facts import Facts
@@ -13,7 +14,16 @@ from shapes import sphere
 
 from gyriflow.errors import InputError, StorageError
 from gyriflow.io import files
-from gyriflow.io.files import atomic_write, contents, files_below, read_json, read_text_table, write_json
+from gyriflow.io.files import (
+    atomic_write,
+    contents,
+    files_below,
+    read_json,
+    read_table,
+    read_text_table,
+    write_json,
+    write_table,
+)
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import read_keys, read_yaml, write_yaml
@@ -82,6 +92,74 @@ def test_cells_stay_below_their_heading(tmp_path, rows):
     path = tmp_path / "participants.tsv"
     path.write_text("\n".join(("id\tage\tfile", *rows)) + "\n")
     assert read_text_table(path) == [{"id": "s1", "age": "24", "file": "a"}, {"id": "s2", "age": "25", "file": "b"}]
+
+
+ROWS = [{"id": "s1", "age": "24,5"}, {"id": "s2", "age": "25"}]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"sep=;\nid;age\ns1;24,5\ns2;25\n",
+        b"sep=;\r\nid;age\r\ns1;24,5\r\ns2;25\r\n",
+        "id\tage\ns1\t24,5\ns2\t25\n".encode("utf-16"),
+        b"\xfe\xff" + "id\tage\r\ns1\t24,5\r\ns2\t25\r\n".encode("utf-16-be"),
+        b'id,age\ns1,"24,5"\ns2,25\n',
+    ],
+)
+def test_tables_as_excel_saves_them_are_read(tmp_path, content):
+    (tmp_path / "participants.csv").write_bytes(content)
+    assert read_text_table(tmp_path / "participants.csv") == ROWS
+
+
+@pytest.mark.parametrize("start", [b"PK\x03\x04", b"\xd0\xcf\x11\xe0"])
+def test_a_workbook_of_excel_is_named_with_what_to_do(tmp_path, start):
+    (tmp_path / "participants.tsv").write_bytes(start + b"\x84\0\xff")
+    with pytest.raises(InputError, check=Facts("participants.tsv:", "Excel", ".tsv")):
+        read_text_table(tmp_path / "participants.tsv")
+
+
+NAMES = ("021", "7", "1e5", "NA", "None", "true", "1.0", "2024-01-01", "-", "nan", "1_000", "a")
+
+
+def test_names_that_look_like_numbers_or_nothing_stay_texts(tmp_path):
+    for column in ("subject", "run", "region", "real", "start", "series", "page", "population"):
+        table = pd.DataFrame({column: NAMES, "week": np.arange(12) / 4, "explained": [True, False] * 6})
+        write_table(tmp_path / "a.csv", table.assign(value=np.nan, unit=""))
+        back = read_table(tmp_path / "a.csv")
+        assert tuple(back[column]) == NAMES
+        assert back["explained"].tolist() == [True, False] * 6
+        assert back["week"].tolist() == table["week"].tolist()
+        assert back[["value", "unit"]].isna().all(axis=None)
+        # all of one kind, too
+        for name in NAMES:
+            write_table(tmp_path / "a.csv", pd.DataFrame({column: [name] * 2, "week": [21.0, 22.5]}))
+            assert read_table(tmp_path / "a.csv")[column].tolist() == [name] * 2
+
+
+def test_folders_that_may_not_be_read_are_among_the_files(tmp_path, monkeypatch):
+    for name in ("sub-01", "sub-02"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.nii").touch()
+    scan = os.scandir
+
+    def refused(path):
+        if str(path).endswith("sub-02"):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    assert files_below(tmp_path) == [tmp_path / "sub-01" / "a.nii", tmp_path / "sub-02"]
+    assert files_below(tmp_path / "lost") == []
+
+
+@pytest.mark.parametrize("key", ["021", "true", "no", "~", "0x1F", "1_000"])
+def test_keys_that_yaml_reads_as_something_else_are_refused(tmp_path, key):
+    (tmp_path / "a.yaml").write_text(f"runs:\n  {key}: {{}}\n")
+    with pytest.raises(InputError, check=Facts(tmp_path / "a.yaml", "line 2", key)):
+        read_keys(tmp_path / "a.yaml")
+    (tmp_path / "a.yaml").write_text(f'runs:\n  "{key}": {{}}\n  1: {{}}\n  21.50: {{}}\n')
+    assert list(read_keys(tmp_path / "a.yaml")["runs"]) == [key, 1, 21.5]
 
 
 def test_contents_are_read_again_only_where_size_or_times_changed(tmp_path, monkeypatch):

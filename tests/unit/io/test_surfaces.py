@@ -14,7 +14,6 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import is_closed, signed_volume
 from gyriflow.io.surfaces import (
     read_hemispheres,
-    read_one_hemisphere,
     read_surface,
     read_surface_map,
     read_surface_maps,
@@ -153,15 +152,94 @@ def test_a_file_of_the_other_hemisphere_is_refused(tmp_path, ball, caplog):
     write_surface(tmp_path / "a.surf.gii", ball, "CortexRight")
     write_geometry(tmp_path / "rh.pial", ball.vertices, ball.faces, volume_info=volume())
     for name in ("a.surf.gii", "rh.pial"):
-        assert len(read_one_hemisphere(tmp_path / name, "right").faces) == len(ball.faces)
+        assert len(read_surface(tmp_path / name, "right").faces) == len(ball.faces)
         with pytest.raises(InputError, check=Facts(f"{name}:", "CortexRight", "CortexLeft", "left", "right")):
-            read_one_hemisphere(tmp_path / name, "left")
+            read_surface(tmp_path / name, "left")
     # the matrix of a file is told once
     files = [in_spaces(tmp_path / name, ball, (U, SCANNER, TURN)) for name in ("b.gii", "c.gii")]
     assert read_hemispheres(*files)[2]
     assert caplog.messages == [Facts(file, "NIFTI_XFORM_SCANNER_ANAT") for file in files]
     write_surface(tmp_path / "d.stl", ball)
     assert not read_hemispheres(files[0], tmp_path / "d.stl")[2]
+
+
+@pytest.mark.parametrize("scanner", [True, False])
+def test_a_freesurfer_surface_that_is_marked_as_in_scanner_space_stays_there(tmp_path, ball, caplog, scanner):
+    write_geometry(tmp_path / "lh.pial", ball.vertices, ball.faces, volume_info=volume())
+    content = (tmp_path / "lh.pial").read_bytes()
+    tag = b"\0\0\0\2\0\0\0\0\0\0\0\x14"
+    assert tag in content
+    (tmp_path / "lh.pial").write_bytes(content.replace(tag, b"\0\0\0\2\0\0\0\1\0\0\0\x14") if scanner else content)
+    back, space, _ = surface_space_structure(tmp_path / "lh.pial")
+    assert space == "NIFTI_XFORM_SCANNER_ANAT"
+    assert (np.abs(back.vertices - ball.vertices).max() < 1e-3) == scanner
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize("name", ["sub-01_hemi-R_pial.surf.gii", "rh.pial.stl", "case.R.pial.ply", "right.gii"])
+def test_a_side_in_a_name_counts_where_the_file_has_none(tmp_path, ball, name):
+    write_surface(tmp_path / name, ball)
+    assert len(read_surface(tmp_path / name, "right").faces) == len(ball.faces)
+    with pytest.raises(InputError, check=Facts(f"{name}:", "CortexRight", "CortexLeft")):
+        read_surface(tmp_path / name, "left")
+    write_surface(tmp_path / "right.surf.gii", ball, "CortexLeft")
+    assert read_surface(tmp_path / "right.surf.gii", "left")
+
+
+def test_maps_and_labels_of_the_other_hemisphere_are_refused(tmp_path, ball):
+    for side, structure in (("left", "CortexLeft"), ("right", "CortexRight")):
+        write_surface(tmp_path / f"{side}.surf.gii", ball, structure)
+        write_vertex_maps(tmp_path / f"a{side}.gii", {"x": ball.vertices[:, 0]}, structure)
+        write_vertex_labels(tmp_path / f"{side}.label.gii", np.ones(162, int), {1: "frontal"}, structure)
+    write_surface(tmp_path / "unnamed.ply", ball)
+    left, right, surfaces = tmp_path / "aleft.gii", tmp_path / "aright.gii", [tmp_path / "left.surf.gii"]
+    read_surface_map(left, surfaces[0])
+    read_surface_map(right, tmp_path / "unnamed.ply")
+    facts = Facts("CortexLeft", "CortexRight")
+    with pytest.raises(InputError, check=facts):
+        read_surface_map(right, surfaces[0])
+    with pytest.raises(InputError, check=facts):
+        read_surface_map(right, tmp_path / "unnamed.ply", "left")
+    # two are left and right
+    with pytest.raises(InputError, check=facts):
+        read_surface_maps([right, left], [tmp_path / "right.surf.gii", tmp_path / "left.surf.gii"])
+    assert len(read_vertex_labels(tmp_path / "left.label.gii", "left")[0]) == 162
+    with pytest.raises(InputError, check=facts):
+        read_vertex_labels(tmp_path / "left.label.gii", "right")
+
+
+def test_hemispheres_whose_files_name_different_spaces_are_told(tmp_path, ball, caplog):
+    files = [in_spaces(tmp_path / "a.gii", ball, (U, SCANNER, TURN)), tmp_path / "b.ply"]
+    write_surface(files[1], ball)
+    assert not read_hemispheres(*files)[2]
+    assert caplog.messages[1:] == [Facts(*files, "NIFTI_XFORM_SCANNER_ANAT", "no space")]
+
+
+def legacy(path, ball, order, kind="f4"):
+    """Write a surface as MRtrix does (order "<") or as VTK does (">")."""
+    count, cells = len(ball.faces), np.column_stack([np.full(len(ball.faces), 3), ball.faces]).astype(f"{order}i4")
+    name = {"f4": "float", "f8": "double"}[kind]
+    head = f"# vtk DataFile Version 1.0\nmesh\nBINARY\nDATASET POLYDATA\nPOINTS {len(ball.vertices)} {name}\n"
+    points = ball.vertices.astype(order + kind).tobytes()
+    path.write_bytes(head.encode() + points + f"POLYGONS {count} {4 * count}\n".encode() + cells.tobytes())
+    return path
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_vtk_files_in_either_byte_order_are_read(tmp_path, ball, order, kind):
+    back = read_surface(legacy(tmp_path / "a.vtk", ball, order, kind))
+    assert back.vertices == pytest.approx(ball.vertices, abs=1e-5)
+    assert (back.faces == ball.faces).all()
+
+
+def test_a_file_that_crashes_vtk_is_refused(tmp_path, ball):
+    content = bytearray(legacy(tmp_path / "a.vtk", ball, ">").read_bytes())
+    place = content.index(b"\n", content.index(b"POLYGONS")) + 1
+    content[place : place + 4] = (10**9).to_bytes(4, "big")
+    (tmp_path / "a.vtk").write_bytes(bytes(content))
+    with pytest.raises(InputError, check=Facts("a.vtk:")):
+        read_surface(tmp_path / "a.vtk")
 
 
 @pytest.mark.fault(13)

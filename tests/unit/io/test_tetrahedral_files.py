@@ -14,7 +14,15 @@ from written_frames import element_field
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
-from gyriflow.io.frames import join_frames, read_field, read_positions, read_tets, read_weeks, write_frame
+from gyriflow.io.frames import (
+    join_frames,
+    read_field,
+    read_pial_frames,
+    read_positions,
+    read_tets,
+    read_weeks,
+    write_frame,
+)
 from gyriflow.io.tetmeshes import (
     Regions,
     read_maps,
@@ -99,6 +107,12 @@ def test_frames_are_joined_into_one_time_series(frames):
         read_field(path, 23.0, "w")
     with pytest.raises(InputError, check=Facts(path, "stress", 21)):
         read_field(path, 21.0, "stress")
+    folder = path.parent
+    (folder / "torn.h5").write_bytes(path.read_bytes()[:-1000])
+    for name in ("torn.h5", "lost.h5"):
+        for read in (read_weeks, read_tets, read_pial_frames, lambda path: read_positions(path, 21.0)):
+            with pytest.raises(InputError, check=Facts(folder / name)):
+                read(folder / name)
 
 
 def test_paraview_reads_the_series_with_fields_of_vertices_and_elements(frames):

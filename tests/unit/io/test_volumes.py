@@ -9,7 +9,7 @@ from facts import Facts
 from shapes import rigid, scaling
 
 from gyriflow.errors import InputError
-from gyriflow.io.volumes import LabelVolume, read_label_volume, read_volume_map, write_label_volume
+from gyriflow.io.volumes import LabelVolume, read_header, read_label_volume, read_volume_map, write_label_volume
 from gyriflow.shipped import SHIPPED
 
 AFFINE = np.array([[0.8, 0, 0, -10], [0, 0.9, 0, 5], [0, 0, 1.0, 20], [0, 0, 0, 1.0]])
@@ -182,6 +182,39 @@ def test_what_is_no_volume_of_labels_in_the_world_is_refused(tmp_path, labels, n
         read_label_volume(tmp_path / name)
 
 
+def without_directions(path, labels):
+    nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE.astype(np.float32)), path)
+    content = bytearray(gzip.decompress(path.read_bytes()))
+    content[28:30] = b"\0\0"  # goodRASFlag
+    path.write_bytes(gzip.compress(bytes(content)))
+
+
+def test_a_freesurfer_volume_without_valid_directions_is_refused(tmp_path, labels):
+    without_directions(tmp_path / "aseg.mgz", labels)
+    for read in (read_label_volume, read_volume_map):
+        with pytest.raises(InputError, check=Facts("aseg.mgz:", "goodRASFlag", 0, 1, "mri_convert")):
+            read(tmp_path / "aseg.mgz")
+
+
+FOREIGN = {
+    "a.nrrd": (b"NRRD0004\ntype: uchar\n", ["NRRD", "NIfTI"]),
+    "a.mha": (b"ObjectType = Image\nNDims = 3\n", ["MetaImage", "NIfTI"]),
+    "b.mhd": (b"Comment = x\nObjectType = Image\n", ["MetaImage"]),
+    "a.dcm": (b"\0" * 128 + b"DICM" + b"\0" * 400, ["DICOM", "dcm2niix"]),
+    "a.nii.gz": (b"<!DOCTYPE html>\n<html>", ["web page"]),
+    "packed.nii": (gzip.compress(b"\0" * 500), ["gzip", ".gz"]),
+    "plain.nii.gz": (b"\0" * 344 + b"n+1\0" + b"\0" * 500, ["without compression", ".nii."]),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_of_other_formats_are_named_with_what_to_do(tmp_path, name):
+    content, facts = FOREIGN[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, check=Facts(f"{name}:", *facts)):
+        read_label_volume(tmp_path / name)
+
+
 @pytest.mark.fault(1)
 def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
     values = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
@@ -210,12 +243,30 @@ def test_volumes_of_labels_are_their_voxels_in_ml():
     assert LabelVolume(labels, scaling((2.0, 5.0, 1.0))).volumes_ml == {2: pytest.approx(0.06), 7: pytest.approx(0.3)}
 
 
-def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, labels):
-    path = saved(tmp_path / "a.nii.gz", np.pad(labels, ((20, 30), (10, 0), (0, 40))))
+ANISOTROPIC = np.diag([0.8, 0.6, 1.5, 1.0])
+TURNS = {
+    "diagonal": AFFINE,
+    "turned": rigid(20, -30, 40, shift=(5, -7, 9)) @ ANISOTROPIC,
+    "flipped": rigid(shift=(5, -7, 9)) @ np.diag([-1, -1, 1, 1.0]) @ ANISOTROPIC,
+    "permuted and mirrored": rigid(0, 0, 90) @ np.diag([1, 1, -1, 1.0]) @ ANISOTROPIC,
+}
+
+
+@pytest.mark.parametrize("affine", TURNS.values(), ids=TURNS)
+def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, labels, affine):
+    padding = ((20, 30), (10, 0), (0, 40))
+    path = saved(tmp_path / "a.nii.gz", np.pad(labels, padding), affine)
     whole, volume = read_label_volume(path), read_label_volume(path, cropped=True)
     # a voxel around the labels, but not beyond the volume's own end
     assert volume.labels.shape == (5, 4, 5)
     for label in (7, 2):
         assert position(volume, label) == pytest.approx(position(whole, label))
+    index = np.add((1, 2, 3), (20, 10, 0))
+    assert position(volume, 7) == pytest.approx(affine[:3, :3] @ index + affine[:3, 3], abs=1e-4)
+    assert sum(volume.volumes_ml.values()) == pytest.approx(2e-3 * abs(np.linalg.det(affine[:3, :3])), rel=1e-5)
+    shape, sizes, unit, space = read_header(path)
+    assert shape == (54, 15, 46)
+    assert sizes == pytest.approx(np.linalg.norm(affine[:3, :3], axis=0), rel=1e-5)
+    assert (unit, space) == ("mm", "scanner")
     empty = saved(tmp_path / "b.nii.gz", np.zeros((3, 4, 5), dtype=np.int16))
     assert read_label_volume(empty, cropped=True).labels.shape == (3, 4, 5)

@@ -1,0 +1,197 @@
+"""Open each file that a study names once, say what it holds, and find what a run would refuse minutes later."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..anatomy.plausible import (
+    require_left_and_right,
+    require_plausible_size,
+    require_plausible_thickness,
+    require_single_hemisphere,
+)
+from ..anatomy.pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface
+from ..errors import GyriflowError, InputError
+from ..formats import is_volume
+from ..geometry.poses import CONVENTIONS
+from ..geometry.triangles import TriangleMesh, convex_hull, is_closed, signed_volume, transformed
+from ..io.surfaces import (
+    load_gifti,
+    read_hemispheres,
+    read_surface,
+    read_surface_map,
+    read_vertex_labels,
+    structure_of,
+    surface_space_structure,
+)
+from ..io.volumes import read_header, read_label_volume, read_volume_map
+from ..settings.brains import BrainConfig, GivenRegions
+from ..settings.terms import SIDES
+from ..settings.varying import files_of, mean_of_curve
+from ..study.study import Study
+
+SUBJECT_NAME = re.compile(r"(?<![A-Za-z0-9])sub-([A-Za-z0-9]+)")
+SPACE_NAME = re.compile(r"(?:^|_)space-([A-Za-z0-9]+)_")
+OWN_SPACES = ("T1w", "T2w", "orig", "individual", "scanner")
+HULL_SHARE = 0.8
+"""About the volume of a hemisphere over that of its convex hull, where a surface is open."""
+
+
+def describe(path: str) -> str:
+    """Return what a file holds: size, unit, side and numbers of vertices or voxels; InputError as its reader's."""
+    if is_volume(path):
+        header = read_header(path)
+        size = " x ".join(f"{size:.3g}" for size in header.voxel_mm)
+        unit = {"unknown": ", no unit given", "mm": ""}.get(header.unit, f", given in {header.unit}")
+        return f"{' x '.join(map(str, header.shape))} voxels of {size} mm{unit}, {header.space} space"
+    if path.lower().endswith((".shape.gii", ".func.gii", ".label.gii")):
+        image = load_gifti(path)
+        values = [np.asarray(array.data) for array in image.darrays]
+        span = ", ".join(f"{part.min():.4g} to {part.max():.4g}" for part in values if part.size)
+        return f"{', '.join(str(len(part)) for part in values)} values, {span}{_side(structure_of(image, path))}"
+    mesh, space, structure = surface_space_structure(path)
+    size = " x ".join(f"{extent:.3g}" for extent in np.ptp(mesh.vertices, axis=0))
+    named = f", {space.removeprefix('NIFTI_XFORM_').lower()} space" if space else ""
+    closed = "closed" if is_closed(mesh) else "open"
+    return f"{closed} surface of {len(mesh.vertices)} vertices, {size} mm{_side(structure)}{named}"
+
+
+def _side(structure: str | None) -> str:
+    return {"CortexLeft": ", left", "CortexRight": ", right"}.get(structure or "", "")
+
+
+def input_facts(study: Study) -> Iterator[str]:
+    """Yield a line about each file of brains, regions and maps that can be read, in the order of the configuration."""
+    owners: dict[str, list[str]] = {}
+    for brain in study.config.brains:
+        for path in (*brain.files, *brain.white_files.values(), *filter(None, [brain.image])):
+            owners.setdefault(path, []).append(brain.id)
+    for name, regions in _given_regions(study).items():
+        for path in regions.files.values():
+            owners.setdefault(path, []).append(f"regions of {name}")
+    for run, name, value in _maps(study):
+        for path in (*files_of(value.map), *files_of(value.surface)):
+            owners.setdefault(path, []).append(f"{name} of {run}")
+    for path, names in owners.items():
+        # problems are those of `check_brain_files` and `check_other_files`; files of atlases may be missing yet
+        if Path(path).is_file():
+            try:
+                yield f"{', '.join(dict.fromkeys(names))}: {Path(path).name}: {describe(path)}"
+            except GyriflowError:
+                continue
+
+
+def check_brain_files(brain: BrainConfig) -> Iterator[str]:
+    """Yield doubts about a brain's surfaces and images; InputError for what a run would refuse.
+
+    Labels are checked elsewhere.
+    """
+    for path in (*brain.files, *brain.white_files.values()):
+        yield from _named_otherwise(path, brain)
+    if brain.image and Path(brain.image).is_file():
+        read_volume_map(brain.image, brain.affine_from)
+    if brain.has_labels or not all(Path(path).is_file() for path in brain.files):
+        return
+    for side, path in brain.white_files.items():
+        read_surface(path, side)
+    if brain.hemispheres is not None:
+        left, right, declared = read_hemispheres(brain.hemispheres.left, brain.hemispheres.right)
+        yield from _check_pair(brain, left, right, declared=declared)
+    elif brain.files:
+        own_side = brain.hemisphere.side if brain.hemisphere else None
+        mesh = _outward(read_surface(brain.files[0], own_side))
+        yield from _check_size(brain, mesh)
+        if own_side and is_closed(mesh):
+            require_single_hemisphere(mesh)
+            yield from pose_of_hemisphere(mesh, own_side, brain.coordinates).warnings
+        elif is_closed(mesh):
+            yield from pose_of_surface(mesh, brain.coordinates).warnings
+
+
+def _check_pair(brain: BrainConfig, left: TriangleMesh, right: TriangleMesh, *, declared: bool) -> Iterator[str]:
+    left, right = _outward(left), _outward(right)
+    yield from _check_size(brain, left, right)
+    if brain.coordinates != "auto":
+        left, right = (transformed(mesh, CONVENTIONS[brain.coordinates]) for mesh in (left, right))
+        require_left_and_right(left, right, brain.coordinates)
+    # shapes of open surfaces are compared after their repair
+    if is_closed(left) and is_closed(right):
+        if brain.coordinates == "auto":
+            yield from pose_of_pair(left, right, declared=declared).warnings
+        else:
+            yield from hemisphere_warnings(left, right, brain.coordinates)
+
+
+def _check_size(brain: BrainConfig, *meshes: TriangleMesh) -> list[str]:
+    sides = 1 if brain.hemisphere is None else 2
+    closed = all(map(is_closed, meshes))
+    volumes = [signed_volume(mesh if closed else convex_hull(mesh)) for mesh in meshes]
+    doubts = require_plausible_size(sides * sum(volumes) * (1.0 if closed else HULL_SHARE), brain.week)
+    return doubts if closed else []
+
+
+def _outward(mesh: TriangleMesh) -> TriangleMesh:
+    return mesh if signed_volume(mesh) >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
+    name, own = Path(path).name, {*SUBJECT_NAME.findall(f"{brain.id} {brain.subject}")}
+    if own and (found := {*SUBJECT_NAME.findall(name)} - own):
+        yield f"{path} is named as of sub-{', sub-'.join(sorted(found))}"
+    spaces = {space for space in SPACE_NAME.findall(name) if space not in OWN_SPACES}
+    if is_volume(path) and Path(path).is_file() and (space := read_header(path).space) in ("mni", "talairach"):
+        spaces.add(space)
+    if spaces:
+        yield f"{path} is in the space {', '.join(sorted(spaces))}: has the brain its own size and shape there?"
+
+
+def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
+    """Yield each problem of files of regions and maps: whose it is, the text, and True."""
+    for owner, regions in _given_regions(study).items():
+        try:
+            _check_regions(regions, study.brains[owner].config if owner in study.brains else None)
+        except InputError as error:
+            yield f"regions of {owner}", str(error), True
+    seen = set()
+    for run, name, value in _maps(study):
+        try:
+            if (files := (name, str(value.map), str(value.surface))) not in seen:
+                seen.add(files)
+                _check_map(name, value)
+        except InputError as error:
+            yield f"{name} of run {run}", str(error), True
+
+
+def _given_regions(study: Study) -> Mapping[str, GivenRegions]:
+    return {} if isinstance(study.config.metrics.regions, str) else study.config.metrics.regions
+
+
+def _maps(study: Study) -> Iterator[tuple[str, str, Any]]:
+    for simulation in study.run_simulations:
+        yield from ((simulation.run, name, value) for name, value in simulation.mapped.items())
+
+
+def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
+    if regions.volume is not None:
+        read_label_volume(regions.volume, brain.affine_from if brain else "auto")
+    for side in SIDES:
+        if (given := getattr(regions, side)) is not None:
+            labels, surface = read_vertex_labels(given.labels, side)[0], read_surface(given.surface, side)
+            if len(labels) != len(surface.vertices):
+                problem, found = "does not belong to its surface", f"{len(labels)} labels"
+                expected = f"{len(surface.vertices)}, the number of vertices of {given.surface}"
+                raise InputError(problem, path=given.labels, found=found, expected=expected)
+
+
+def _check_map(name: str, value: Any) -> None:
+    paths, surfaces = files_of(value.map), files_of(value.surface)
+    if surfaces:
+        sides = SIDES if len(paths) == 2 else (None,)
+        values = [read_surface_map(*files)[1] for files in zip(paths, surfaces, sides, strict=True)]
+    else:
+        values = [read_volume_map(path).values.ravel() for path in paths]
+    if name == "thickness_mm":
+        require_plausible_thickness(np.concatenate(values), mean_of_curve(value), ", ".join(paths))
