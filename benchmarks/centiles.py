@@ -106,8 +106,7 @@ def new_subjects(case: Case, subjects: int, cohorts: int, seed: int, beyond: flo
     random, found = np.random.default_rng((seed, subjects)), {name: [] for name in PLACES}
     for _ in range(cohorts):
         weeks, values, numbers = drawn(case, subjects, random)
-        weights = np.full(len(weeks), 1 / case.scans)
-        norm = fit_norm(weeks, values, weights, subjects, is_positive=case.is_positive)
+        norm = fit_norm(weeks, values, numbers, is_positive=case.is_positive)
         for name, place in PLACES.items():
             week = weeks.min() + place * np.ptp(weeks) + beyond * np.sign(place - 0.5)
             at = np.full(len(SUBJECT_Z), week)

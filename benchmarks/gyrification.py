@@ -61,7 +61,7 @@ def main() -> None:
     for name, (mesh, true) in bodies.items():
         around = {"hull": convex_hull(mesh), "envelope": envelope(mesh)}
         found = {key: gyrification_index([mesh], [pieces_over(surface, mesh)]) for key, surface in around.items()}
-        result[name] = {key: round(value, 4) for key, value in (found | {"true": true}).items()}
+        result[name] = {key: round(value, 4) for key, value in (found | {"true": float(true)}).items()}
         print(name, result[name], flush=True)
     print(json.dumps(result))
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from scipy.linalg import block_diag, solve
 
@@ -43,8 +43,10 @@ Such errors are nearer to normal than those of the mean, and make fewer extreme 
 
 MAX_LEVERAGE = 0.9
 MIN_SCATTER = 1e-9
-ROUNDS, STEP_TOL, MAX_STEP = 100, 1e-4, 1.0
-DAMPED_STEP, ROUNDS_UNTIL_DAMPED = 0.2, 15
+ROUNDS, MAX_STEP = 60, 1.0
+STEP_TOL, POOR_STEP = 1e-3, 0.05
+"""Largest shift, in scales, at which a fit ends, and at which it is good enough after all rounds."""
+DAMPED_STEP, ROUNDS_UNTIL_DAMPED = 0.5, 15
 """Factor of the steps after so many rounds: few subjects at an end can make the scale swing."""
 
 
@@ -123,12 +125,12 @@ class WeeklyNorm:
         both = locations @ self.location + np.stack([-error, error])
         return np.exp(both) if self.is_positive else both
 
-    def without(self, weeks: Floats, values: Floats, weights: Floats) -> "WeeklyNorm":
-        """Return the norm without one of its subjects, by one Newton step from the whole."""
-        locations, scales = self._bases(weeks)
+    def without(self, week: float, value: float) -> "WeeklyNorm":
+        """Return the norm without the only scan of a subject, by one Newton step from the whole."""
+        (locations, scales), values = self._bases(week), np.array([value])
         terms = _terms(locations @ self.location, scales @ self.scale, self.skewness, values, self.is_positive)
         left = 1 - np.minimum(self._errors(locations, scales)[0], MAX_LEVERAGE)
-        slope = _slope(terms, locations, scales, weights, left)
+        slope = _slope(terms, locations, scales, np.ones(1), left)
         step, size = self.covariance @ slope[: len(self.covariance)], len(self.location)
         location, scale = self.location - step[:size], self.scale - step[size : size + len(self.scale)]
         skewness = self.skewness - float(step[size + len(self.scale) :].sum())
@@ -146,13 +148,15 @@ def norm_from_plain(plain: Mapping[str, Any]) -> WeeklyNorm:
     return WeeklyNorm(**{**plain, **arrays})
 
 
-def fit_norm(weeks: Floats, values: Floats, weights: Floats, subjects: int, *, is_positive: bool) -> WeeklyNorm:
-    """Fit a norm to values (n,) at weeks (n,) by penalised likelihood, restricted for the scale.
+def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: bool) -> WeeklyNorm:
+    """Fit a norm to values (n,) at weeks (n,) of people (n,) by penalised likelihood, restricted for the scale.
 
-    The weights of a subject's scans add up to 1. Curves are splines, or of fewer than eight weeks a quadratic of the
+    The scans of a subject together have the weight of one; errors are by the correlation of their z. Curves are splines, or of fewer than eight weeks a quadratic of the
     location and a line of the scale. Fewer than four weeks have a line, one week a constant. The skewness is estimated
     from `MIN_SUBJECTS_FOR_SKEWNESS` on.
     """
+    scans = _Scans.of(people)
+    weights, subjects = scans.weights, int(scans.person.max()) + 1
     first, last, count = float(weeks.min()), float(weeks.max()), len(np.unique(weeks))
     is_spline = count >= MIN_WEEKS_FOR_SPLINES
     powers = 3 if count > 3 else 2 if count > 1 else 1
@@ -185,7 +189,8 @@ def fit_norm(weeks: Floats, values: Floats, weights: Floats, subjects: int, *, i
     for number in range(ROUNDS):
         log_scale, skewness = scale_rows @ fit[size : size + scale_size], _skewness(fit, with_skewness, is_positive)
         terms = _terms(rows @ fit[:size], log_scale, skewness, values, is_positive)
-        information, left = _information(rows, scale_rows, log_scale, skewness, weights, penalty)
+        scans = scans.correlated(terms.z)
+        information, left = _information(rows, scale_rows, log_scale, skewness, scans, penalty)
         slope = _slope(terms, rows, scale_rows, weights, left)[: len(fit)] - penalty @ (fit - mean)
         information = information[: len(fit), : len(fit)] + penalty
         step = solve(information, slope, assume_a="pos")
@@ -193,12 +198,57 @@ def fit_norm(weeks: Floats, values: Floats, weights: Floats, subjects: int, *, i
         if not has_scatter or shifts.max() < STEP_TOL:
             break
         fit += step * min(1.0, MAX_STEP / shifts.max()) * (1.0 if number < ROUNDS_UNTIL_DAMPED else DAMPED_STEP)
-    else:
-        log.warning("the fit of a norm of %d subjects has not converged", subjects)
-    skewness, units = _skewness(fit, with_skewness, is_positive), np.where(np.arange(len(fit)) < size, unit, 1.0)
-    fit, covariance = fit * units, np.linalg.inv(information) * np.outer(units, units)
-    curves, free = (fit[:size], fit[size : size + scale_size]), float(weights @ left)
+    if has_scatter and shifts.max() > POOR_STEP:
+        log.warning("the norm of %d subjects at weeks %g to %g has not converged", subjects, first, last)
+    skewness, inverse = _skewness(fit, with_skewness, is_positive), np.linalg.inv(information)
+    if scans.correlation is not None:
+        # the scatter of the slopes with correlated scans
+        scatter = information.copy()
+        for part, part_rows, power in (
+            (slice(0, size), rows * np.exp(-log_scale)[:, None], 1),
+            (slice(size, size + scale_size), np.sqrt(2 * left)[:, None] * scale_rows, 2),
+        ):
+            scatter[part, part] = penalty[part, part] + part_rows.T @ scans.spread(part_rows, power)
+        inverse = inverse @ scatter @ inverse
+    units = np.where(np.arange(len(fit)) < size, unit, 1.0)
+    fit, covariance = fit * units, inverse * np.outer(units, units)
+    free = float(weights @ left) * subjects / float(scans.spread(np.ones((len(weights), 1)), 2).sum())
+    curves = fit[:size], fit[size : size + scale_size]
     return WeeklyNorm(first, last, is_positive, *curves, skewness, covariance, subjects, is_spline, free)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scans:
+    """The number of each scan's person, its weight, and the correlation of a person's z, None without repeated scans."""
+
+    person: NDArray[np.int64]
+    weights: Floats
+    correlation: float | None
+
+    @classmethod
+    def of(cls, people: ArrayLike) -> "_Scans":
+        _, person, counts = np.unique(np.asarray(people), return_inverse=True, return_counts=True)
+        return cls(person, 1.0 / counts[person], 1.0 if counts.max() > 1 else None)
+
+    def correlated(self, z: Floats) -> "_Scans":
+        """Return them with the correlation that z (n,) have."""
+        if self.correlation is None:
+            return self
+        counts, sums = (np.bincount(self.person, values) for values in (np.ones(len(z)), z))
+        products = sums**2 - np.bincount(self.person, z**2)
+        several = counts > 1
+        mean = np.mean(products[several] / (counts * (counts - 1))[several])
+        return replace(self, correlation=float(np.clip(mean / (self.weights @ z**2) * len(counts), 0.0, 1.0)))
+
+    def spread(self, rows: Floats, power: int = 1) -> Floats:
+        """Return the product (n, k) of rows with the weights, and the powers of the correlations, between scans."""
+        weighted = self.weights[:, None] * rows
+        if self.correlation is None:
+            return weighted
+        both = np.zeros((self.person.max() + 1, rows.shape[1]))
+        np.add.at(both, self.person, weighted)
+        shared = self.correlation**power
+        return self.weights[:, None] * (shared * both[self.person] + (1 - shared) * weighted)
 
 
 def _skewness(fit: Floats, is_estimated: bool, is_positive: bool) -> float:
@@ -206,16 +256,17 @@ def _skewness(fit: Floats, is_estimated: bool, is_positive: bool) -> float:
 
 
 def _information(
-    rows: Floats, scale_rows: Floats, log_scale: Floats, skewness: float, weights: Floats, penalty: Floats
+    rows: Floats, scale_rows: Floats, log_scale: Floats, skewness: float, scans: "_Scans", penalty: Floats
 ) -> tuple[Floats, Floats]:
     """Return the expected information on all parameters, and what the location leaves of each observation's scatter.
 
     It is that of Rigby and Stasinopoulos (2005, doi 10.1111/j.1467-9876.2005.00510.x), for small S, by logarithms.
     """
-    size, squared = rows.shape[1], np.exp(2 * log_scale)
+    size, squared, weights = rows.shape[1], np.exp(2 * log_scale), scans.weights
     each = (1 + 2 * skewness**2 * squared) / squared
     location = (rows.T * (weights * each)) @ rows
-    leverage = each * _squares(rows, np.linalg.inv(location + penalty[:size, :size]))
+    own = np.sqrt(each)[:, None] * rows
+    leverage = np.einsum("ij,ij->i", own @ np.linalg.inv(location + penalty[:size, :size]), scans.spread(own)) / weights
     left = 1 - np.minimum(leverage, MAX_LEVERAGE)
     blocks = [
         [location, 2 * skewness * (rows.T * weights) @ scale_rows, -0.5 * rows.T @ weights[:, None]],

@@ -27,7 +27,8 @@ FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
 """With fewer subjects, centiles end at these, and norms without one of them are fitted again."""
 
 MAX_ONE_STEP_Z = 1.5
-"""Other norms are fitted again without subjects beyond this z; those up to it are removed by one Newton step."""
+"""Other norms are fitted again without a subject that is beyond this z or has several scans; else it is removed by one
+Newton step."""
 
 MIN_SPREAD = 1e-6
 """Smallest spread of a norm over its values for which there are scores."""
@@ -249,13 +250,7 @@ def cohort_norms(
 def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
     values = brains["value"].to_numpy(dtype=float)
     is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
-    weeks, people = brains["week"].to_numpy(float), brains["person"].nunique()
-    return fit_norm(weeks, values, _weights(brains), people, is_positive=is_positive)
-
-
-def _weights(brains: pd.DataFrame) -> Floats:
-    # the scans of one subject are not independent
-    return 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
+    return fit_norm(brains["week"].to_numpy(float), values, brains["person"], is_positive=is_positive)
 
 
 def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms) -> pd.DataFrame:
@@ -301,9 +296,9 @@ def _score(
         own, others = brains[is_own], brains[~is_own]
         if (subjects := others["person"].nunique()) < min_norm_subjects(individuals=cohort.individuals):
             return {"brains": subjects, "flag": "too few brains"}
-        scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
-        if not is_small and np.abs(norm.scores(*scans)[0]).max() <= MAX_ONE_STEP_Z:
-            norm = norm.without(*scans, _weights(own))
+        is_single, scan = len(brains) == norm.subjects, (float(own["week"].iloc[0]), float(own["value"].iloc[0]))
+        if is_single and not is_small and abs(norm.scores(*scan)[0][0]) <= MAX_ONE_STEP_Z:
+            norm = norm.without(*scan)
         else:
             norm = _fit(others, key[1])
     score: dict[str, Any] = {"brains": norm.subjects}
