@@ -126,9 +126,7 @@ def members(case: Case, subjects: int, cohorts: int, seed: int) -> dict[str, lis
         found.append(measured_scores(table, names, cohort_norms(table, names))[["week", "z"]])
     scores = pd.concat(found)
     third = ((scores["week"] - FIRST) / (LAST - FIRST) * 3).astype(int).clip(0, 2)
-    return {
-        name: shares(scores.loc[third == k, "z"].to_numpy()).round(1).tolist() for k, name in enumerate(PLACES)
-    }
+    return {name: shares(scores.loc[third == k, "z"].to_numpy()).round(1).tolist() for k, name in enumerate(PLACES)}
 
 
 def main() -> None:
@@ -138,7 +136,9 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="+", default=SIZES, metavar="N")
     parser.add_argument("--cases", nargs="+", default=list(CASES), choices=CASES, metavar="CASE")
     parser.add_argument("--members", action="store_true", help="score the subjects of the norms")
-    parser.add_argument("--beyond", type=float, default=0.0, metavar="GW", help="weeks before the first and after the last week")
+    parser.add_argument(
+        "--beyond", type=float, default=0.0, metavar="GW", help="weeks before the first and after the last week"
+    )
     options = parser.parse_args()
     result: dict[str, dict[int, dict[str, list[float]]]] = {}
     for name in options.cases:

@@ -1,6 +1,6 @@
 """Measure gyrification indices of half spheres whose cuts lie in pits or on necks, and of surfaces.
 
-    ./run python benchmarks/gyrification.py 'results/brains/*/surface/*.pial.surf.gii'
+    ./run python benchmarks/gyrification.py results/brains/*/surface/*.pial.surf.gii
 
 Printed are the index by hulls, that by envelopes, and `true`, the index by hulls of the half sphere, or of a surface
 that of the body closed by the smallest area that its cut may have, over its whole hull: it is known without a decision
@@ -9,7 +9,6 @@ about what lies over the cut, and a little too small. The last line is one JSON 
 
 import argparse
 import json
-from glob import glob
 from pathlib import Path
 
 import igl
@@ -51,10 +50,10 @@ def closed_index(mesh: TriangleMesh) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("surfaces", nargs="*", help="open surfaces of hemispheres, or patterns of them")
+    parser.add_argument("surfaces", type=Path, nargs="*", help="open surfaces of hemispheres")
     options = parser.parse_args()
     bodies = {f"pit of {pit:g} mm": half_sphere(pit) for pit in PITS_MM}
-    for path in (Path(path) for pattern in options.surfaces for path in sorted(glob(pattern))):
+    for path in options.surfaces:
         mesh = read_surface(path)
         bodies[str(path)] = mesh, closed_index(mesh)
     result = {}

@@ -19,7 +19,7 @@ from gyriflow.version import RELEASE
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-GROUND = {"errors", "units", "quantities", "formats"}
+GROUND = {"errors", "units", "quantities", "formats", "splines"}
 PLAIN = GROUND | {"geometry", "settings"}
 """What every room may import: errors, units, quantities, formats of files, plain geometry and typed settings."""
 ARROWS = {
@@ -27,6 +27,7 @@ ARROWS = {
     "units": set(),
     "quantities": set(),
     "formats": set(),
+    "splines": set(),
     "code_hash": set(),
     "shipped": set(),
     "version": {"shipped"},

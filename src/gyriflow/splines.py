@@ -32,7 +32,7 @@ def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
 
 
 def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
-    """Return the penalty (k, k) on differences of the rate: of first order, it is 0 for lines; of second, for quadratics.
+    """Return the penalty (k, k) on differences of the rate, of first order (0 for lines) or second (for quadratics).
 
     The end knots coincide, so differences are divided by the distances between the middles of the splines.
     """

@@ -151,9 +151,9 @@ def norm_from_plain(plain: Mapping[str, Any]) -> WeeklyNorm:
 def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: bool) -> WeeklyNorm:
     """Fit a norm to values (n,) at weeks (n,) of people (n,) by penalised likelihood, restricted for the scale.
 
-    The scans of a subject together have the weight of one; errors are by the correlation of their z. Curves are splines, or of fewer than eight weeks a quadratic of the
-    location and a line of the scale. Fewer than four weeks have a line, one week a constant. The skewness is estimated
-    from `MIN_SUBJECTS_FOR_SKEWNESS` on.
+    The scans of a subject together have the weight of one; errors are by the correlation of their z. Curves are
+    splines, or of fewer than eight weeks a quadratic of the location and a line of the scale. Fewer than four weeks
+    have a line, one week a constant. The skewness is estimated from `MIN_SUBJECTS_FOR_SKEWNESS` on.
     """
     scans = _Scans.of(people)
     weights, subjects = scans.weights, int(scans.person.max()) + 1
@@ -219,7 +219,7 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
 
 @dataclass(frozen=True, eq=False)
 class _Scans:
-    """The number of each scan's person, its weight, and the correlation of a person's z, None without repeated scans."""
+    """The persons of scans by number, the scans' weights, and the correlation of a person's z, None of single scans."""
 
     person: NDArray[np.int64]
     weights: Floats
@@ -270,7 +270,11 @@ def _information(
     left = 1 - np.minimum(leverage, MAX_LEVERAGE)
     blocks = [
         [location, 2 * skewness * (rows.T * weights) @ scale_rows, -0.5 * rows.T @ weights[:, None]],
-        [None, 2 * (scale_rows.T * (weights * left)) @ scale_rows, -skewness * scale_rows.T @ (weights * squared)[:, None]],
+        [
+            None,
+            2 * (scale_rows.T * (weights * left)) @ scale_rows,
+            -skewness * scale_rows.T @ (weights * squared)[:, None],
+        ],
         [None, None, np.array([[7 / 4 * (weights @ squared)]])],
     ]
     for row, column in ((1, 0), (2, 0), (2, 1)):

@@ -149,8 +149,8 @@ def published_scores(
             flag = "one hemisphere"
         elif not norm.weeks[0] <= week <= norm.weeks[1]:
             flag = "outside the norm's weeks"
-        row = {"structure": name, "week": week, "value": value, "unit": norm.unit, "brains": norm.subjects, "flag": flag}
-        rows.append(row | (_scored(norm, week, value) if flag in {"ok", "other labels"} else {}))
+        row = {"structure": name, "week": week, "value": value, "unit": norm.unit, "brains": norm.subjects}
+        rows.append(row | {"flag": flag} | (_scored(norm, week, value) if flag in {"ok", "other labels"} else {}))
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
     return pd.DataFrame(rows, columns=columns).astype({"brains": float})
 
@@ -354,7 +354,8 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
         interval = norm.median_interval(weeks)
         band = {"week": weeks, "brains": norm.subjects, "expected": expected}
         band |= {"expected_low": interval[0], "expected_high": interval[1]}
-        spread = {"sd": 0.5 * (high - low)} | {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        spread = {"sd": 0.5 * (high - low)}
+        spread |= {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
         band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
         parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]
