@@ -164,7 +164,8 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
     rows, scale_rows = (_basis(weeks, first, last, each, is_spline) for each in (size, scale_size))
     start = np.log(values) if is_positive else values
     normal, freedom = (rows.T * weights) @ rows, float(size)
-    location_penalty, ends = np.zeros((size, size)), _basis(np.array([first, last]), first, last, scale_size, is_spline)
+    location_penalty: Floats = np.zeros((size, size))
+    ends = _basis(np.array([first, last]), first, last, scale_size, is_spline)
     half_change = 0.5 * np.diff(ends, axis=0) / HALF_CHANGE_SD
     scale_penalty = half_change.T @ half_change
     if is_spline:
@@ -177,7 +178,7 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
         scale_penalty += 2.0 * splines.strength(normal, roughness, scale_freedom, "scale of the norm") * roughness
     location = solve(normal + location_penalty, rows.T @ (weights * start))
     variance = float(weights @ (start - rows @ location) ** 2) / max(subjects - freedom, 1.0)
-    has_scatter, unit = variance > MIN_SCATTER**2, max(np.sqrt(variance), MIN_SCATTER)
+    has_scatter, unit = variance > MIN_SCATTER**2, max(float(np.sqrt(variance)), MIN_SCATTER)
     with_skewness = is_positive and subjects >= MIN_SUBJECTS_FOR_SKEWNESS
     mean = np.zeros(size + scale_size + with_skewness)
     mean[size + scale_size :] = SKEWNESS

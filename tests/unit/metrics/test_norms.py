@@ -183,7 +183,7 @@ def test_the_interval_of_a_median_is_that_of_a_mean() -> None:
     half = 0.5 * (curve["expected_high"] - curve["expected_low"])
     assert half == pytest.approx(1.645 * values.std() / 9, rel=0.03)
     assert curve["expected"] == pytest.approx(values.mean(), abs=0.7)
-    assert curve["sd"] == pytest.approx(values.std(), rel=0.03)
+    assert curve["sd"] == pytest.approx(values.std(), rel=0.05)
 
 
 @pytest.mark.parametrize(("subjects", "weeks"), [(200, 160), (200, 7), (200, 1), (20, 16), (20, 3)])
@@ -453,6 +453,31 @@ def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
     assert table.loc[("real", "frontal"), "change"] == 6.0
     assert ("follows", "frontal") not in table.index
     assert set(table["subject"]) == {"one"}
+
+
+def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
+    rows = [
+        ("early", "real", 21.5, "right", "mean_shape_index", -0.2, "1"),
+        ("late", "real", 24.0, "right", "mean_shape_index", 0.05, "1"),
+        ("early", "run", 21.5, "right", "mean_shape_index", -0.4, "1"),
+        ("early", "run", 24.0, "right", "mean_shape_index", -0.1, "1"),
+    ]
+    found = change_between_scans(long_table([pd.DataFrame(rows, columns=COLUMNS)]), SCANS).set_index("run")
+    names = ["change", "change_per_week", "relative_change", "measured_change", "difference"]
+    assert found.loc["real", names].tolist() == pytest.approx([0.25, 0.1, 1.25, 0.25, 0.0])
+    assert found.loc["run", names].tolist() == pytest.approx([0.3, 0.12, 0.75, 0.25, -0.15])
+    assert found.loc["run", ["from_brain", "to_brain", "from_week", "to_week"]].tolist() == [
+        "early",
+        "late",
+        21.5,
+        24.0,
+    ]
+
+
+def test_asymmetry_has_the_sign_of_the_larger_side() -> None:
+    table = pd.DataFrame({"hemisphere": ["right", "left"], "metric": "volume", "unit": "mL", "value": [7.0, 3.0]})
+    (found,) = asymmetry(table).to_dict("records")
+    assert (found["difference"], found["asymmetry_index"]) == (-4.0, pytest.approx(-0.8))
 
 
 def test_wide_has_a_row_per_brain_and_week() -> None:
