@@ -9,7 +9,6 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.linalg import solve
 from scipy.optimize import brentq
 
 log = logging.getLogger(__name__)
@@ -53,7 +52,7 @@ def strength(normal: Floats, penalty: Floats, freedom: float, name: str = "curve
     ridge = 1e-10 * np.trace(normal) * np.eye(len(normal))
 
     def excess(exponent: float) -> float:
-        return float(np.trace(solve(normal + 10**exponent * penalty + ridge, normal, assume_a="pos"))) - freedom
+        return float(np.trace(np.linalg.solve(normal + 10**exponent * penalty + ridge, normal))) - freedom
 
     for end, sign in zip(STRENGTHS, (1, -1), strict=True):
         if sign * (found := excess(end)) <= 0:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
-from scipy.linalg import block_diag, solve
+from scipy.linalg import block_diag
 
 from .. import splines
 from ..geometry.triangles import Floats
@@ -176,7 +176,7 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
         roughness = splines.penalty(first, last, INTERVALS, order=1)
         # the information of an observation on ln S is 2
         scale_penalty += 2.0 * splines.strength(normal, roughness, scale_freedom, "scale of the norm") * roughness
-    location = solve(normal + location_penalty, rows.T @ (weights * start))
+    location = np.linalg.solve(normal + location_penalty, rows.T @ (weights * start))
     variance = float(weights @ (start - rows @ location) ** 2) / max(subjects - freedom, 1.0)
     has_scatter, unit = variance > MIN_SCATTER**2, max(float(np.sqrt(variance)), MIN_SCATTER)
     with_skewness = is_positive and subjects >= MIN_SUBJECTS_FOR_SKEWNESS
@@ -194,7 +194,7 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
         information, left = _information(rows, scale_rows, log_scale, skewness, scans, penalty)
         slope = _slope(terms, rows, scale_rows, weights, left)[: len(fit)] - penalty @ (fit - mean)
         information = information[: len(fit), : len(fit)] + penalty
-        step = solve(information, slope, assume_a="pos")
+        step = np.linalg.solve(information, slope)
         shifts = np.abs([rows @ step[:size] * np.exp(-log_scale), scale_rows @ step[size : size + scale_size]])
         if not has_scatter or shifts.max() < STEP_TOL:
             break
@@ -211,7 +211,8 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
         ):
             scatter[part, part] = penalty[part, part] + part_rows.T @ scans.spread(part_rows, power)
         inverse = inverse @ scatter @ inverse
-    units = np.where(np.arange(len(fit)) < size, unit, 1.0)
+    units = np.ones(len(fit))
+    units[:size] = unit
     fit, covariance = fit * units, inverse * np.outer(units, units)
     free = float(weights @ left) * subjects / float(scans.spread(np.ones((len(weights), 1)), 2).sum())
     curves = fit[:size], fit[size : size + scale_size]
