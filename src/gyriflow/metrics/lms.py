@@ -185,7 +185,7 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
     # the location is fitted in units of the scatter: then the information of an observation on it is about 1
     rows = unit * rows
     penalty = block_diag(location_penalty, scale_penalty, *[[[SKEWNESS_SD**-2]]] * with_skewness)
-    fit = mean.copy()
+    fit: Floats = mean.copy()
     fit[:size], fit[size] = location / unit, np.log(unit)
     for number in range(ROUNDS):
         log_scale, skewness = scale_rows @ fit[size : size + scale_size], _skewness(fit, with_skewness, is_positive)

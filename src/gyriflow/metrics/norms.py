@@ -82,12 +82,18 @@ class PublishedNorm:
 
     def values(self, weeks: ArrayLike, z: float) -> Floats:
         """Return the values with a z at weeks (n,)."""
-        return np.polyval(self.mean, weeks) + z * np.polyval(self.sd, weeks)
+        mean, sd = self._curves(weeks)
+        return mean + z * sd
 
     def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
         """Return z of values (n,) at weeks, and NaN (2, n) for its unknown interval."""
-        z = (np.asarray(values) - np.polyval(self.mean, weeks)) / np.polyval(self.sd, weeks)
+        mean, sd = self._curves(weeks)
+        z = (np.asarray(values, dtype=float) - mean) / sd
         return z, np.full((2, len(z)), np.nan)
+
+    def _curves(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
+        at = np.asarray(weeks, dtype=float)
+        return np.polyval(np.array(self.mean), at), np.polyval(np.array(self.sd), at)
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
