@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
-from gyriflow.geometry.triangles import TriangleMesh, submesh, vertex_normals
+from gyriflow.geometry.triangles import TriangleMesh, face_normals, flipped, submesh, vertex_normals
 
 HALF_AXES = np.array([11.0, 24.0, 16.0])
 """Semi-axes in mm of an ellipsoid as large as a small hemisphere of week 21."""
@@ -84,6 +84,17 @@ def cut_ellipsoid() -> tuple[TriangleMesh, TriangleMesh, TriangleMesh]:
     is_left = whole.vertices[whole.faces][:, :, 0].mean(axis=1) < 0.0
     left, right = (submesh(whole, side)[0] for side in (is_left, ~is_left))
     return left, right, TriangleMesh(left.vertices * [0.0, 1.0, 1.0], left.faces[:, ::-1])
+
+
+def hemisphere_with_cut(pit_mm: float, radius: float = 25.0, cut: float = 8.0) -> TriangleMesh:
+    """Return half a sphere, closed in the plane x = 0 but for a round cut in a pit so deep, or on a neck so high."""
+    down = np.linspace(0.0, 0.5 * np.pi, 40)
+    flat, wall = np.linspace(radius, cut, 25)[1:], np.linspace(0.0, pit_mm, 5)[1:]
+    around = np.concatenate([radius * np.sin(down), flat, np.full(len(wall), cut)])
+    along = np.concatenate([radius * np.cos(down), 0 * flat, wall])
+    shape = trimesh.creation.revolve(np.column_stack([around, along]), sections=160)
+    mesh = TriangleMesh(shape.vertices[:, [2, 0, 1]], shape.faces)
+    return mesh if face_normals(mesh)[:, 0].mean() > 0 else flipped(mesh)
 
 
 def box(size, centre=(0.0, 0.0, 0.0), subdivisions: int = 0) -> TriangleMesh:

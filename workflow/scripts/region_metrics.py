@@ -2,7 +2,7 @@
 
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_labels, read_vertex_maps
-from gyriflow.metrics.regions import region_metrics
+from gyriflow.metrics.tables import region_metrics
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step
 

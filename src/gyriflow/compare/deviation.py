@@ -10,7 +10,7 @@ from ..geometry.diffusion import diffuse
 from ..geometry.matching import match_surface, values_at
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_areas, vertex_normals
 from ..metrics.norms import cohort_norms, measured_scores
-from ..metrics.regions import region_metrics
+from ..metrics.tables import region_metrics
 from ..metrics.thickness import at_part
 from ..settings.terms import MEASURED
 

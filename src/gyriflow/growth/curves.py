@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, PchipInterpolator
-from scipy.linalg import solve
-from scipy.optimize import brentq, lsq_linear
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import lsq_linear
 
+from .. import splines
 from ..errors import InputError
 from ..geometry.triangles import Floats
 
@@ -112,9 +112,9 @@ def fitted(
     count = len(np.unique(weeks_))
     degrees = min(degrees_of_freedom, max(count - 1.0, 2.0))
     ends = weeks_[0], weeks_[-1]
-    design, logs = _design(weeks_, *ends), np.log(values_)
-    penalty = _penalty(*ends, order=2 if degrees >= 3 else 1)
-    strength = _strength(design, penalty, degrees)
+    design, logs = splines.design(weeks_, *ends, KNOT_INTERVALS), np.log(values_)
+    penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
+    strength = splines.strength(design.T @ design, penalty, degrees, name)
     weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
     coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
     if not may_shrink and coefficients[1:].max() < 1e-6:
@@ -123,7 +123,7 @@ def fitted(
     squares = (weights * (logs - design @ coefficients) ** 2).sum()
     spread = np.sqrt(squares / residual_degrees) if residual_degrees > 0.5 else np.nan
     at = np.linspace(*ends, max(2, round((ends[1] - ends[0]) / SPACING_WEEKS) + 1))
-    rows = _design(at, *ends)
+    rows = splines.design(at, *ends, KNOT_INTERVALS)
     free = np.ones(len(coefficients), dtype=bool)
     free[1:] = may_shrink | (coefficients[1:] > 1e-8)
     normal = (design.T * weights) @ design + strength * penalty
@@ -159,39 +159,6 @@ def curve_table(curves: Mapping[str, Curve]) -> pd.DataFrame:
         columns = {"week": curve.weeks, "value": curve.values, "low": low, "high": high}
         tables.append(pd.DataFrame({"quantity": name} | columns | {"rate_per_week": rate(curve, curve.weeks)}))
     return pd.concat(tables, ignore_index=True)
-
-
-def _design(weeks: Floats, first: float, last: float) -> Floats:
-    integral = BSpline(_knots(first, last), np.eye(KNOT_INTERVALS + 2), 2, extrapolate=False).antiderivative()
-    return np.column_stack([np.ones(len(weeks)), integral(weeks) - integral(first)])
-
-
-def _penalty(first: float, last: float, order: int) -> Floats:
-    # the end knots coincide, so differences are taken between the middles of the splines
-    knots = _knots(first, last)
-    middles = 0.5 * (knots[1:-2] + knots[2:-1])
-    slopes = np.diff(np.eye(len(middles)), axis=0) / np.diff(middles)[:, None]
-    if order == 2:
-        slopes = np.diff(slopes, axis=0) / (0.5 * (middles[2:] - middles[:-2]))[:, None]
-    return np.pad(slopes.T @ slopes, ((1, 0), (1, 0)))
-
-
-def _knots(first: float, last: float) -> Floats:
-    return np.concatenate([[first] * 2, np.linspace(first, last, KNOT_INTERVALS + 1), [last] * 2])
-
-
-def _strength(design: Floats, penalty: Floats, degrees: float) -> float:
-    # a small ridge keeps the matrix regular if there are fewer weeks than splines
-    ridge = 1e-10 * np.eye(len(penalty))
-
-    def excess(exponent: float) -> float:
-        normal = design.T @ design
-        return float(np.trace(solve(normal + 10**exponent * penalty + ridge, normal, assume_a="pos"))) - degrees
-
-    for end, sign in ((-8.0, 1), (8.0, -1)):
-        if sign * excess(end) <= 0:
-            return float(10**end)
-    return float(10 ** brentq(excess, -8.0, 8.0))
 
 
 def _solve(design: Floats, logs: Floats, weights: Floats, penalty: Floats, may_shrink: bool) -> Floats:

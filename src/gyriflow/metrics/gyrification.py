@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from ..geometry.matching import nearest_on
 from ..geometry.remeshing import from_meshlab, in_meshlab, pymeshlab
-from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas, face_normals, vertex_normals
 
 ENVELOPE_RADIUS_MM = 5.0
 """The envelope bridges sulci narrower than twice this radius."""
@@ -22,6 +22,9 @@ ENVELOPE_OFFSET_MM = 0.1
 
 PIECE_MM = 2.0
 """Size of the pieces that are classed as lying over the cut or over the pial surface."""
+
+ABOVE_MM = 0.3
+"""Height above a piece at which the line into it begins: the envelope is in places below the surface."""
 
 LOCAL_RADIUS_MM = 10.0
 """Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""
@@ -86,7 +89,9 @@ class Pieces:
 def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     """Return a surface around `mesh` in pieces of 2 mm, without what lies over the cuts that `mesh` is open at.
 
-    A piece is left out where its nearest point of the capped mesh is on a cap.
+    A piece is left out where a line into it, along its normal, meets a cap first. The nearest point would be wrong near
+    the rim of a cut: a piece that spans a recess of the cut may be nearer to its banks, and one over the wall of a neck
+    nearer to the cut.
     """
     vertices, faces = trimesh.remesh.subdivide_to_size(surface.vertices, surface.faces, PIECE_MM, max_iter=20)
     small = TriangleMesh(vertices, faces)
@@ -94,7 +99,13 @@ def pieces_over(surface: TriangleMesh, mesh: TriangleMesh) -> Pieces:
     closed = cap(mesh)
     if len(closed.faces) == len(mesh.faces):
         return Pieces(centres, areas)
-    is_original = nearest_on(centres, closed)[1] < len(mesh.faces)
+    inwards = -face_normals(small)
+    tree, shape = igl.AABB(), (closed.vertices, closed.faces)
+    tree.init(*shape)
+    face, *_ = tree.intersect_ray_first(*shape, centres - ABOVE_MM * inwards, inwards)
+    # a line may miss a surface at its rim
+    face = np.where(face < 0, nearest_on(centres, closed)[1], face)
+    is_original = face < len(mesh.faces)
     return Pieces(centres[is_original], areas[is_original])
 
 

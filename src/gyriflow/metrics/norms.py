@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from ..errors import InputError
@@ -13,7 +14,7 @@ from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
 from ..settings.terms import MEASURED, SIDES, SPREAD_UNKNOWN, Side, min_norm_subjects
-from .lms import FEW_CENTILES, INTERVAL_Z, WeeklyNorm, fit_norm, norm_from_plain
+from .lms import WeeklyNorm, fit_norm, norm_from_plain
 from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
@@ -22,8 +23,12 @@ QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
 
+FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
+"""With fewer subjects, centiles end at these, and norms without one of them are fitted again."""
+
 MAX_ONE_STEP_Z = 1.5
-"""Subjects up to this z are removed from the norm by one Newton step; beyond it, the norm is fitted again."""
+"""Other norms are fitted again without a subject that is beyond this z or has several scans; else it is removed by one
+Newton step."""
 
 MIN_SPREAD = 1e-6
 """Smallest spread of a norm over its values for which there are scores."""
@@ -35,6 +40,24 @@ OTHER_SIDES = "other hemispheres"
 """Flag of a brain whose hemispheres are not those of the reference brains."""
 SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag")
 """Columns of `measured_scores` that follow the value and its unit."""
+
+
+class Norm(Protocol):
+    """The distribution of a quantity by week."""
+
+    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+        """Return z of values (n,) at weeks, and its 90 % interval (2, n), NaN if it is unknown."""
+
+    def values(self, weeks: ArrayLike, z: float) -> Floats:
+        """Return the values with a z at weeks (n,)."""
+
+
+def _scored(norm: Norm, week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)) -> dict[str, Any]:
+    """Return the first eight of `SCORES`, with centiles between the given ones."""
+    low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
+    z, interval = norm.scores([week], [value])
+    scores = np.clip(np.append(z, interval), *stats.norm.ppf(np.array(centiles) / 100))
+    return dict(zip(SCORES, (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores)), strict=False))
 
 
 @dataclass(frozen=True)
@@ -57,14 +80,20 @@ class PublishedNorm:
     tissue: str = ""
     side: Side | None = None
 
-    def values(self, week: float, z: float) -> Floats:
-        """Return the value with a z at a week (1,), as `WeeklyNorm.values` does."""
-        return np.atleast_1d(np.polyval(self.mean, week) + z * np.polyval(self.sd, week))
+    def values(self, weeks: ArrayLike, z: float) -> Floats:
+        """Return the values with a z at weeks (n,)."""
+        mean, sd = self._curves(weeks)
+        return mean + z * sd
 
-    def scores(self, week: float, value: float) -> tuple[Floats, Floats]:
-        """Return z of a value at a week (1,) and its standard error, which is unknown."""
-        z = (value - self.values(week, 0.0)) / (self.values(week, 1.0) - self.values(week, 0.0))
-        return z, np.full(1, np.nan)
+    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+        """Return z of values (n,) at weeks, and NaN (2, n) for its unknown interval."""
+        mean, sd = self._curves(weeks)
+        z = (np.asarray(values, dtype=float) - mean) / sd
+        return z, np.full((2, len(z)), np.nan)
+
+    def _curves(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
+        at = np.asarray(weeks, dtype=float)
+        return np.polyval(np.array(self.mean), at), np.polyval(np.array(self.sd), at)
 
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
@@ -121,18 +150,15 @@ def published_scores(
         if name not in norms:
             continue
         norm = norms[name]
-        inside = norm.weeks[0] <= week <= norm.weeks[1]
-        is_present = len(sides) == len(SIDES) or norm.side in sides
-        scored = inside and is_present
-        mean = float(norm.values(week, 0.0)[0]) if scored else np.nan
-        sd, z = float(norm.values(week, 1.0)[0]) - mean, float(norm.scores(week, value)[0][0]) if scored else np.nan
-        brains = np.nan if norm.subjects is None else norm.subjects
         flag = "other labels" if name in substitutes else "ok"
-        if not scored:
-            flag = "outside the norm's weeks" if is_present else "one hemisphere"
-        rows.append((name, week, value, norm.unit, mean, sd, z, 100 * float(stats.norm.cdf(z)), brains, flag))
+        if len(sides) < len(SIDES) and norm.side not in sides:
+            flag = "one hemisphere"
+        elif not norm.weeks[0] <= week <= norm.weeks[1]:
+            flag = "outside the norm's weeks"
+        row = {"structure": name, "week": week, "value": value, "unit": norm.unit, "brains": norm.subjects}
+        rows.append(row | {"flag": flag} | (_scored(norm, week, value) if flag in {"ok", "other labels"} else {}))
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
-    return pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=columns).astype({"brains": float})
 
 
 @dataclass(frozen=True)
@@ -227,16 +253,10 @@ def cohort_norms(
     return CohortNorms(norms, individuals, made_with or {})
 
 
-def _fit(brains: pd.DataFrame, metric: str, with_curves: bool | None = None) -> WeeklyNorm:
+def _fit(brains: pd.DataFrame, metric: str) -> WeeklyNorm:
     values = brains["value"].to_numpy(dtype=float)
     is_positive = not METRICS[metric].is_signed and bool((values > 0).all())
-    weeks, people = brains["week"].to_numpy(float), brains["person"].nunique()
-    return fit_norm(weeks, values, _weights(brains), people, is_positive=is_positive, with_curves=with_curves)
-
-
-def _weights(brains: pd.DataFrame) -> Floats:
-    # the scans of one subject are not independent
-    return 1.0 / brains.groupby("person")["value"].transform("size").to_numpy(dtype=float)
+    return fit_norm(brains["week"].to_numpy(float), values, brains["person"], is_positive=is_positive)
 
 
 def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: CohortNorms) -> pd.DataFrame:
@@ -245,63 +265,59 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     A brain of the reference is compared with the other subjects. `reference` is empty for norms from a file.
 
     Columns subject, run, week, hemisphere, metric, value, unit, expected (median), sd (half the distance between z = −1
-    and 1), z, z_low, z_high, centile (0 to 100), centile_low, centile_high (90 % intervals from the norm's own
-    uncertainty), brains (subjects of the norm), flag: "ok"; "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN`
-    (only expected is given); "outside the reference's weeks", "too few brains", "other hemispheres" (than the
-    reference), "not positive" (as all values of the norm are) or "no spread" (of the norm), whose scores are NaN.
+    and 1), z and centile (0 to 100) as those of a new subject with the uncertainty of the norm, z_low, z_high,
+    centile_low, centile_high (90 % intervals of those in the population), brains (subjects of the norm), flag: "ok";
+    "few brains" (centiles end at 5 and 95); `SPREAD_UNKNOWN` (only expected is given); "outside the reference's weeks",
+    "too few brains", "other hemispheres" (than the reference), "not positive" (as all values of the norm are) or "no
+    spread" (of the norm), whose scores are NaN.
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
     is_comparable = same_sides(metrics, reference) if len(reference) else _hemispheres_of(metrics) == cohort.hemispheres
     table = _with_norm(metrics.assign(is_comparable=is_comparable))
     rows = []
-    for row, person, has_same_sides in zip(
-        table[names].to_dict("records"), table["person"], table["is_comparable"], strict=True
-    ):
+    for row in table.to_dict("records"):
         key = row["hemisphere"], row["metric"]
         brains = by_metric.get(key)
         if brains is None and key not in cohort.norms:
             continue
-        is_own = row["run"] == MEASURED and brains is not None and (brains["person"] == person).any()
-        score = _score(key, row["week"], row["value"], cohort, brains if is_own else None, person)
-        rows.append((*row.values(), *(score if has_same_sides else _no_score(OTHER_SIDES))))
+        is_own = row["run"] == MEASURED and brains is not None and (brains["person"] == row["person"]).any()
+        score = {"brains": 0, "flag": OTHER_SIDES}
+        if row["is_comparable"]:
+            score = _score(key, row["week"], row["value"], cohort, brains if is_own else None, row["person"])
+        rows.append(row | score)
     return pd.DataFrame(rows, columns=[*names, *SCORES])
-
-
-def _no_score(flag: str, subjects: int = 0) -> tuple[Any, ...]:
-    return (*[np.nan] * (len(SCORES) - 2), subjects, flag)
 
 
 def _score(
     key: tuple[str, str], week: float, value: float, cohort: CohortNorms, brains: pd.DataFrame | None, person: str
-) -> tuple[Any, ...]:
+) -> dict[str, Any]:
     """Return the `SCORES` of a value; `brains` are those of the norm if the person is one of its subjects."""
     if key not in cohort.norms:
-        return _no_score("too few brains", 0 if brains is None else brains["person"].nunique())
+        return {"brains": 0 if brains is None else brains["person"].nunique(), "flag": "too few brains"}
     norm = cohort.norms[key][1]
+    is_small = norm.subjects < FEW_SUBJECTS
     if brains is not None:
         is_own = brains["person"] == person
-        own, remaining = brains[is_own], brains[~is_own]
-        if (subjects := remaining["person"].nunique()) < min_norm_subjects(individuals=cohort.individuals):
-            return _no_score("too few brains", subjects)
-        scans = own["week"].to_numpy(float), own["value"].to_numpy(float)
-        if norm.freedom is not None or np.abs(norm.scores(*scans)[0]).max() > MAX_ONE_STEP_Z:
-            norm = _fit(remaining, key[1], with_curves=norm.freedom is None)
+        own, others = brains[is_own], brains[~is_own]
+        if (subjects := others["person"].nunique()) < min_norm_subjects(individuals=cohort.individuals):
+            return {"brains": subjects, "flag": "too few brains"}
+        is_single, scan = len(brains) == norm.subjects, (float(own["week"].iloc[0]), float(own["value"].iloc[0]))
+        if is_single and not is_small and abs(norm.scores(*scan)[0][0]) <= MAX_ONE_STEP_Z:
+            norm = norm.without(*scan)
         else:
-            norm = norm.without(*scans, _weights(own))
+            norm = _fit(others, key[1])
+    score: dict[str, Any] = {"brains": norm.subjects}
     if not norm.first - WINDOW_GW <= week <= norm.last + WINDOW_GW:
-        return _no_score("outside the reference's weeks", norm.subjects)
-    low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
+        return score | {"flag": "outside the reference's weeks"}
     if not cohort.individuals:
-        return (expected, *[np.nan] * (len(SCORES) - 3), norm.subjects, SPREAD_UNKNOWN)
-    has_spread = high - low > MIN_SPREAD * max(abs(low), abs(high))
-    if (norm.is_positive and value <= 0) or not has_spread:
-        return _no_score("not positive" if has_spread else "no spread", norm.subjects)
-    (z,), (error,) = norm.scores([week], [value])
-    bounds, flag = ((0.0, 100.0), "ok") if norm.freedom is None else (FEW_CENTILES, "few brains")
-    scores = np.array([z, z - INTERVAL_Z * error, z + INTERVAL_Z * error])
-    scores = np.clip(scores, *stats.norm.ppf(np.array(bounds) / 100))
-    return (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores), norm.subjects, flag)
+        return score | {"flag": SPREAD_UNKNOWN, "expected": float(norm.values([week], 0.0)[0])}
+    if norm.is_positive and value <= 0:
+        return score | {"flag": "not positive"}
+    score |= _scored(norm, week, value, FEW_CENTILES if is_small else (0.0, 100.0))
+    if score["sd"] <= MIN_SPREAD * abs(score["expected"]):
+        return {"brains": norm.subjects, "flag": "no spread"}
+    return score | {"flag": "few brains" if is_small else "ok"}
 
 
 def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
@@ -341,11 +357,11 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
     for (hemisphere, metric), (unit, norm) in cohort.norms.items():
         weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
-        sd = 0.5 * (high - low)
-        margin = INTERVAL_Z * norm.scores(weeks, expected)[1] * sd
+        interval = norm.median_interval(weeks)
         band = {"week": weeks, "brains": norm.subjects, "expected": expected}
-        band |= {"expected_low": expected - margin, "expected_high": expected + margin}
-        spread = {"sd": sd} | {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        band |= {"expected_low": interval[0], "expected_high": interval[1]}
+        spread = {"sd": 0.5 * (high - low)}
+        spread |= {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
         band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
         parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

@@ -178,6 +178,8 @@ def norm_settings(config: Config) -> dict[str, Any]:
     """Return the version and the settings that the norms of metrics depend on."""
     return {
         "version": RELEASE,
+        # raised with the definition of a metric or of the norms
+        "norms": 2,
         "open_sulci": config.surface.open_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
         **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes"}),

@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 import pytest
-from shapes import octasphere, sphere
+from shapes import hemisphere_with_cut, octasphere, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.triangles import TriangleMesh, area, convex_hull, is_closed, signed_volume, submesh, vertex_areas
@@ -79,6 +79,35 @@ def test_cut_is_left_out_of_the_index() -> None:
     assert pieces_over(hull, half).areas.sum() == pytest.approx(2 * np.pi * 25.0**2, rel=0.01)
     assert index(half, hull) == pytest.approx(1.0, abs=0.02)
     assert index(half, envelope(half)) == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("pit", [1.0, 3.0, 6.0, -1.0, -3.0, -6.0])
+def test_what_spans_a_cut_in_a_pit_or_on_a_neck_is_left_out(pit: float) -> None:
+    radius, cut = 25.0, 8.0
+    mesh = hemisphere_with_cut(pit, radius, cut)
+    # areas over π: half the sphere, the plane round the cut and the walls; the hull goes from the plane's rim to a neck
+    pial = 2 * radius**2 + radius**2 - cut**2 + 2 * cut * abs(pit)
+    hull = 2 * radius**2 + (radius + cut) * np.hypot(radius - cut, min(pit, 0.0))
+    assert index(mesh, convex_hull(mesh)) == pytest.approx(pial / hull, rel=0.003)
+
+
+@pytest.mark.parametrize("pit", [3.0, -3.0])
+def test_the_envelope_over_a_cut_is_left_out_and_nothing_else(pit: float) -> None:
+    around = pieces_over(envelope(mesh := hemisphere_with_cut(pit, 25.0, 8.0)), mesh)
+    across = np.linalg.norm(around.centres[:, 1:], axis=1)
+    is_medial = np.abs(around.centres[:, 0]) < 4.0
+    assert around.areas[is_medial & (across < 7.0)].sum() < 0.1 * np.pi * 8.0**2
+    ring = is_medial & (across > 10.0) & (across < 20.0)
+    assert around.areas[ring].sum() == pytest.approx(np.pi * (20.0**2 - 10.0**2), rel=0.05)
+
+
+def test_depth_beside_a_cut_is_that_below_the_hull() -> None:
+    mesh = hemisphere_with_cut(4.0)
+    depth = sulcal_depth(mesh, convex_hull(mesh))
+    is_wall = np.linalg.norm(mesh.vertices[:, 1:], axis=1) < 8.1
+    is_wall &= mesh.vertices[:, 0] < 10.0
+    assert depth[is_wall] == pytest.approx(np.abs(mesh.vertices[is_wall, 0]), abs=0.05)
+    assert depth[~is_wall].max() < 0.05
 
 
 def test_local_index_is_high_at_a_sulcus_and_one_far_from_it() -> None:

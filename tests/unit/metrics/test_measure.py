@@ -22,7 +22,7 @@ from gyriflow.metrics.measure import (
     measure_white,
     thickness_metrics,
 )
-from gyriflow.metrics.regions import region_metrics
+from gyriflow.metrics.tables import region_metrics
 from gyriflow.metrics.thickness import at_part, depth_of_weight, simulated_thickness
 from gyriflow.quantities import METRICS, VERTEX_MAPS
 from gyriflow.settings.terms import PROXIES

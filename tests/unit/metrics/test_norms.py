@@ -1,5 +1,6 @@
 """Norms of brains that are drawn from known curves, and published ones; tables of a study, by brain, side and week."""
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy import stats
 
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.yaml_files import SCHEMES
-from gyriflow.metrics.lms import INTERVAL_Z, fit_norm
+from gyriflow.metrics.lms import MIN_SUBJECTS_FOR_SKEWNESS, SKEWNESS, fit_norm
 from gyriflow.metrics.norms import (
     LabelledBrain,
     cohort_from_plain,
@@ -29,7 +30,8 @@ from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 from gyriflow.study.checks import norm_settings
 from gyriflow.study.loading import load
 
-FILE = Path(__file__).parents[3] / "norms" / "svrtk-volumes.yaml"
+ROOT = Path(__file__).parents[3]
+FILE = ROOT / "norms" / "svrtk-volumes.yaml"
 NORMS = published_norms(yaml.safe_load(FILE.read_text()))
 
 
@@ -71,32 +73,117 @@ def growing(weeks):
     return 80 + 270 * ((weeks - 21) / 16) ** 1.3
 
 
-TRUE = {
-    "the same relative scatter": (True, lambda weeks, z: growing(weeks) * (1 + 0.08 * z)),
-    "the same scatter": (True, lambda weeks, z: growing(weeks) + 8.0 * z),
-    "skewed": (True, lambda weeks, z: growing(weeks) * np.exp(0.25 * z)),
-    "signed, wider with age": (False, lambda weeks, z: 0.1 * (weeks - 29) + (0.5 + 0.05 * (weeks - 21)) * z),
-}
+def centiles_benchmark():
+    """Return the module `benchmarks/centiles.py`."""
+    spec = importlib.util.spec_from_file_location("centiles", ROOT / "benchmarks" / "centiles.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@pytest.mark.parametrize("name", TRUE)
-def test_centiles_mean_what_they_say_at_each_week(name: str) -> None:
-    is_positive, value = TRUE[name]
-    random = np.random.default_rng(1)
-    at, true = (
-        axis.ravel() for axis in np.meshgrid([22.0, 27.0, 32.0, 36.0], stats.norm.ppf([0.01, 0.05, 0.5, 0.95, 0.99]))
-    )
-    found = []
-    for _ in range(200):
-        weeks = random.uniform(21, 37, 200)
-        norm = fit_norm(weeks, value(weeks, random.standard_normal(200)), np.ones(200), 200, is_positive=is_positive)
-        found.append(norm.scores(at, value(at, true)))
-    z, error = np.swapaxes(found, 0, 1)
-    assert np.abs(100 * (stats.norm.cdf(z).mean(axis=0) - stats.norm.cdf(true))).max() < 2.0
-    # a 90 % interval of 200 cohorts, with the chance of 200 draws
-    holds = (np.abs(z - true) <= INTERVAL_Z * error).mean(axis=0)
-    assert 0.83 < holds.min() < holds.max() < 0.975
-    assert 0.88 < holds.mean() < 0.94
+CENTILES = centiles_benchmark()
+COHORTS, SEED = 30, 5
+
+
+@pytest.mark.parametrize("subjects", [12, 30, 100])
+@pytest.mark.parametrize("name", CENTILES.CASES)
+def test_of_new_normal_subjects_5_percent_are_below_the_5th_centile(name: str, subjects: int) -> None:
+    case = CENTILES.CASES[name]
+    if subjects < case.min_subjects:
+        return
+    found = CENTILES.new_subjects(case, subjects, COHORTS, seed=SEED)
+    below, above, first = (np.array(column) for column in zip(*found.values(), strict=True))
+    # with the chance of so few cohorts
+    for share in (below, above):
+        assert np.abs(share - 5).max() < 4.2
+        assert share.mean() == pytest.approx(5, abs=2.2)
+    assert first.max() < 3.0
+    assert first.mean() < 2.0
+
+
+@pytest.mark.parametrize("subjects", [30, 200])
+def test_half_a_week_beyond_the_norm_brains_are_expected_to_have_grown(subjects: int) -> None:
+    found = CENTILES.new_subjects(CENTILES.CASES["constant CV"], subjects, COHORTS, seed=2, beyond=0.5)
+    for name in ("first", "last"):
+        below, above, first = found[name]
+        assert max(below, above) < 9.5
+        assert min(below, above) > 1.0
+        assert first < 3.0
+
+
+def test_subjects_of_a_norm_are_scored_as_new_ones() -> None:
+    found = CENTILES.members(CENTILES.CASES["constant CV"], 35, 6, seed=1)
+    below, above, first = np.mean(list(found.values()), axis=0)
+    assert below == pytest.approx(5, abs=2.5)
+    assert above == pytest.approx(5, abs=2.5)
+    assert first < 2.5
+
+
+@pytest.mark.parametrize("subjects", [30, 200])
+def test_a_90_percent_interval_of_z_holds(subjects: int) -> None:
+    random, case = np.random.default_rng(1), CENTILES.CASES["constant CV"]
+    at, true = (axis.ravel() for axis in np.meshgrid([22.0, 29.0, 36.0], stats.norm.ppf([0.05, 0.5, 0.95])))
+    holds = []
+    for _ in range(60):
+        weeks, values, people = CENTILES.drawn(case, subjects, random)
+        low, high = fit_norm(weeks, values, people, is_positive=True).scores(at, case.values(at, true))[1]
+        holds.append((low <= true) & (true <= high))
+    assert 0.83 < np.mean(holds) < 0.97
+
+
+def test_few_subjects_of_one_week_are_compared_by_students_distribution() -> None:
+    values = np.array([3.0, 5.0, 4.0, 6.5, 2.5, 4.5, 5.5, 3.5, 4.0, 6.0, 3.0, 4.5])
+    norm = fit_norm(np.full(12, 25.0), values, np.arange(12), is_positive=False)
+    distance = (7.0 - values.mean()) / values.std(ddof=1)
+    z, (low, high) = norm.scores([25.0], [7.0])
+    # once with the error of the mean: in the spread of new subjects
+    student = stats.t.cdf(distance / np.sqrt(1 + 1 / 12), 11)
+    assert z[0] == pytest.approx(stats.norm.ppf(student), rel=1e-3)
+    error = 1.645 * np.sqrt(1 / 12 + distance**2 / 22)
+    assert [low[0], high[0]] == pytest.approx([distance - error, distance + error], rel=1e-3)
+    assert norm.values([25.0], float(z[0])) == pytest.approx([7.0], rel=1e-6)
+
+
+def test_skewness_is_estimated_from_many_subjects() -> None:
+    random = np.random.default_rng(0)
+    for share, subjects in ((0.0, 400), (1.0, 400), (1.0, MIN_SUBJECTS_FOR_SKEWNESS - 1)):
+        weeks, z = random.uniform(21, 37, subjects), random.standard_normal(subjects).clip(-3, 3)
+        values = CENTILES.volume(weeks) * np.where(share, 1 + 0.25 * z, np.exp(0.25 * z))
+        norm = fit_norm(weeks, values, np.arange(subjects), is_positive=True)
+        if subjects == 400:
+            assert norm.skewness == pytest.approx(share, abs=0.35)
+        else:
+            assert norm.skewness == SKEWNESS
+
+
+def test_a_subject_is_removed_by_one_step_as_by_another_fit() -> None:
+    weeks, values, people = CENTILES.drawn(CENTILES.CASES["constant CV"], 150, np.random.default_rng(5))
+    norm = fit_norm(weeks, values, people, is_positive=True)
+    inner = np.flatnonzero((np.abs(weeks - 29) < 5) & (np.abs(norm.scores(weeks, values)[0]) > 1.0))[:5]
+    for number in inner:
+        scan = [weeks[number]], [values[number]]
+        others = people != people[number]
+        alone = fit_norm(weeks[others], values[others], people[others], is_positive=True).scores(*scan)[0]
+        change = alone - norm.scores(*scan)[0]
+        one_step = norm.without(weeks[number], values[number]).scores(*scan)[0]
+        assert np.abs(one_step - alone).max() < 0.35 * np.abs(change).max() + 0.01
+
+
+def test_a_run_is_compared_with_all_subjects_and_a_scan_with_the_others() -> None:
+    weeks = np.arange(21.0, 33.0)
+    metrics, reference = table(weeks, 10 * weeks + np.tile([1.0, -1.0], 6))
+    run = metrics[metrics["subject"] == "s5"].assign(run="expected", value=263.0)
+    found = scores(pd.concat([metrics, run]), reference).query("subject == 's5'").set_index("run")
+    assert found["brains"].to_dict() == {"real": 11, "expected": 12}
+
+
+def test_the_interval_of_a_median_is_that_of_a_mean() -> None:
+    values = np.random.default_rng(2).normal(50.0, 6.0, 81)
+    curve = curves(*table(np.full(81, 25.0), values)).iloc[0]
+    half = 0.5 * (curve["expected_high"] - curve["expected_low"])
+    assert half == pytest.approx(1.645 * values.std() / 9, rel=0.03)
+    assert curve["expected"] == pytest.approx(values.mean(), abs=0.7)
+    assert curve["sd"] == pytest.approx(values.std(), rel=0.05)
 
 
 @pytest.mark.parametrize(("subjects", "weeks"), [(200, 160), (200, 7), (200, 1), (20, 16), (20, 3)])
@@ -105,11 +192,11 @@ def test_values_and_scores_are_inverse(subjects: int, weeks: int, is_positive: b
     random = np.random.default_rng(2)
     at = random.choice(np.linspace(21, 37, weeks), subjects)
     values = growing(at) * np.exp(0.1 * random.standard_normal(subjects)) - (0 if is_positive else 150)
-    norm = fit_norm(at, values, np.ones(subjects), subjects, is_positive=is_positive)
+    norm = fit_norm(at, values, np.arange(subjects), is_positive=is_positive)
     some = np.unique(at)[:3]
     for z in (-1.6, 0.0, 1.0):
         assert norm.scores(some, norm.values(some, z))[0] == pytest.approx(np.full(len(some), z), abs=1e-6)
-    assert (norm.freedom is None, norm.is_spline) == (subjects == 200, subjects == 200 and weeks > 7)
+    assert norm.is_spline == (weeks > 7)
 
 
 def test_a_small_head_of_22_weeks_is_found() -> None:
@@ -222,7 +309,7 @@ def test_norms_are_of_subjects_and_not_of_their_scans() -> None:
     own = metrics.assign(person=metrics["subject"])
     twice = pd.concat([own, own.assign(subject=own["subject"] + "again")])
     both = [curves(metrics, reference), curves(twice, list(twice["subject"]))]
-    np.testing.assert_allclose(both[0][["q05", "q95"]], both[1][["q05", "q95"]])
+    np.testing.assert_allclose(both[0][["q05", "q95"]], both[1][["q05", "q95"]], rtol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -366,6 +453,31 @@ def test_change_of_scans_and_of_the_simulation_from_the_first() -> None:
     assert table.loc[("real", "frontal"), "change"] == 6.0
     assert ("follows", "frontal") not in table.index
     assert set(table["subject"]) == {"one"}
+
+
+def test_change_of_a_metric_below_zero_over_uneven_weeks() -> None:
+    rows = [
+        ("early", "real", 21.5, "right", "mean_shape_index", -0.2, "1"),
+        ("late", "real", 24.0, "right", "mean_shape_index", 0.05, "1"),
+        ("early", "run", 21.5, "right", "mean_shape_index", -0.4, "1"),
+        ("early", "run", 24.0, "right", "mean_shape_index", -0.1, "1"),
+    ]
+    found = change_between_scans(long_table([pd.DataFrame(rows, columns=COLUMNS)]), SCANS).set_index("run")
+    names = ["change", "change_per_week", "relative_change", "measured_change", "difference"]
+    assert found.loc["real", names].tolist() == pytest.approx([0.25, 0.1, 1.25, 0.25, 0.0])
+    assert found.loc["run", names].tolist() == pytest.approx([0.3, 0.12, 0.75, 0.25, -0.15])
+    assert found.loc["run", ["from_brain", "to_brain", "from_week", "to_week"]].tolist() == [
+        "early",
+        "late",
+        21.5,
+        24.0,
+    ]
+
+
+def test_asymmetry_has_the_sign_of_the_larger_side() -> None:
+    table = pd.DataFrame({"hemisphere": ["right", "left"], "metric": "volume", "unit": "mL", "value": [7.0, 3.0]})
+    (found,) = asymmetry(table).to_dict("records")
+    assert (found["difference"], found["asymmetry_index"]) == (-4.0, pytest.approx(-0.8))
 
 
 def test_wide_has_a_row_per_brain_and_week() -> None:
