@@ -90,6 +90,7 @@ from .repair import (
     surface_of_mask,
 )
 from .sulci import open_fused_sulci
+from .thickness import MIN_VOXELS, voxels_through_cortex
 
 log = logging.getLogger(__name__)
 
@@ -256,9 +257,12 @@ def _with_sulci(
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         reason = "the labels have no white matter"
         return field, affine, 0.0, {"stays_fused": reason}, _fused_sulci_warning(reason, volume.week)
+    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    if (voxels := voxels_through_cortex(cerebrum.mask, core, cerebrum.affine)) < MIN_VOXELS:
+        reason = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
+        return field, affine, 0.0, {"stays_fused": reason}, _fused_sulci_warning(reason, volume.week)
     # handles are found faster before voxels are refined
     simple, repaired = make_simple(field, cerebrum.smallest_part)
-    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     if not report.get("sheets"):
         return field, affine, 0.0, report, _fused_sulci_warning(report.get("stays_fused"), volume.week)
