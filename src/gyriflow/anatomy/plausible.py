@@ -3,6 +3,9 @@
 An impossible size reveals files in metres, micrometres or centimetres.
 """
 
+from collections.abc import Iterable
+from itertools import pairwise
+
 import numpy as np
 
 from ..errors import InputError
@@ -27,6 +30,8 @@ MAX_CUT_FACTOR = 2.0
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
+# usual limits of the ratio of mean thickness between brains a week apart and further: CRL's has 1.2 from 21 to 22 GW
+MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
 
@@ -168,3 +173,18 @@ def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
             expected=f"at most {max_mm:.1f} mm",
             remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
         )
+
+
+def thickness_jumps(series: Iterable[tuple[str, float, float]]) -> list[str]:
+    """Return warnings of successive brains of a growth series whose thickness differs as only labels do.
+
+    `series` has each brain's name, week and mean thickness in mm, which may be NaN.
+    """
+    measured = sorted((brain for brain in series if brain[2] > 0), key=lambda brain: brain[1])
+    warnings = []
+    for (first, week, before), (second, later, after) in pairwise(measured):
+        limit = np.clip(MAX_WEEKLY_RATIO ** (later - week), MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO)
+        if max(before / after, after / before) > limit:
+            thick = f"the cortex of {first} ({week:g} GW) is {before:.2f} mm thick, that of {second} ({later:g} GW)"
+            warnings.append(f"{thick} {after:.2f} mm: were both labelled in the same way?")
+    return warnings

@@ -33,10 +33,10 @@ MIN_SHEET_DEPTH = 1.5
 MARGIN_VOXELS = 3
 # value of the field in a slit; with 1 next to it, a slit of one voxel becomes 0.9 voxels wide
 SLIT_VALUE = 0.1
-# the usual thickness is that of the surface nearby, since cortex may be twice as thick elsewhere
+# the usual thickness is that of the surface nearby where this is thinner
 NEARBY_MM = 15.0
 # places at which it is determined, and depths of the surface that count for it
-PLACES_MM, N_DEPTHS = 5.0, 20_000
+PLACES_MM, N_DEPTHS = 5.0, 10_000
 # cortex further from white matter than this many thicknesses lacks white matter; largest share of such cortex
 FAR, MAX_FAR_SHARE = 3.0, 0.05
 
@@ -101,17 +101,20 @@ def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, 
 
 
 def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
-    """Return the median depth in mm of the cortex at the surface around (n, 3) points.
+    """Return the median depth in mm of the cortex at the surface around (n, 3) points, at most that of the brain.
 
-    `depth` (m,) is that at the (m, 3) points of the surface. The median is taken within `NEARBY_MM` of places
+    Above many fused sulci the surface is further from white matter than the cortex is thick.
+
+    `depth` (m,) is that at the (m, 3) points of the surface; no coordinate is negative. The median is taken within `NEARBY_MM` of places
     `PLACES_MM` apart, and is that of the nearest place.
     """
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
-    cells, cell = np.unique(np.rint(points / PLACES_MM).astype(np.int64), axis=0, return_inverse=True)
-    nearby = tree.query_ball_point(PLACES_MM * cells, NEARBY_MM)
-    overall = float(np.median(depth))
-    return np.array([np.median(depth[rows]) if len(rows) else overall for rows in nearby])[cell.ravel()]
+    cell = np.rint(points / PLACES_MM).astype(np.int64)
+    shape, overall = tuple(cell.max(axis=0) + 1), float(np.median(depth))
+    nearby = tree.query_ball_point(PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM)
+    medians = np.array([min(np.median(depth[rows]), overall) if rows else overall for rows in nearby])
+    return medians.reshape(shape)[tuple(cell.T)]
 
 
 def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask) -> tuple[Mask, int]:
