@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.anatomy.pial import logged
-from gyriflow.anatomy.plausible import thickness_jumps
+from gyriflow.anatomy.plausible import logged, thickness_jumps
 from gyriflow.geometry.triangles import area_cm2, volume_ml
 from gyriflow.growth.rates import TISSUES, rates_of_series
 from gyriflow.io.files import read_json, write_table

@@ -30,7 +30,6 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
-from ..settings.schemes import LabelScheme
 from ..settings.terms import Side
 from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
 
@@ -384,31 +383,19 @@ def open_fissure(
     return np.minimum(field, np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0)).astype(np.float32)
 
 
-def signed_side_distance(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:
-    """Return each voxel's distance in mm to the left hemisphere's labels minus that to the right hemisphere's.
-
-    It is negative on the left, positive on the right and zero half-way between.
-    """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    left, right = (
-        ndimage.distance_transform_edt(~np.isin(labels, side), sampling=size) for side in (scheme.left, scheme.right)
-    )
-    return np.asarray(left - right)
-
-
 def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Floats:
     """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
     return ndimage.map_coordinates(field, voxel_index(points, affine), order=1, mode="nearest")
 
 
-def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
+def plane_between_labels(left: Mask, right: Mask, affine: Floats, brain: Mask) -> MidPlane:
     """Fit a plane to the points half-way between the labels of the two sides, in and around a brain.
 
-    It serves brains whose hemispheres are too unequal for a plane of mirror symmetry. `side` is the result of
-    `signed_side_distance`, `brain` the (i, j, k) mask of the brain.
+    It serves brains whose hemispheres are too unequal for a plane of mirror symmetry. All masks are (i, j, k).
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
-    near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
+    to_left, to_right = (ndimage.distance_transform_edt(~side, sampling=size) for side in (left, right))
+    side, near = to_left - to_right, ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
     places = transform_points(np.argwhere(near & (np.abs(side) < size.max())), affine)
     centre = places.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(places.T))

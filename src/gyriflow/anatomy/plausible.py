@@ -3,6 +3,7 @@
 An impossible size reveals files in metres, micrometres or centimetres.
 """
 
+import logging
 from collections.abc import Iterable
 from itertools import pairwise
 
@@ -11,6 +12,8 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume
 from ..units import ML_PER_MM3
+
+log = logging.getLogger(__name__)
 
 # cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
 # by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)
@@ -34,6 +37,14 @@ DOUBTFUL_RATIO = 1.15
 MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
+
+
+def logged(warnings: Iterable[str]) -> list[str]:
+    """Log warnings and return them."""
+    warnings = list(warnings)
+    for warning in warnings:
+        log.warning(warning)
+    return warnings
 
 
 def expected_volume_ml(week: float) -> float:

@@ -10,12 +10,12 @@ from typing import Any
 
 import igl
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import MeshError
-from ..geometry.matching import nearest_on
+from ..geometry.deformations import voxel_index
+from ..geometry.matching import nearest_on, surface_mask
 from ..geometry.remeshing import (
     REMESHING_ROUNDS,
     SHARP_DEG,
@@ -189,10 +189,9 @@ def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, 
     document = in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
     smooth = from_meshlab(document)
-    even = remesh(smooth, edge_length_mm)
-    crossing = int(self_intersecting_faces(even).sum())
-    if crossing and self_intersecting_faces(even := untangle(even)).any():
-        even = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
+    even, crossing, remaining = untangle(remesh(smooth, edge_length_mm))
+    if remaining:
+        even, _, _ = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
     return even, crossing
 
 
@@ -372,22 +371,14 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     if not MIN_LENGTH_MM < np.ptp(mesh.vertices, axis=0).max() < MAX_LENGTH_MM:
         # surfaces in another unit are reported elsewhere
         return mesh, []
-    size = np.full(3, STALK_VOXEL_MM)
-    first = mesh.vertices.min(axis=0) - 2.0 * size
-    shape = np.ceil((np.ptp(mesh.vertices, axis=0) + 4.0 * size) / size).astype(int)
-    grid = pv.ImageData(dimensions=shape, spacing=size, origin=first)
-    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-    image = body.voxelize_binary_mask(reference_volume=grid)
-    mask = np.asarray(image["mask"]).reshape(shape, order="F") > 0
-    affine = np.diag([*size, 1.0])
-    affine[:3, 3] = first
-    remaining, report = without_stalks(mask, affine)
+    labels, affine = surface_mask(mesh, STALK_VOXEL_MM)
+    remaining, report = without_stalks(labels > 0, affine)
     if not report:
         return mesh, []
     # a face belongs to the same side of a cut as the nearest voxel inside
-    _, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
-    voxel = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
-    is_kept = remaining[tuple(nearest[(slice(None), *voxel.T)])]
+    nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
+    voxel = np.rint(voxel_index(corners(mesh).mean(axis=1), affine)).astype(int)
+    is_kept = remaining[tuple(nearest[(slice(None), *voxel)])]
     cut_open, _ = submesh(mesh, is_kept)
     return clean(cut_open, MAX_CUT_MM)[0], report
 

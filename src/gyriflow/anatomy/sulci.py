@@ -105,8 +105,8 @@ def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
 
     Above many fused sulci the surface is further from white matter than the cortex is thick.
 
-    `depth` (m,) is that at the (m, 3) points of the surface; no coordinate is negative. The median is taken within `NEARBY_MM` of places
-    `PLACES_MM` apart, and is that of the nearest place.
+    `depth` (m,) is that at the (m, 3) points of the surface; no coordinate is negative. The median is taken within
+    `NEARBY_MM` of places `PLACES_MM` apart, and is that of the nearest place.
     """
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
