@@ -263,34 +263,24 @@ class Fissure:
         """Return the (2, n) grid coordinates of (n, 3) points, in cells of `heights`."""
         return np.asarray((points @ self.axes.T - self.corner).T / SPACING_MM, dtype=np.float64)
 
-    def nearest_cells(self, points: Floats) -> tuple[Ints, ...]:
-        """Return the two (n,) index arrays of the heights nearest to (n, 3) points."""
-        ends = np.array(self.heights.shape)[:, None] - 1
-        return tuple(np.clip(np.rint(self.cells(points)).astype(int), 0, ends))
-
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
-    """Return the mid-surface half-way between the facing medial walls of a closed surface."""
+    """Return the mid-surface half-way between the facing medial walls of a closed surface, else the plane."""
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     flat = walls.vertices @ axes.T
     corner = flat.min(axis=0) - MARGIN_MM
     shape = tuple(np.ceil((flat.max(axis=0) + MARGIN_MM - corner) / SPACING_MM).astype(int) + 1)
-    return between(walls, Fissure(plane, axes, corner, np.zeros(shape)))
-
-
-def between(walls: TriangleMesh, start: Fissure) -> Fissure:
-    """Move a mid-surface to half-way between facing walls. Parts without walls nearby stay."""
-    plane, shape, bend = start.plane, start.heights.shape, BEND_MM / SPACING_MM
+    fissure = Fissure(plane, axes, corner, np.zeros(shape))
     middle = fissure_points(walls, plane.normal, plane.offset)
-    height, fissure = middle @ plane.normal - plane.offset, start
+    height, cells = middle @ plane.normal - plane.offset, np.rint(fissure.cells(middle)).astype(int)
     for _ in range(N_UPDATES):
         near = np.abs(fissure.height_above(middle)) < MAX_SHIFT_MM
-        index, weight, total = start.nearest_cells(middle[near]), np.zeros(shape), np.zeros(shape)
-        np.add.at(weight, index, 1.0)
-        np.add.at(total, index, height[near])
-        weight, total = ndimage.gaussian_filter(weight, bend), ndimage.gaussian_filter(total, bend)
-        # a weight far below one point per cell draws the surface back to its previous place
-        fissure = replace(start, heights=(total + 0.02 * start.heights) / (weight + 0.02))
+        weight, total = np.zeros(shape), np.zeros(shape)
+        np.add.at(weight, tuple(cells[:, near]), 1.0)
+        np.add.at(total, tuple(cells[:, near]), height[near])
+        weight, total = (ndimage.gaussian_filter(values, BEND_MM / SPACING_MM) for values in (weight, total))
+        # a weight far below one point per cell draws the surface back to the plane
+        fissure = replace(fissure, heights=total / (weight + 0.02))
     return fissure
 
 
