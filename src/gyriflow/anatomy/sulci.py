@@ -136,7 +136,7 @@ def _mark_sheet(
     cortex: Mask,
     nearest: NDArray[np.int32],
     axis: int,
-    min_mm: Floats,
+    min_mm: NDArray[np.floating],
     size: Floats,
     is_right: Mask | None,
 ) -> None:
