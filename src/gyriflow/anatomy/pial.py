@@ -78,7 +78,14 @@ from .plausible import (
     require_single_hemisphere,
     require_whole,
 )
-from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
+from .pose import (
+    WALL_DISTANCE_MM,
+    hemisphere_warnings,
+    pose_of_hemisphere,
+    pose_of_pair,
+    pose_of_surface,
+    pose_of_volume_by_shape,
+)
 from .repair import (
     RepairedSurface,
     filled_warning,
@@ -89,7 +96,7 @@ from .repair import (
     surface_of_mask,
 )
 from .sulci import open_fused_sulci
-from .thickness import MIN_VOXELS, voxels_through_cortex
+from .thickness import MIN_VOXELS, border, voxels_through_cortex
 
 # the mid-plane agrees with the labels if this is the cosine between its normal and the line from left to right: 45°
 MIN_AXIS_COSINE = 0.7
@@ -103,8 +110,6 @@ FUSED_AFTER_GW = 26.0
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
 MIN_GAP_MM = 0.5
-# distance of the medial wall of a single hemisphere from the mid-sagittal plane
-WALL_DISTANCE_MM = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,10 +293,10 @@ def _with_sulci(
     brain: _Brain,
 ) -> tuple[NDArray[np.float32], Floats, float]:
     """Open fused sulci; return the field, its affine, and the volume removed (mL)."""
-    voxels = np.inf
+    grid = cerebrum.affine
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
         report: dict[str, Any] = {"stays_fused": "the labels have no white matter"}
-    elif (voxels := voxels_through_cortex(cerebrum.mask, core, cerebrum.affine)) < MIN_VOXELS:
+    elif (voxels := voxels_through_cortex(cerebrum.mask, border(core, grid), grid)) < MIN_VOXELS:
         fused = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
         report = {"stays_fused": fused}
     else:

@@ -78,8 +78,8 @@ def cortical_thickness(
     its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over that of a
     complete surface around the cortex's volume, (1 + mean curvature × thickness) × volume / thickness.
     """
-    core = cerebrum & ~cortex
-    values = layer_thickness(pial, border(core, affine))
+    inner = border(cerebrum & ~cortex, affine)
+    values = layer_thickness(pial, inner)
     points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=0)
     # of long voxels, no centre may be nearer than half their diagonal
     voxel = max(float(np.cbrt(size.prod())), 0.5 * float(np.linalg.norm(size)))
@@ -104,9 +104,8 @@ def cortical_thickness(
     sheet_mm2 = float(cortex.sum()) * float(abs(np.linalg.det(affine[:3, :3]))) / report["mean_mm"]
     complete_mm2 = sheet_mm2 * (1.0 + mean_curvature(pial, is_measured) * report["mean_mm"])
     report |= {"area_ratio": area(pial) / complete_mm2, "voxel_mm": float(size.max())}
-    return Thickness(
-        filled, is_measured, report | {"voxels_through_cortex": voxels_through_cortex(cerebrum, core, affine)}
-    )
+    report["voxels_through_cortex"] = voxels_through_cortex(cerebrum, inner, affine)
+    return Thickness(filled, is_measured, report)
 
 
 def border(mask: Mask, affine: Floats) -> TriangleMesh:
@@ -122,9 +121,12 @@ def border(mask: Mask, affine: Floats) -> TriangleMesh:
     return TriangleMesh(mesh.vertices + missing_mm3 / area(mesh) * vertex_normals(mesh), mesh.faces)
 
 
-def voxels_through_cortex(cerebrum: Mask, core: Mask, affine: Floats) -> float:
-    """Return the median thickness of the cortex, between (i, j, k) masks, in edges of the longest kind of a voxel."""
-    outer, inner = border(cerebrum, affine), border(core, affine)
+def voxels_through_cortex(cerebrum: Mask, inner: TriangleMesh, affine: Floats) -> float:
+    """Return the median thickness of the cortex over the longest edge of a voxel.
+
+    The cortex lies between the border of the (i, j, k) mask of the cerebrum and its inner border.
+    """
+    outer = border(cerebrum, affine)
     points = outer.vertices[:: max(1, len(outer.vertices) // N_SAMPLES)]
     inward, _, nearest = nearest_on(points, inner)
     values = 0.5 * (inward + nearest_on(nearest, outer)[0]) / np.linalg.norm(affine[:3, :3], axis=0).max()
