@@ -173,17 +173,17 @@ def from_labels(
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
     cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
     smooth, affine = smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
-    grid, side_mm, removed_ml = affine, None, 0.0
+    grid, side_mm, removed_ml = affine, np.zeros(0, dtype=np.float32), 0.0
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     if not side:
         plane, side_mm = _fissure_of_labels(cerebrum, core, smooth, affine, scheme, brain)
         smooth, brain.report["slit_voxels_reopened"] = remove_bridges(cerebrum.mask, smooth)
     original = smooth, grid
-    if side_mm is not None and scheme.cortex:
+    if scheme.cortex and not side:
         smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, core)
         brain.report["fissure_opened_mL"] = removed_ml
     if open_sulci:
-        smooth, affine, taken_ml = _with_sulci(smooth, affine, cerebrum, core, scheme, side_mm, brain)
+        smooth, affine, taken_ml = _with_sulci(smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain)
         removed_ml += taken_ml
     even = surface_of_mask(
         smooth,
@@ -210,7 +210,7 @@ def _read_volume(
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
-    pose = Pose() if side else pose_of_labels(labels, affine, scheme)
+    pose = None if side else pose_of_labels(labels, affine, scheme)
     sides = _labelled_sides(cerebrum.tissue, scheme)
     if side and set(sides) - {side}:
         raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
@@ -232,7 +232,7 @@ def _read_volume(
         brain.warn(require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
         pose = pose or _pose_by_shape(field, cerebrum.affine, scheme)
         brain.warn(pose.warnings)
-    return cerebrum, pose
+    return cerebrum, pose or Pose()
 
 
 def _fissure_of_labels(
@@ -245,10 +245,10 @@ def _fissure_of_labels(
     plane = mid_plane(walls)
     sides = [np.isin(cerebrum.tissue, labels) for labels in (scheme.left, scheme.right) if has_sides]
     if has_sides:
-        left, right = (np.argwhere(labelled).mean(axis=0) for labelled in sides)
-        axis = affine[:3, :3] @ (right - left)
+        left, right = sides
+        axis = affine[:3, :3] @ (np.argwhere(right).mean(axis=0) - np.argwhere(left).mean(axis=0))
         if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
-            plane = plane_between_labels(*sides, affine, mask)
+            plane = plane_between_labels(left, right, affine, mask)
             brain.warn(["the hemispheres are not mirror images of each other: the mid-plane is that of their labels"])
     require_sides(cerebrum.tissue, scheme, affine, plane.normal)
     return plane, side_distance(mask, core if scheme.cortex else mask, affine, fissure_between(walls, plane), *sides)
