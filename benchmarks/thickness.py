@@ -64,9 +64,12 @@ def try_hidden(share: float) -> dict:
     """Measure the area ratio of a ball whose surface leaves out a fused sulcus with a share of the area."""
     places, affine = grid((VOXEL_MM,) * 3, RADIUS_MM + 6.0, (0, 0, 0))
     depth = RADIUS_MM - np.linalg.norm(places, axis=-1)
-    # a ring around the ball, as deep as its two banks have the area
-    deep = RADIUS_MM - np.sqrt(RADIUS_MM**2 - 2.0 * RADIUS_MM**2 * share / (1.0 - share))
-    to_end = np.hypot(places @ ACROSS, np.maximum(depth - deep, 0.0))
+    # from above, as deep as the segments of a circle on its two banks have the area
+    deep = np.linspace(0.0, 2.0 * RADIUS_MM, 2001)
+    half_chord = np.sqrt(np.maximum(deep * (2.0 * RADIUS_MM - deep), 0.0))
+    segment = RADIUS_MM**2 * np.arccos(1.0 - deep / RADIUS_MM) - (RADIUS_MM - deep) * half_chord
+    reach = np.interp(share / (1.0 - share) * 2.0 * np.pi * RADIUS_MM**2, segment, deep)
+    to_end = np.hypot(places @ ACROSS, np.maximum(RADIUS_MM - reach - places @ ALONG, 0.0))
     body, cortex = depth > 0, (depth > 0) & ((depth < CORTEX_MM) | ((to_end < CORTEX_MM) & (share > 0)))
     pial = surface_of_mask(smooth_mask(body), affine, float(body.sum() * VOXEL_MM**3), EDGE_MM).mesh
     return {"hidden": share, "area_ratio": cortical_thickness(pial, body, cortex, affine).report["area_ratio"]}

@@ -173,7 +173,8 @@ def from_labels(
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
     cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
     smooth, affine = smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
-    grid, side_mm, removed_ml = affine, np.zeros(0, dtype=np.float32), 0.0
+    grid, removed_ml = affine, 0.0
+    side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     if not side:
         plane, side_mm = _fissure_of_labels(cerebrum, core, smooth, affine, scheme, brain)
