@@ -127,11 +127,11 @@ def test_area_that_fused_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, h
     labels = np.where(inside, np.where((depth < 2.0) | banks, 5, 1), 0)
     scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
     found = thickness_from_labels(labels, affine, scheme, pial, Pose())
-    assert found.report["area_ratio"] == pytest.approx(1.0 - hidden, abs=0.02)
+    assert found.report["area_ratio"] == pytest.approx(1.0 - hidden, abs=0.03)
     assert caplog.messages == [Facts("cortex", f"{found.report['area_ratio']:.2f}")] * (
         found.report["area_ratio"] < 0.95
     )
-    assert bool(caplog.messages) == (hidden >= 0.1) or hidden == 0.05
+    assert bool(caplog.messages) == (hidden > 0.05)
 
 
 @pytest.mark.parametrize(("size", "tolerance"), [((0.8,) * 3, 0.01), ((1.2,) * 3, 0.01), ((1.0, 1.0, 3.0), 0.02)])
