@@ -32,6 +32,33 @@ class Mutant(NamedTuple):
 
 
 BY_TESTS = {
+    # places and volumes in long, turned voxels, at every border and on both sides
+    "anatomy/test_labels.py": [
+        ("src/gyriflow/anatomy/labels.py", "for end in (0, -1))", "for end in (0,))"),
+        ("src/gyriflow/anatomy/labels.py", '"inside_cortex": main & ~fluid & ~outer', '"inside_cortex": main & ~outer'),
+    ],
+    "anatomy/test_thickness.py": [
+        ("src/gyriflow/anatomy/thickness.py", "np.abs(points[:, 0] - fissure_x_mm)", "(points[:, 0] - fissure_x_mm)"),
+        (
+            "src/gyriflow/anatomy/thickness.py",
+            "points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=0)",
+            "points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=1)",
+        ),
+    ],
+    "anatomy/test_pial.py": [
+        ("src/gyriflow/anatomy/pial.py", "motion(shift=-moved * to_right)", "motion(shift=moved * to_right)"),
+    ],
+    "anatomy/test_sulci.py": [
+        ("src/gyriflow/anatomy/pial.py", 'report["opened_mL"] - gained_ml', 'report["opened_mL"]'),
+        (
+            "src/gyriflow/anatomy/sulci.py",
+            "MIN_BANK_DISTANCE * thickness",
+            "MIN_BANK_DISTANCE * np.median(thickness[cortex])",
+        ),
+    ],
+    "anatomy/test_plausible.py": [
+        ("src/gyriflow/anatomy/plausible.py", "max(before / after, after / before)", "before / after"),
+    ],
     # which brain, side or setting is chosen
     "study/test_which_brain.py": [
         ("src/gyriflow/study/study.py", "max(earlier, key", "min(earlier, key"),

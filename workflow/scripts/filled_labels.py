@@ -10,15 +10,13 @@ from gyriflow.step import step
 files = snakemake.input
 with step(snakemake.log[0], *files.white):
     report, similar = read_json(files.report), read_json(files.similar) if files.similar else {}
-    thickness = similar.get("mean_mm", TYPICAL_THICKNESS_MM)
-    through = similar.get("voxels_through_cortex")
     whites = {side: read_surface(path) for side, path in snakemake.params.white.items()}
     labels, affine = filled_labels(
         read_surface(files.whole),
         [read_surface(path) for path in files.sides],
         report["fissure_x_mm"],
         whites=list(posed_whites(read_pose(files.report), whites).values()),
-        thickness_mm=thickness,
-        voxel_mm=thickness / through if through else TYPICAL_VOXEL_MM,
+        thickness_mm=similar.get("mean_mm", TYPICAL_THICKNESS_MM),
+        voxel_mm=similar.get("voxel_mm", TYPICAL_VOXEL_MM),
     )
     write_label_volume(snakemake.output[0], LabelVolume(labels, affine))

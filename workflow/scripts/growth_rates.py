@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from gyriflow.anatomy.plausible import logged, thickness_jumps
 from gyriflow.geometry.triangles import area_cm2, volume_ml
 from gyriflow.growth.rates import TISSUES, rates_of_series
 from gyriflow.io.files import read_json, write_table
@@ -16,6 +17,8 @@ with step(snakemake.log[0]):
     areas["area_cm2"] = list(map(area_cm2, surfaces))
     areas["thickness_mm"] = areas["subject"].map({name: read_json(path)["mean_mm"] for name, path in thickness.items()})
     areas["volume_ml"] = list(map(volume_ml, surfaces))
+    for _, brains in areas.groupby("series", sort=False):
+        logged(thickness_jumps(brains[["subject", "week", "thickness_mm"]].itertuples(index=False, name=None)))
     tissues = [read_json(report).get("label_volumes_mL", {}) for report in files.reports]
     for tissue in TISSUES:
         areas[f"{tissue}_ml"] = [volumes.get(tissue) for volumes in tissues]

@@ -1,6 +1,6 @@
 """Make the white surfaces of a brain from its labels or from given files, and measure them."""
 
-from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
+from gyriflow.anatomy.thickness import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
 from gyriflow.io.surfaces import (
     STRUCTURES,

@@ -30,7 +30,6 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
-from ..settings.schemes import LabelScheme
 from ..settings.terms import Side
 from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
 
@@ -264,34 +263,24 @@ class Fissure:
         """Return the (2, n) grid coordinates of (n, 3) points, in cells of `heights`."""
         return np.asarray((points @ self.axes.T - self.corner).T / SPACING_MM, dtype=np.float64)
 
-    def nearest_cells(self, points: Floats) -> tuple[Ints, ...]:
-        """Return the two (n,) index arrays of the heights nearest to (n, 3) points."""
-        ends = np.array(self.heights.shape)[:, None] - 1
-        return tuple(np.clip(np.rint(self.cells(points)).astype(int), 0, ends))
-
 
 def fissure_between(walls: TriangleMesh, plane: MidPlane) -> Fissure:
-    """Return the mid-surface half-way between the facing medial walls of a closed surface."""
+    """Return the mid-surface half-way between the facing medial walls of a closed surface, else the plane."""
     axes = np.linalg.svd(plane.normal[None])[2][1:]
     flat = walls.vertices @ axes.T
     corner = flat.min(axis=0) - MARGIN_MM
     shape = tuple(np.ceil((flat.max(axis=0) + MARGIN_MM - corner) / SPACING_MM).astype(int) + 1)
-    return between(walls, Fissure(plane, axes, corner, np.zeros(shape)))
-
-
-def between(walls: TriangleMesh, start: Fissure) -> Fissure:
-    """Move a mid-surface to half-way between facing walls. Parts without walls nearby stay."""
-    plane, shape, bend = start.plane, start.heights.shape, BEND_MM / SPACING_MM
+    fissure = Fissure(plane, axes, corner, np.zeros(shape))
     middle = fissure_points(walls, plane.normal, plane.offset)
-    height, fissure = middle @ plane.normal - plane.offset, start
+    height, cells = middle @ plane.normal - plane.offset, np.rint(fissure.cells(middle)).astype(int)
     for _ in range(N_UPDATES):
         near = np.abs(fissure.height_above(middle)) < MAX_SHIFT_MM
-        index, weight, total = start.nearest_cells(middle[near]), np.zeros(shape), np.zeros(shape)
-        np.add.at(weight, index, 1.0)
-        np.add.at(total, index, height[near])
-        weight, total = ndimage.gaussian_filter(weight, bend), ndimage.gaussian_filter(total, bend)
-        # a weight far below one point per cell draws the surface back to its previous place
-        fissure = replace(start, heights=(total + 0.02 * start.heights) / (weight + 0.02))
+        weight, total = np.zeros(shape), np.zeros(shape)
+        np.add.at(weight, tuple(cells[:, near]), 1.0)
+        np.add.at(total, tuple(cells[:, near]), height[near])
+        weight, total = (ndimage.gaussian_filter(values, BEND_MM / SPACING_MM) for values in (weight, total))
+        # a weight far below one point per cell draws the surface back to the plane
+        fissure = replace(fissure, heights=total / (weight + 0.02))
     return fissure
 
 
@@ -384,31 +373,19 @@ def open_fissure(
     return np.minimum(field, np.clip(0.5 + EDGE_SLOPE * outside / voxel, 0.0, 1.0)).astype(np.float32)
 
 
-def signed_side_distance(labels: NDArray[np.integer], scheme: LabelScheme, affine: Floats) -> Floats:
-    """Return each voxel's distance in mm to the left hemisphere's labels minus that to the right hemisphere's.
-
-    It is negative on the left, positive on the right and zero half-way between.
-    """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    left, right = (
-        ndimage.distance_transform_edt(~np.isin(labels, side), sampling=size) for side in (scheme.left, scheme.right)
-    )
-    return np.asarray(left - right)
-
-
 def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Floats:
     """Return the (n,) values of an (i, j, k) field at (n, 3) points in mm, linear between voxels."""
     return ndimage.map_coordinates(field, voxel_index(points, affine), order=1, mode="nearest")
 
 
-def plane_between_labels(side: Floats, affine: Floats, brain: Mask) -> MidPlane:
+def plane_between_labels(left: Mask, right: Mask, affine: Floats, brain: Mask) -> MidPlane:
     """Fit a plane to the points half-way between the labels of the two sides, in and around a brain.
 
-    It serves brains whose hemispheres are too unequal for a plane of mirror symmetry. `side` is the result of
-    `signed_side_distance`, `brain` the (i, j, k) mask of the brain.
+    It serves brains whose hemispheres are too unequal for a plane of mirror symmetry. All masks are (i, j, k).
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
-    near = ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
+    to_left, to_right = (ndimage.distance_transform_edt(~side, sampling=size) for side in (left, right))
+    side, near = to_left - to_right, ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
     places = transform_points(np.argwhere(near & (np.abs(side) < size.max())), affine)
     centre = places.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov(places.T))

@@ -1,8 +1,7 @@
 """Make a brain's posed pial surface from a label volume, from surface files or from a simple shape."""
 
-import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .extraction import (
+    COMPARABLE,
     LEVEL,
     Floats,
     Mask,
@@ -44,7 +44,6 @@ from .extraction import (
 )
 from .fissure import (
     FISSURE_MM,
-    Fissure,
     MidPlane,
     cut_middle,
     cut_share,
@@ -59,7 +58,6 @@ from .fissure import (
     sample,
     separate,
     side_distance,
-    signed_side_distance,
     smallest_gap,
     split,
     upright,
@@ -71,6 +69,7 @@ from .plausible import (
     DOUBTFUL_RATIO,
     cut_warnings,
     facing_warnings,
+    logged,
     max_cut_share,
     proportion_warnings,
     require_common_pose,
@@ -80,7 +79,14 @@ from .plausible import (
     require_single_hemisphere,
     require_whole,
 )
-from .pose import hemisphere_warnings, pose_of_hemisphere, pose_of_pair, pose_of_surface, pose_of_volume_by_shape
+from .pose import (
+    WALL_DISTANCE_MM,
+    hemisphere_warnings,
+    pose_of_hemisphere,
+    pose_of_pair,
+    pose_of_surface,
+    pose_of_volume_by_shape,
+)
 from .repair import (
     RepairedSurface,
     filled_warning,
@@ -91,8 +97,7 @@ from .repair import (
     surface_of_mask,
 )
 from .sulci import open_fused_sulci
-
-log = logging.getLogger(__name__)
+from .thickness import MIN_VOXELS, border, voxels_through_cortex
 
 # the mid-plane agrees with the labels if this is the cosine between its normal and the line from left to right: 45°
 MIN_AXIS_COSINE = 0.7
@@ -106,8 +111,6 @@ FUSED_AFTER_GW = 26.0
 POSE_VOXEL_MM = 1.5
 # smallest gap between hemispheres from surfaces
 MIN_GAP_MM = 0.5
-# distance of the medial wall of a single hemisphere from the mid-sagittal plane
-WALL_DISTANCE_MM = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +129,24 @@ class PialSurface:
     fissure_x_mm: float
     pose: Pose
     report: dict[str, Any]
+
+
+@dataclass
+class _Brain:
+    """The week, report and warnings of a brain while its surface is made."""
+
+    week: float
+    report: dict[str, Any]
+    warnings: list[str] = field(default_factory=list)
+
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Log warnings and keep them."""
+        self.warnings += logged(warnings)
+
+    def take(self, surface: RepairedSurface, suffix: str = "") -> None:
+        """Keep the warnings and the report of repairs, its keys with a suffix."""
+        self.report |= {f"{key}{suffix}": value for key, value in surface.report.items()}
+        self.warn(surface.warnings)
 
 
 def from_labels(
@@ -150,127 +171,150 @@ def from_labels(
     InputError if the labels do not fit the scheme or the week, for a single hemisphere without `side`, and for a whole
     brain or labels of the other hemisphere with it. MeshError if the surface keeps self-intersections.
     """
-    volume = _read_volume(labels, affine, scheme, side, week)
+    brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
+    cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
+    smooth, affine = smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
+    grid, removed_ml = affine, 0.0
+    side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
+    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    if not side:
+        plane, side_mm = _fissure_of_labels(cerebrum, core, smooth, affine, scheme, brain)
+        smooth, brain.report["slit_voxels_reopened"] = remove_bridges(cerebrum.mask, smooth)
+    original = smooth, grid
+    if scheme.cortex and not side:
+        smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, core)
+        brain.report["fissure_opened_mL"] = removed_ml
+    if open_sulci:
+        smooth, affine, taken_ml = _with_sulci(smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain)
+        removed_ml += taken_ml
+    even = surface_of_mask(
+        smooth,
+        affine,
+        cerebrum.volume_mm3,
+        edge_length_mm,
+        smallest=COMPARABLE if side else cerebrum.smallest_part,
+        taken_mm3=removed_ml / ML_PER_MM3,
+        original=original,
+    )
+    brain.take(even)
     if side:
-        return _hemisphere_from_volume(volume, side, edge_length_mm, open_sulci)
-    return _brain_from_volume(volume, edge_length_mm, open_sulci)
+        require_single_hemisphere(even.mesh)
+        return _one_side(even, side, pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
+    heights = sample(side_mm, grid, corners(even.mesh).mean(axis=1))
+    return _two_sides(even, left_faces(even.mesh, heights), plane, pose, brain)
 
 
-@dataclass(frozen=True, eq=False)
-class _Volume:
-    """A checked label volume: its cerebrum, the smoothed mask with its posed affine, scheme, pose and warnings."""
-
-    cerebrum: Cerebrum
-    field: NDArray[np.float32]
-    affine: Floats
-    scheme: LabelScheme
-    pose: Pose
-    week: float
-    warnings: list[str]
-
-
-def _read_volume(labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, week: float) -> _Volume:
+def _read_volume(
+    labels: Labels, affine: Floats, scheme: LabelScheme, side: Side | None, brain: _Brain
+) -> tuple[Cerebrum, Pose]:
+    """Return the checked cerebrum of a label volume and its pose; that of a hemisphere is found from its surface."""
     # the medial wall of a single hemisphere may have no cortex
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
-    warnings = logged(cerebrum.warnings)
-    pose = Pose() if side else pose_of_labels(labels, affine, scheme)
-    if side and set(_labelled_sides(cerebrum.tissue, scheme)) - {side}:
+    brain.report |= {"scheme": scheme.name, **cerebrum.report}
+    brain.warn(cerebrum.warnings)
+    pose = None if side else pose_of_labels(labels, affine, scheme)
+    sides = _labelled_sides(cerebrum.tissue, scheme)
+    if side and set(sides) - {side}:
         raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
-    warnings += logged(require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, week))
+    brain.warn(require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
     if (share := cerebrum.report["border_share"]) > REPORTED_LOSS:
         cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
-        warnings += logged([f"{cut}: parts outside are missing, and the surface is flat there"])
-    field = smooth_mask(cerebrum.mask)
+        brain.warn([f"{cut}: parts outside are missing, and the surface is flat there"])
     if not side:
-        warnings += logged(scheme_contradictions(layout_of(labels), scheme))
-        warnings += logged(_require_both(cerebrum, scheme, field))
-    if pose is None:
-        pose = _pose_by_shape(field, cerebrum.affine, scheme)
-    warnings += logged(pose.warnings)
-    return _Volume(cerebrum, field, pose.world @ cerebrum.affine, scheme, pose, week, warnings)
+        brain.warn(scheme_contradictions(layout_of(labels), scheme))
+        if len(sides) == 1:
+            problem = f"the volume has labels of the {sides[0]} hemisphere only"
+            remedy = "Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side."
+            raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
+        field = smooth_mask(cerebrum.mask)
+        # parts that are removed below because of their size do not count
+        parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
+        surface = isosurface(smooth_mask(parts), cerebrum.affine)
+        # a brain that is cut by the field of view may be as narrow, which has been reported already
+        brain.warn(require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
+        pose = pose or _pose_by_shape(field, cerebrum.affine, scheme)
+        brain.warn(pose.warnings)
+    return cerebrum, pose or Pose()
 
 
-def _hemisphere_from_volume(volume: _Volume, side: Side, edge_length_mm: float, open_sulci: bool) -> PialSurface:
-    cerebrum, scheme, field, affine = volume.cerebrum, volume.scheme, volume.field, volume.affine
-    warnings = list(volume.warnings)
-    report, original, taken_ml = {"scheme": scheme.name, **cerebrum.report}, (field, affine), 0.0
-    if open_sulci:
-        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, volume)
-        warnings += logged(doubts)
-    taken = taken_ml / ML_PER_MM3
-    even = surface_of_mask(field, affine, cerebrum.volume_mm3, edge_length_mm, taken_mm3=taken, original=original)
-    require_single_hemisphere(even.mesh)
-    pose = pose_of_hemisphere(even.mesh, side, "auto", of_volume=True)
-    report = {"source": "hemisphere", "side": side, **report, **even.report}
-    warnings += logged([*even.warnings, *pose.warnings])
-    return _single_hemisphere(replace(even, report=report, warnings=warnings), side, pose, volume.week)
-
-
-def _brain_from_volume(volume: _Volume, edge_length_mm: float, open_sulci: bool) -> PialSurface:
-    cerebrum, scheme, field, affine = volume.cerebrum, volume.scheme, volume.field, volume.affine
-    warnings = list(volume.warnings)
-    mask, tissue, report = cerebrum.mask, cerebrum.tissue, {"scheme": scheme.name, **cerebrum.report}
-    grid, opened_ml = affine, 0.0
-    core = mask & ~np.isin(tissue, scheme.cortex)
+def _fissure_of_labels(
+    cerebrum: Cerebrum, core: Mask, field: NDArray[np.float32], affine: Floats, scheme: LabelScheme, brain: _Brain
+) -> tuple[MidPlane, NDArray[np.float32]]:
+    """Return the mid-plane, and each voxel's distance from the surface between the hemispheres."""
+    mask, has_sides = cerebrum.mask, bool(scheme.left and scheme.right)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
     walls = isosurface(smooth_mask(core) if scheme.cortex else field, affine)
-    fissure, doubts = _fissure_of_labels(tissue, mask, walls, scheme, affine)
-    warnings += logged(doubts)
-    sides = [np.isin(tissue, side) for side in (scheme.left, scheme.right) if scheme.left and scheme.right]
-    side_mm = side_distance(mask, core if scheme.cortex else mask, affine, fissure, *sides)
-    field, report["slit_voxels_reopened"] = remove_bridges(mask, field)
-    original = field, grid
-    # a hidden fissure is opened as a whole, down to the tissue that joins the hemispheres
-    hidden = hidden_fissure(side_mm, field > LEVEL, core, affine) if scheme.cortex else np.zeros_like(mask)
-    if hidden.any():
-        opened = _with_fissure(field, affine, side_mm, hidden)
-        if handles(opened[0] > LEVEL):
-            # tissue that crosses the fissure makes tunnels of it, and closing these would close the fissure
-            hidden = hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=True)
-            opened = _with_fissure(field, affine, side_mm, hidden)
-        field, affine, opened_ml = opened
-    if scheme.cortex:
-        report["fissure_opened_mL"] = opened_ml
-    if open_sulci:
-        field, affine, taken_ml, report["sulci"], doubts = _with_sulci(field, affine, volume, side_mm)
-        warnings += logged(doubts)
-        opened_ml += taken_ml
-    volume_mm3, smallest, taken = cerebrum.volume_mm3, cerebrum.smallest_part, opened_ml / ML_PER_MM3
-    even = surface_of_mask(
-        field, affine, volume_mm3, edge_length_mm, smallest=smallest, taken_mm3=taken, original=original
-    )
-    mesh, centres = even.mesh, corners(even.mesh).mean(axis=1)
-    warnings += logged(even.warnings)
-    heights = sample(side_mm, grid, centres)
-    even = replace(even, report={"source": "labels", **report, **even.report}, warnings=warnings)
-    return _upright(even, left_faces(mesh, heights), fissure.plane, volume.pose, volume.week)
+    plane = mid_plane(walls)
+    sides = [np.isin(cerebrum.tissue, labels) for labels in (scheme.left, scheme.right) if has_sides]
+    if has_sides:
+        left, right = sides
+        axis = affine[:3, :3] @ (np.argwhere(right).mean(axis=0) - np.argwhere(left).mean(axis=0))
+        if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
+            plane = plane_between_labels(left, right, affine, mask)
+            brain.warn(["the hemispheres are not mirror images of each other: the mid-plane is that of their labels"])
+    require_sides(cerebrum.tissue, scheme, affine, plane.normal)
+    return plane, side_distance(mask, core if scheme.cortex else mask, affine, fissure_between(walls, plane), *sides)
+
+
+def _with_fissure(
+    field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], core: Mask
+) -> tuple[NDArray[np.float32], Floats, float]:
+    """Open a hidden fissure as a whole, down to the tissue that joins the hemispheres.
+
+    Return the field, its affine, and the volume removed (mL). If more than a thousandth of the brain is removed, the
+    fissure was fused. Voxels that are too coarse for its walls are then refined first.
+    """
+    size = np.linalg.norm(affine[:3, :3], axis=0)
+    # an opening of less than two voxels would be lost
+    factor = int(np.ceil(1.8 * size.max() / FISSURE_MM))
+    for bridges in (False, True):
+        hidden = hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=bridges)
+        if not hidden.any():
+            return field, affine, 0.0
+        to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(np.float32)
+        before, grid = field, affine
+        wide = open_fissure(field, affine, side_mm, to_hidden)
+        if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
+            distances = (refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
+            before, grid = refine(field, affine, factor)
+            wide = open_fissure(before, grid, *distances)
+        # tissue that crosses the fissure makes tunnels of it, and closing these would close the fissure
+        if not handles(wide > LEVEL):
+            break
+    voxel_ml = abs(np.linalg.det(grid[:3, :3])) * ML_PER_MM3
+    return wide, grid, float((before - wide).sum(dtype=float) * voxel_ml)
 
 
 def _with_sulci(
     field: NDArray[np.float32],
     affine: Floats,
-    volume: _Volume,
-    side_mm: NDArray[np.float32] | None = None,
-) -> tuple[NDArray[np.float32], Floats, float, dict[str, Any], list[str]]:
-    """Open fused sulci; return the field, its affine, the volume removed (mL), a report, and warnings."""
-    cerebrum, scheme = volume.cerebrum, volume.scheme
+    cerebrum: Cerebrum,
+    core: Mask,
+    scheme: LabelScheme,
+    side_mm: NDArray[np.float32] | None,
+    brain: _Brain,
+) -> tuple[NDArray[np.float32], Floats, float]:
+    """Open fused sulci; return the field, its affine, and the volume removed (mL)."""
+    grid = cerebrum.affine
     if not scheme.cortex or not np.isin(cerebrum.tissue, scheme.white_matter).any():
-        reason = "the labels have no white matter"
-        return field, affine, 0.0, {"stays_fused": reason}, _fused_sulci_warning(reason, volume.week)
-    # handles are found faster before voxels are refined
-    simple, repaired = make_simple(field, cerebrum.smallest_part)
-    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
-    opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
+        report: dict[str, Any] = {"stays_fused": "the labels have no white matter"}
+    elif (voxels := voxels_through_cortex(cerebrum.mask, border(core, grid), grid)) < MIN_VOXELS:
+        fused = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
+        report = {"stays_fused": fused}
+    else:
+        # handles are found faster before voxels are refined
+        simple, repaired = make_simple(field, cerebrum.smallest_part)
+        opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
+    brain.report["sulci"] = report
     if not report.get("sheets"):
-        return field, affine, 0.0, report, _fused_sulci_warning(report.get("stays_fused"), volume.week)
+        if "stays_fused" in report and brain.week > FUSED_AFTER_GW:
+            brain.warn([f"fused sulci were not opened: {report['stays_fused']}"])
+        return field, affine, 0.0
+    report["repaired_before"] = repaired
+    brain.warn(filled_warning(repaired, affine))
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
-    report |= {"repaired_before": repaired}
-    return opened, fine, report["opened_mL"] - gained_ml, report, filled_warning(repaired, affine)
-
-
-def _fused_sulci_warning(reason: str | None, week: float) -> list[str]:
-    return [f"fused sulci were not opened: {reason}"] if reason and week > FUSED_AFTER_GW else []
+    return opened, fine, report["opened_mL"] - gained_ml
 
 
 def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
@@ -278,20 +322,6 @@ def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelSche
     coarse = unambiguous(field[::every, ::every, ::every])
     rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
     return pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
-
-
-def _fissure_of_labels(
-    tissue: Labels, mask: Mask, walls: TriangleMesh, scheme: LabelScheme, affine: Floats
-) -> tuple[Fissure, list[str]]:
-    plane, doubts = mid_plane(walls), []
-    if scheme.left and scheme.right:
-        left, right = (np.argwhere(np.isin(tissue, side)).mean(axis=0) for side in (scheme.left, scheme.right))
-        axis = affine[:3, :3] @ (right - left)
-        if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
-            plane = plane_between_labels(signed_side_distance(tissue, scheme, affine), affine, mask)
-            doubts.append("the hemispheres are not mirror images of each other: the mid-plane is that of their labels")
-    require_sides(tissue, scheme, affine, plane.normal)
-    return fissure_between(walls, plane), doubts
 
 
 def from_hemispheres(
@@ -324,36 +354,40 @@ def from_hemispheres(
         to_pose = connected.pose.of_file()
         require_left_and_right(transformed(left, to_pose), transformed(right, to_pose), coordinates)
         return replace(connected, report=connected.report | {"source": "hemispheres", "joined_along_cut": True})
-    to_ras = CONVENTIONS[coordinates] if coordinates != "auto" else np.eye(4)
-    sides = [
+    brain, named = _Brain(week, {"source": "hemispheres", "coordinates": coordinates}), coordinates != "auto"
+    to_ras = CONVENTIONS[coordinates] if named else np.eye(4)
+    parts = [
         sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)
     ]
-    warnings = logged(warning for side in sides for warning in side.warnings)
-    left, right = (side.mesh for side in sides)
-    volume = signed_volume(left) + signed_volume(right)
-    warnings += logged(require_plausible_size(volume, week))
-    if named := coordinates != "auto":
+    for side, part in zip(SIDES, parts, strict=True):
+        brain.take(part, f"_{side}")
+    left, right = (part.mesh for part in parts)
+    brain.warn(require_plausible_size(signed_volume(left) + signed_volume(right), week))
+    if named:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
         pose = pose_of_pair(left, right, declared=declared)
         left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
-        warnings += logged(pose.warnings)
+        brain.warn(pose.warnings)
     length = float(np.ptp(merged(left, right).vertices, axis=0).max())
-    warnings += logged(require_pair(left, right, max_hemisphere_ratio, coordinates))
+    brain.warn(require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
-        warnings += logged(hemisphere_warnings(left, right, coordinates))
-    posed = [replace(side, mesh=mesh) for side, mesh in zip(sides, (left, right), strict=True)]
-    even = [make_pieces_sound(side, edge_length_mm) for side in posed]
-    warnings += logged(warning for side in even for warning in side.warnings)
-    whole = merged(*(side.mesh for side in even))
-    plane = mid_plane(whole, named=named)
+        brain.warn(hemisphere_warnings(left, right, coordinates))
+    parts = [
+        make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
+        for part, mesh in zip(parts, (left, right), strict=True)
+    ]
+    for side, part in zip(SIDES, parts, strict=True):
+        brain.take(part, f"_{side}")
+    surface = replace(
+        parts[0],
+        mesh=merged(*(part.mesh for part in parts)),
+        is_cap=np.concatenate([part.is_cap for part in parts]),
+    )
+    plane = mid_plane(surface.mesh, named=named)
     require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
-    report: dict[str, Any] = {"source": "hemispheres", "coordinates": coordinates}
-    for name, *steps in zip(SIDES, sides, even, strict=True):
-        report |= {f"{key}_{name}": value for step in steps for key, value in step.report.items()}
-    surface = RepairedSurface(whole, report, warnings, np.concatenate([side.is_cap for side in even]))
-    is_left = np.arange(len(whole.faces)) < len(even[0].mesh.faces)
-    return _two_pieces(surface, is_left, plane, pose, week, named=named)
+    is_left = np.arange(len(surface.mesh.faces)) < len(parts[0].mesh.faces)
+    return _two_pieces(surface, is_left, plane, pose, brain, named=named)
 
 
 def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
@@ -367,23 +401,24 @@ def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | 
 
 
 def _two_pieces(
-    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, week: float, *, named: bool
+    surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain, *, named: bool
 ) -> PialSurface:
     """Return the pial surface of a brain whose hemispheres are closed pieces, with a gap between them."""
     left, right = cut_sides(surface.mesh, is_left)
     is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
     gap, to_right = smallest_gap(left, right), plane.normal
     left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
-    warnings = [*surface.warnings, *logged(facing_warnings(left, right, to_right))]
+    mesh = merged(left, right)
+    brain.warn(facing_warnings(left, right, to_right))
     if moved > 0:
-        warnings += logged([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
-        plane = mid_plane(merged(left, right), named=named)
+        brain.warn([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
+        plane = mid_plane(mesh, named=named)
     shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
     files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
-    report = {**surface.report, "moved_apart_mm": moved, "gap_before_mm": gap}
-    surface = RepairedSurface(merged(left, right), report, warnings, is_cap)
-    return _upright(surface, np.arange(len(is_cap)) < len(left.faces), plane, pose, week)
+    brain.report |= {"moved_apart_mm": moved, "gap_before_mm": gap}
+    surface = replace(surface, mesh=mesh, is_cap=is_cap)
+    return _two_sides(surface, np.arange(len(is_cap)) < len(left.faces), plane, pose, brain)
 
 
 def from_surface(
@@ -404,32 +439,31 @@ def from_surface(
     InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
     if it cannot be made closed and free of handles and self-intersections.
     """
+    brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
     clean = sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
-    warnings = logged(clean.warnings)
-    warnings += logged(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
+    brain.take(clean)
+    brain.warn(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
     if side:
         require_single_hemisphere(clean.mesh)
     even = make_pieces_sound(clean, edge_length_mm)
-    warnings += logged(even.warnings)
+    brain.take(even)
     if side:
         pose = pose_of_hemisphere(even.mesh, side, coordinates)
     else:
-        warnings += logged(require_whole(even.mesh, "surface"))
+        brain.warn(require_whole(even.mesh, "surface"))
         pose = pose_of_surface(even.mesh, coordinates)
-    warnings += logged(pose.warnings)
     # "lps" if these were found, else the configured coordinates
-    read_as = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
-    report = {"coordinates": read_as, **clean.report, **even.report}
+    brain.report["coordinates"] = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     if side:
-        report = {"source": "hemisphere", "side": side, **report}
-        return _single_hemisphere(replace(even, report=report, warnings=warnings), side, pose, week)
-    mesh, named = transformed(even.mesh, pose.of_file()), coordinates != "auto"
-    surface = RepairedSurface(mesh, {"source": "pial", **report}, warnings, even.is_cap)
-    plane = mid_plane(mesh, named=named)
-    is_left = left_faces(mesh, fissure_between(mesh, plane).height_above(corners(mesh).mean(axis=1)))
-    if all(map(is_closed, cut_sides(mesh, is_left))):
-        return _two_pieces(surface, is_left, plane, pose, week, named=named)
-    return _upright(surface, is_left, plane, pose, week)
+        return _one_side(even, side, pose, brain)
+    brain.warn(pose.warnings)
+    even, named = replace(even, mesh=transformed(even.mesh, pose.of_file())), coordinates != "auto"
+    plane = mid_plane(even.mesh, named=named)
+    heights = fissure_between(even.mesh, plane).height_above(corners(even.mesh).mean(axis=1))
+    is_left = left_faces(even.mesh, heights)
+    if all(map(is_closed, cut_sides(even.mesh, is_left))):
+        return _two_pieces(even, is_left, plane, pose, brain, named=named)
+    return _two_sides(even, is_left, plane, pose, brain)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
@@ -439,27 +473,17 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
     has self-intersections.
     """
     require_sound(mesh)
-    left, right = split(mesh, 0.0)
-    surface = RepairedSurface(mesh, {"source": "shape", "rotation_deg": 0.0}, [])
-    return _pial_surface(surface, {"left": left, "right": right}, 0.0, Pose(), week)
-
-
-def logged(warnings: Iterable[str]) -> list[str]:
-    """Log warnings and return them."""
-    warnings = list(warnings)
-    for warning in warnings:
-        log.warning(warning)
-    return warnings
+    sides = dict(zip(SIDES, split(mesh, 0.0), strict=True))
+    return _pial_surface(mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0}))
 
 
 def _pial_surface(
-    surface: RepairedSurface, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, week: float
+    whole: TriangleMesh, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, brain: _Brain
 ) -> PialSurface:
-    whole = surface.mesh
     areas: dict[str, float] = {side: area_cm2(part) for side, part in sides.items()}
-    measures = {
+    report = brain.report | {
         "pose": pose.plain(),
-        "week": week,
+        "week": brain.week,
         "fissure_x_mm": fissure_x,
         "area_cm2": {"whole": sum(areas.values()), **areas},
         "volume_mL": volume_ml(whole),
@@ -468,19 +492,17 @@ def _pial_surface(
         "faces": len(whole.faces),
         "pieces": len(pieces(whole)),
         "euler_number": euler_number(whole),
-        "warnings": list(surface.warnings),
+        "warnings": brain.warnings,
     }
-    report = {**surface.report, **measures}
     return PialSurface(whole, sides.get("left"), sides.get("right"), fissure_x, pose, report)
 
 
-def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, week: float) -> PialSurface:
-    to_file = np.asarray(np.linalg.inv(pose.of_file()), dtype=float)
-    surface, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, to_file)
-    is_left, doubts = is_left[is_kept], list[str]()
-    matrix, angle = upright(plane, surface.mesh.vertices.mean(axis=0))
-    whole = transformed(surface.mesh, matrix)
-    is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_left)
+def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain) -> PialSurface:
+    """Return the pial surface of a brain, upright and cut into its hemispheres."""
+    mesh, is_cap, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain)
+    is_left = is_left[is_kept]
+    matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
+    whole = transformed(mesh, matrix)
     for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
         _require_medial(submesh(whole, cap)[0], sign)
     left, right = cut_sides(submesh(whole, ~is_cap)[0], is_left[~is_cap])
@@ -489,55 +511,57 @@ def _upright(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pos
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
     if not left.vertices[:, 0].mean() < fissure_x < right.vertices[:, 0].mean():
-        doubts.append("the mid-plane is not between the unequal hemispheres: the middle of their cut is used")
+        brain.warn(["the mid-plane is not between the unequal hemispheres: the middle of their cut is used"])
         fissure_x = cut_middle(left, right)
     if plane.fissure_points == 0:
-        doubts.append("no fissure was found between facing walls: the plane of mirror symmetry is used")
+        brain.warn(["no fissure was found between facing walls: the plane of mirror symmetry is used"])
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
-        doubts.append(f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose")
-    doubts += proportion_warnings(np.ptp(whole.vertices, axis=0))
+        brain.warn([f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose"])
+    brain.warn(proportion_warnings(np.ptp(whole.vertices, axis=0)))
     areas = sorted((area(left), area(right)))
     if areas[1] > MAX_AREA_RATIO * areas[0]:
         found = f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²"
         raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
     if areas[1] > DOUBTFUL_RATIO * areas[0]:
-        doubts.append(f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline")
+        brain.warn([f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline"])
     share = cut_share(left, right)
-    doubts += cut_warnings(share, week)
-    facts = {
+    brain.warn(cut_warnings(share, brain.week))
+    brain.report |= {
         "cut_share": share,
-        "usual_cut_share": max_cut_share(week),
+        "usual_cut_share": max_cut_share(brain.week),
         "rotation_deg": angle,
         "fissure_points": plane.fissure_points,
         "asymmetry_mm": plane.asymmetry_mm,
     }
-    report, warnings = {**surface.report, **facts}, [*surface.warnings, *logged(doubts)]
-    surface = RepairedSurface(whole, report, warnings)
-    return _pial_surface(surface, {"left": left, "right": right}, fissure_x, pose.then(matrix), week)
+    return _pial_surface(whole, {"left": left, "right": right}, fissure_x, pose.then(matrix), brain)
+
+
+def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -> PialSurface:
+    """Return the pial surface of a single hemisphere, beside the mid-sagittal plane."""
+    brain.warn(pose.warnings)
+    every = np.ones(len(surface.mesh.faces), dtype=bool)
+    mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
+    whole = pial = transformed(mesh, pose.of_file())
+    if is_cap.any():
+        _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
+        pial = submesh(whole, ~is_cap)[0]
+    x = whole.vertices[:, 0]
+    fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
+    brain.report["rotation_deg"] = angle_deg(pose.of_file()[:3, :3])
+    return _pial_surface(whole, {side: pial}, fissure_x, pose, brain)
 
 
 def _without_islands(
-    surface: RepairedSurface, sides: Mapping[Side, Mask], to_file: Floats
-) -> tuple[RepairedSurface, Mask]:
-    """Leave out what is not connected to a hemisphere's largest piece; return the surface and the faces that remain."""
-    is_kept, warnings = largest_pieces(surface.mesh, sides, to_file)
-    if not warnings:
-        return surface, is_kept
-    is_cap = surface.is_cap[is_kept] if len(surface.is_cap) else surface.is_cap
-    mesh = submesh(surface.mesh, is_kept)[0]
-    return replace(surface, mesh=mesh, is_cap=is_cap, warnings=[*surface.warnings, *logged(warnings)]), is_kept
+    surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
+) -> tuple[TriangleMesh, Mask, Mask]:
+    """Leave out what is not connected to a hemisphere's largest piece.
 
-
-def _single_hemisphere(surface: RepairedSurface, side: Side, pose: Pose, week: float) -> PialSurface:
-    surface, _ = _without_islands(surface, {side: np.ones(len(surface.mesh.faces), dtype=bool)}, np.eye(4))
-    whole = pial = transformed(surface.mesh, pose.of_file())
-    if surface.is_cap.any():
-        _require_medial(submesh(whole, surface.is_cap)[0], 1.0 if side == "left" else -1.0)
-        pial = submesh(whole, ~surface.is_cap)[0]
-    x = whole.vertices[:, 0]
-    fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
-    report = {**surface.report, "rotation_deg": angle_deg(pose.of_file()[:3, :3])}
-    return _pial_surface(RepairedSurface(whole, report, surface.warnings), {side: pial}, fissure_x, pose, week)
+    Return the surface, the mask of its caps, and that of the faces that remain.
+    """
+    is_kept, warnings = largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
+    brain.warn(warnings)
+    is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)
+    return submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
 
 
 def _require_medial(cap: TriangleMesh, sign: float) -> None:
@@ -553,36 +577,3 @@ def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
     cortex = scheme.cortex or scheme.cerebrum
     labels = {"left": scheme.left, "right": scheme.right}
     return [side for side in SIDES if np.isin(tissue, np.intersect1d(labels[side], cortex)).any()]
-
-
-def _require_both(cerebrum: Cerebrum, scheme: LabelScheme, field: NDArray[np.float32]) -> list[str]:
-    if len(sides := _labelled_sides(cerebrum.tissue, scheme)) == 1:
-        problem = f"the volume has labels of the {sides[0]} hemisphere only"
-        remedy = "Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side."
-        raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
-    # parts that are removed below because of their size do not count
-    parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
-    surface = isosurface(smooth_mask(parts), cerebrum.affine)
-    # a brain that is cut by the field of view may be as narrow, which has been reported already
-    return require_whole(surface, "volume", refuses=cerebrum.report["border_share"] <= REPORTED_LOSS)
-
-
-def _with_fissure(
-    field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], hidden: Mask
-) -> tuple[NDArray[np.float32], Floats, float]:
-    """Open the fissure; return the field, its affine, and the volume removed (mL).
-
-    If more than a thousandth of the brain is removed, the fissure was fused. Voxels that are too coarse for its walls
-    are then refined first.
-    """
-    size = np.linalg.norm(affine[:3, :3], axis=0)
-    to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(np.float32)
-    wide = open_fissure(field, affine, side_mm, to_hidden)
-    # an opening of less than two voxels would be lost
-    factor = int(np.ceil(1.8 * size.max() / FISSURE_MM))
-    if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
-        distances = (refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
-        field, affine = refine(field, affine, factor)
-        wide = open_fissure(field, affine, *distances)
-    voxel_ml = abs(np.linalg.det(affine[:3, :3])) * ML_PER_MM3
-    return wide, affine, float((field - wide).sum(dtype=float) * voxel_ml)

@@ -3,12 +3,18 @@
 An impossible size reveals files in metres, micrometres or centimetres.
 """
 
+import logging
+from collections.abc import Iterable
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, TriangleMesh, signed_volume
 from ..units import ML_PER_MM3
+
+log = logging.getLogger(__name__)
 
 # cerebral volume (mL) at 25.4 and 36.6 GW: the atlas of Fidon et al. 2021 (doi 10.5281/zenodo.5524312) and the growth
 # by 230 % between these weeks found by Clouchoux et al. 2012 (doi 10.1016/j.ajog.2011.10.002)
@@ -32,8 +38,18 @@ UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres
 DOUBTFUL_RATIO = 1.15
 # shift of one hemisphere along the mid-plane, in cube roots of its volume
 MAX_USUAL_SHIFT = 0.08
+# usual limits of the ratio of mean thickness between brains a week apart and further: CRL's has 1.2 from 21 to 22 GW
+MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
+
+
+def logged(warnings: Iterable[str]) -> list[str]:
+    """Log warnings and return them."""
+    warnings = list(warnings)
+    for warning in warnings:
+        log.warning(warning)
+    return warnings
 
 
 def expected_volume_ml(week: float) -> float:
@@ -202,3 +218,18 @@ def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
             expected=f"at most {max_mm:.1f} mm",
             remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
         )
+
+
+def thickness_jumps(series: Iterable[tuple[str, float, float]]) -> list[str]:
+    """Return warnings of successive brains of a growth series whose thickness differs as only labels do.
+
+    `series` has each brain's name, week and mean thickness in mm, which may be NaN.
+    """
+    measured = sorted((brain for brain in series if brain[2] > 0), key=lambda brain: brain[1])
+    warnings = []
+    for (first, week, before), (second, later, after) in pairwise(measured):
+        limit = np.clip(MAX_WEEKLY_RATIO ** (later - week), MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO)
+        if max(before / after, after / before) > limit:
+            thick = f"the cortex of {first} ({week:g} GW) is {before:.2f} mm thick, that of {second} ({later:g} GW)"
+            warnings.append(f"{thick} {after:.2f} mm: were both labelled in the same way?")
+    return warnings

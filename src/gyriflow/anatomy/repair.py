@@ -10,12 +10,12 @@ from typing import Any
 
 import igl
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import MeshError
-from ..geometry.matching import nearest_on
+from ..geometry.deformations import transform_points, voxel_index
+from ..geometry.matching import nearest_on, surface_mask
 from ..geometry.remeshing import (
     REMESHING_ROUNDS,
     SHARP_DEG,
@@ -47,7 +47,7 @@ from ..geometry.triangles import (
 from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
-from .extraction import EDGE_SLOPE, LEVEL, Floats, Mask, isosurface, make_simple, without_stalks
+from .extraction import EDGE_SLOPE, LEVEL, Floats, Mask, dilated, isosurface, make_simple, without_stalks
 from .fissure import sample
 from .labels import REPORTED_LOSS
 from .terraces import without_terraces
@@ -66,8 +66,8 @@ SPIKE_MM, SPIKE_FACTOR = 10.0, 10.0
 STALK_VOXEL_MM = 0.8
 # cuts follow the triangles, so they are wider than the stalks
 MAX_CUT_MM = 12.0
-# margin around a surface that is rebuilt
-MARGIN_VOXELS = 6
+# margin around a surface that is rebuilt, with that of `surface_mask`
+MARGIN_VOXELS = 2
 # a warning is given if closing handles adds more than this
 MAX_FILLED_MM3 = 100.0
 # a larger relative change of volume by smoothing gives a warning
@@ -189,10 +189,9 @@ def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, 
     document = in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
     smooth = from_meshlab(document)
-    even = remesh(smooth, edge_length_mm)
-    crossing = int(self_intersecting_faces(even).sum())
-    if crossing and self_intersecting_faces(even := untangle(even)).any():
-        even = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
+    even, crossing, remaining = untangle(remesh(smooth, edge_length_mm))
+    if remaining:
+        even, _, _ = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
     return even, crossing
 
 
@@ -372,22 +371,14 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
     if not MIN_LENGTH_MM < np.ptp(mesh.vertices, axis=0).max() < MAX_LENGTH_MM:
         # surfaces in another unit are reported elsewhere
         return mesh, []
-    size = np.full(3, STALK_VOXEL_MM)
-    first = mesh.vertices.min(axis=0) - 2.0 * size
-    shape = np.ceil((np.ptp(mesh.vertices, axis=0) + 4.0 * size) / size).astype(int)
-    grid = pv.ImageData(dimensions=shape, spacing=size, origin=first)
-    body = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))
-    image = body.voxelize_binary_mask(reference_volume=grid)
-    mask = np.asarray(image["mask"]).reshape(shape, order="F") > 0
-    affine = np.diag([*size, 1.0])
-    affine[:3, 3] = first
-    remaining, report = without_stalks(mask, affine)
+    labels, affine = surface_mask(mesh, STALK_VOXEL_MM)
+    remaining, report = without_stalks(labels > 0, affine)
     if not report:
         return mesh, []
     # a face belongs to the same side of a cut as the nearest voxel inside
-    _, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
-    voxel = np.clip(np.rint((corners(mesh).mean(axis=1) - first) / size).astype(int), 0, shape - 1)
-    is_kept = remaining[tuple(nearest[(slice(None), *voxel.T)])]
+    nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
+    voxel = np.rint(voxel_index(corners(mesh).mean(axis=1), affine)).astype(int)
+    is_kept = remaining[tuple(nearest[(slice(None), *voxel)])]
     cut_open, _ = submesh(mesh, is_kept)
     return clean(cut_open, MAX_CUT_MM)[0], report
 
@@ -472,28 +463,17 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Rebuild a surface through voxels, without handles or self-intersections; return it and a report.
 
-    The generalised winding number (Jacobson et al. 2013, doi 10.1145/2461912.2461916) separates inside from outside
-    even where the surface crosses itself. Details below the voxel size are lost.
+    The winding number separates inside from outside even where the surface crosses itself. Details below the voxel size
+    are lost.
     """
-    first = mesh.vertices.min(axis=0) - MARGIN_VOXELS * voxel_mm
-    shape = np.ceil(np.ptp(mesh.vertices, axis=0) / voxel_mm).astype(int) + 2 * MARGIN_VOXELS
-    affine = np.diag([voxel_mm, voxel_mm, voxel_mm, 1.0])
-    affine[:3, 3] = first
-    points = np.indices(shape).reshape(3, -1).T * voxel_mm + first
-    # NaN beyond the bounds, where the field is 0 or 1
-    bounds = igl.SIGNED_DISTANCE_TYPE_UNSIGNED, -2.0 * voxel_mm, 2.0 * voxel_mm
-    distance = igl.signed_distance(points, mesh.vertices, mesh.faces, *bounds)[0]
-    band = np.isfinite(distance)
-    distance[~band] = np.inf
-    wound = np.zeros(len(points), dtype=bool)
-    wound[band] = igl.fast_winding_number(mesh.vertices, mesh.faces, points[band]) > 0.5
-    # each region away from the surface is inside or outside as a whole
-    far = ~band.reshape(shape)
-    number, count = ndimage.label(far)
-    samples = np.array(ndimage.maximum_position(far, number, np.arange(1, count + 1)), dtype=float)
-    winding = igl.fast_winding_number(mesh.vertices, mesh.faces, samples @ affine[:3, :3].T + affine[:3, 3])
-    inside = wound.reshape(shape) | np.concatenate([[False], winding > 0.5])[number]
-    signed = np.where(inside, distance.reshape(shape), -distance.reshape(shape))
+    ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
+    labels, affine = surface_mask(mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]]))
+    inside = labels > 0
+    # beyond two voxels from the surface, the field is 0 or 1
+    near = dilated(inside, 2.0) & dilated(~inside, 2.0)
+    signed = np.where(inside, np.inf, -np.inf)
+    distance, _, _ = nearest_on(transform_points(np.argwhere(near), affine), mesh)
+    signed[near] = np.where(inside[near], distance, -distance)
     field = np.clip(0.5 + EDGE_SLOPE * signed / voxel_mm, 0.0, 1.0).astype(np.float32)
     field, report = make_simple(field)
     return isosurface(field, affine), report

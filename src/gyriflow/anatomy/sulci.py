@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from ..geometry.deformations import transform_points
 from ..units import ML_PER_MM3
 from .extraction import INSIDE, LEVEL, OUTSIDE, Floats, Mask, is_simple, main_parts, refine, shifted_affine
 from .fissure import sample
-from .thickness import MIN_VOXELS
 
 # voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
 MAX_VOXEL_MM = 0.55
@@ -33,6 +33,10 @@ MIN_SHEET_DEPTH = 1.5
 MARGIN_VOXELS = 3
 # value of the field in a slit; with 1 next to it, a slit of one voxel becomes 0.9 voxels wide
 SLIT_VALUE = 0.1
+# the usual thickness is that of the surface nearby where this is thinner
+NEARBY_MM = 15.0
+# places at which it is determined, and depths of the surface that count for it
+PLACES_MM, N_DEPTHS = 5.0, 10_000
 # cortex further from white matter than this many thicknesses lacks white matter; largest share of such cortex
 FAR, MAX_FAR_SHARE = 3.0, 0.05
 
@@ -46,8 +50,8 @@ def open_fused_sulci(
     mask `core`, the tissue inside the cortex, or an integer fraction of these. Slits grow inward from outside over
     simple points, so they add neither handles nor cavities, and end where both banks have the same white matter. Slits
     between the hemispheres, whose sides are the signs of `side_mm` in the voxels of `core`, are not sulci. The field
-    is returned unchanged if no sulcus is fused, if much cortex is far from all white matter, or if the cortex is
-    thinner than 1.5 voxels. In the latter two cases the report has the reason as "stays_fused".
+    is returned unchanged if no sulcus is fused, or if much cortex is far from all white matter. In the latter case the
+    report has the reason as "stays_fused".
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
@@ -63,22 +67,22 @@ def open_fused_sulci(
     places = np.argwhere(cortex).astype(np.int32)
     depth_mm = np.linalg.norm((nearest[:, cortex].T - places) * size, axis=1)
     at_surface = ndimage.binary_dilation(~inside, INSIDE)
-    low, thickness = map(float, np.quantile(depth_mm[at_surface[cortex]], [0.25, 0.5]))
-    if (far := float((depth_mm > FAR * low).mean())) > MAX_FAR_SHARE:
+    surface = at_surface[cortex]
+    if (far := float((depth_mm > FAR * np.quantile(depth_mm[surface], 0.25)).mean())) > MAX_FAR_SHARE:
         reason = f"{100 * far:.0f} % of the cortex is further than {FAR:g} times its thickness from white matter"
         return field, affine, {"stays_fused": reason}
-    if (voxels := thickness / (factor * every * size.max())) < MIN_VOXELS:
-        reason = f"the cortex is {voxels:.1f} voxels thick, so roughness of the labels looks like two banks"
-        return field, affine, {"stays_fused": reason}
+    thickness = np.zeros(cortex.shape, dtype=np.float32)
+    thickness[cortex] = _usual_thickness(places * size, places[surface] * size, depth_mm[surface])
     bank = cortex.copy()
-    bank[cortex] = depth_mm > MIN_BANK * thickness
+    bank[cortex] = depth_mm > MIN_BANK * thickness[cortex]
     distance = np.zeros(cortex.shape, dtype=np.float32)
     for axis in range(3):
         _mark_sheet(distance, bank, nearest, axis, MIN_BANK_DISTANCE * thickness, size, is_right)
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
     below = ndimage.distance_transform_edt(near > LEVEL, sampling=np.linalg.norm(affine[:3, :3], axis=0))
     depth = sample(below, grid, transform_points(np.argwhere(distance > 0), fine))
-    sheets, count = _deep_sheets(distance > 0, at_surface, size, depth, MIN_SHEET_DEPTH * thickness)
+    is_deep = depth > MIN_SHEET_DEPTH * thickness[distance > 0]
+    sheets, count = _deep_sheets(distance > 0, at_surface, size, is_deep)
     if not count:
         return field, affine, {"sheets": 0, "slit_voxels": 0, "opened_mL": 0.0}
     slit = _grow_slits(inside, sheets, cortex, distance)
@@ -96,16 +100,33 @@ def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, 
     return tuple(slice(every * side.start, every * side.stop) for side in large), tuple(large)
 
 
-def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, depth_mm: Floats, min_mm: float) -> tuple[Mask, int]:
-    """Return the large parts of a mask that reach from the surface to a minimum depth, and their number.
+def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
+    """Return the median depth in mm of the cortex at the surface around (n, 3) points, at most that of the brain.
 
-    `depth_mm` (n,) is the depth of the mask's voxels below the surface, `at_surface` the mask of voxels at it.
+    Above many fused sulci the surface is further from white matter than the cortex is thick.
+
+    `depth` (m,) is that at the (m, 3) points of the surface; no coordinate is negative. The median is taken within
+    `NEARBY_MM` of places `PLACES_MM` apart, and is that of the nearest place.
+    """
+    every = max(1, len(surface) // N_DEPTHS)
+    tree, depth = cKDTree(surface[::every]), depth[::every]
+    cell = np.rint(points / PLACES_MM).astype(np.int64)
+    shape, overall = tuple(cell.max(axis=0) + 1), float(np.median(depth))
+    nearby = tree.query_ball_point(PLACES_MM * np.array(list(np.ndindex(shape))), NEARBY_MM)
+    medians = np.array([min(np.median(depth[rows]), overall) if rows else overall for rows in nearby])
+    return medians.reshape(shape)[tuple(cell.T)]
+
+
+def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask) -> tuple[Mask, int]:
+    """Return the large parts of a mask that reach from the surface to deep places, and their number.
+
+    `is_deep` (n,) is whether a voxel of the mask is deep, `at_surface` the mask of voxels at the surface.
     """
     number, count = ndimage.label(sheet, OUTSIDE)
     part, parts = number[sheet], np.arange(count + 1)
     large = np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3) >= MIN_SHEET_MM2
     reached = np.bincount(part, at_surface[sheet], minlength=count + 1) > 0
-    deep = np.bincount(part, depth_mm > min_mm, minlength=count + 1) > 0
+    deep = np.bincount(part, is_deep, minlength=count + 1) > 0
     is_sheet = large & reached & deep & (parts > 0)
     return is_sheet[number], int(is_sheet.sum())
 
@@ -115,20 +136,21 @@ def _mark_sheet(
     cortex: Mask,
     nearest: NDArray[np.int32],
     axis: int,
-    min_mm: float,
+    min_mm: NDArray[np.floating],
     size: Floats,
     is_right: Mask | None,
 ) -> None:
     """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
 
-    It is set in the voxels that the plane half-way between the banks passes, which are connected through faces.
+    Different banks are further apart than `min_mm` (i, j, k). It is set in the voxels that the plane half-way between
+    the banks passes, which are connected through faces.
     """
     step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))
     banks = [nearest[(slice(None), *voxels.T)].T for voxels in (first, first + step)]
     offset = (banks[1] - banks[0]) * size
     length = np.linalg.norm(offset, axis=1)
-    differ = length > min_mm
+    differ = length > min_mm[tuple(first.T)]
     if is_right is not None:
         sides = [is_right[tuple(bank.T)] for bank in banks]
         differ &= sides[0] == sides[1]

@@ -87,8 +87,12 @@ def _degraded(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:
 def _room(mesh: TriangleMesh, voxels: Floats, max_move_mm: float) -> tuple[Floats, Floats]:
     """Return how far vertices may move inward (n,) and outward (n,) until the surface meets a voxel's centre."""
     nearest = np.rint(transform_points(mesh.vertices, np.linalg.inv(voxels))).astype(np.int64)
-    around = np.unique((nearest[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1).reshape(-1, 3), axis=0)
-    centres = transform_points(around, voxels)
+    first = nearest.min(axis=0) - 1
+    shape = np.ptp(nearest, axis=0) + 3
+    around = np.zeros(shape, dtype=bool)
+    for step in np.ndindex(3, 3, 3):
+        around[tuple((nearest - 1 - first + step).T)] = True
+    centres = transform_points(np.argwhere(around) + first, voxels)
     distance, face, place = nearest_on(centres, mesh)
     near = distance < max_move_mm
     height = np.einsum("ij,ij->i", centres - place, face_normals(mesh)[face])[near].repeat(3)

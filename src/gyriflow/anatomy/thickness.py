@@ -1,4 +1,4 @@
-"""Cortical thickness at the vertices of a pial surface, from labels of the cortex or from white surfaces."""
+"""Cortical thickness at the vertices of a pial surface, and white surfaces, the inner border of the cortex."""
 
 import logging
 from collections.abc import Mapping
@@ -13,12 +13,13 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 from ..geometry.matching import layer_thickness, nearest_on
 from ..geometry.poses import Pose
-from ..geometry.triangles import TriangleMesh, area, merged, transformed, vertex_areas
+from ..geometry.triangles import TriangleMesh, area, merged, signed_volume, transformed, vertex_areas, vertex_normals
 from ..settings.schemes import LabelScheme
-from ..settings.terms import SIDES
+from ..settings.terms import SIDES, Side
 from .extraction import LEVEL, Floats, Mask, isosurface, main_parts, smooth_mask
-from .fissure import sample
+from .fissure import cut_sides, nearer_left, sample
 from .labels import Labels, read_cerebrum
+from .repair import make_sound, sound_pieces, surface_of_mask
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +36,11 @@ QUANTILES = (0.05, 0.95)
 # on the medial wall, which has no cortex, white and pial surfaces coincide
 MIN_MM = 0.3
 MIN_AREA_RATIO = 0.95
-HIDDEN = "a part of the pial surface is hidden in fused sulci: area and gyrification are lower bounds"
+HIDDEN = "a part of it is hidden in fused sulci: area and gyrification are lower bounds"
+# vertices of both borders at which the number of voxels through the cortex is measured
+N_SAMPLES = 8000
+# offset of a surface by which its mean curvature is measured
+OFFSET_MM = 0.05
 USUAL_MM = 0.4, 3.5  # means in label atlases of 21 to 36 GW are 0.8 to 2.7 mm
 # the white surface crosses the pial one if a larger share of its area is further outside than this
 OUTSIDE_MM, MAX_OUTSIDE_SHARE = 0.5, 0.01
@@ -64,24 +69,20 @@ def cortical_thickness(
 ) -> Thickness:
     """Return the cortical thickness at the vertices of a pial surface; InputError if it has no cortex under it.
 
-    The inner border is the isosurface of the smoothed mask of the cerebrum without its cortex, which lies between
-    voxels as the pial surface does. The thickness at a vertex is the mean of two distances: from the vertex to the
-    nearest point of the inner border, and from there to the nearest point of the pial surface (Fischl & Dale 2000,
-    doi 10.1073/pnas.200033797). It is not measured where the surface has no cortex under it (corpus callosum,
-    brainstem), nor where a hidden fissure or fused sulci were opened; with `fissure_x_mm`, it is measured in sulci.
+    The inner border is the surface of the cerebrum without its cortex, which lies between voxels as the pial surface
+    does. The thickness at a vertex is that of `layer_thickness`. It is not measured where the surface has no cortex
+    under it (corpus callosum, brainstem), nor where a hidden fissure or fused sulci were opened; with `fissure_x_mm`,
+    it is measured in sulci.
 
     `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
-    its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over the
-    cortex's volume divided by its mean thickness.
+    its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over that of a
+    complete surface around the cortex's volume, (1 + mean curvature × thickness) × volume / thickness.
     """
-    core = smooth_mask(cerebrum & ~cortex)
-    kept, _, _ = main_parts(core > LEVEL)
-    core = np.where(kept, np.maximum(core, LEVEL + 1e-3), np.minimum(core, LEVEL - 1e-3)).astype(np.float32)
-    inner = isosurface(core, affine)
-    points = pial.vertices
+    inner = border(cerebrum & ~cortex, affine)
     values = layer_thickness(pial, inner)
-    voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
-    size = np.linalg.norm(affine[:3, :3], axis=0)
+    points, size = pial.vertices, np.linalg.norm(affine[:3, :3], axis=0)
+    # of long voxels, no centre may be nearer than half their diagonal
+    voxel = max(float(np.cbrt(size.prod())), 0.5 * float(np.linalg.norm(size)))
     to_cortex, to_outside = (
         sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points) for mask in (~cortex, cerebrum)
     )
@@ -99,9 +100,46 @@ def cortical_thickness(
     filled = values.copy()
     filled[~is_measured] = values[is_measured][nearest]
     report = summary(values, is_measured, vertex_areas(pial))
-    # volume over thickness is the area of the middle of the sheet; a folded brain has more outside
-    report["area_ratio"] = area(pial) * report["mean_mm"] / (float(cortex.sum()) * voxel**3)
-    return Thickness(filled, is_measured, report | {"voxels_through_cortex": report["mean_mm"] / voxel})
+    # volume over thickness is the area of the middle of the sheet; a convex brain has more outside
+    sheet_mm2 = float(cortex.sum()) * float(abs(np.linalg.det(affine[:3, :3]))) / report["mean_mm"]
+    complete_mm2 = sheet_mm2 * (1.0 + mean_curvature(pial, is_measured) * report["mean_mm"])
+    report |= {"area_ratio": area(pial) / complete_mm2, "voxel_mm": float(size.max())}
+    report["voxels_through_cortex"] = voxels_through_cortex(cerebrum, inner, affine)
+    return Thickness(filled, is_measured, report)
+
+
+def border(mask: Mask, affine: Floats) -> TriangleMesh:
+    """Return the surface in mm around the main parts of an (i, j, k) mask, with the volume of their voxels.
+
+    It is the isosurface of the smoothed mask, moved along its normals: smoothing moves a convex surface inward.
+    """
+    field = smooth_mask(mask)
+    kept, _, _ = main_parts(field > LEVEL)
+    field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3))
+    mesh = isosurface(field.astype(np.float32), affine)
+    missing_mm3 = main_parts(mask)[0].sum() * abs(np.linalg.det(affine[:3, :3])) - signed_volume(mesh)
+    return TriangleMesh(mesh.vertices + missing_mm3 / area(mesh) * vertex_normals(mesh), mesh.faces)
+
+
+def voxels_through_cortex(cerebrum: Mask, inner: TriangleMesh, affine: Floats) -> float:
+    """Return the median thickness of the cortex over the longest edge of a voxel.
+
+    The cortex lies between the border of the (i, j, k) mask of the cerebrum and its inner border.
+    """
+    outer = border(cerebrum, affine)
+    points = outer.vertices[:: max(1, len(outer.vertices) // N_SAMPLES)]
+    inward, _, nearest = nearest_on(points, inner)
+    values = 0.5 * (inward + nearest_on(nearest, outer)[0]) / np.linalg.norm(affine[:3, :3], axis=0).max()
+    return float(np.median(values[values >= MIN_LAYER_VOXELS]))
+
+
+def mean_curvature(mesh: TriangleMesh, at: Mask) -> float:
+    """Return the mean curvature (1/mm) of a surface over some vertices, an (n,) mask: half of what its area grows."""
+    step = OFFSET_MM * vertex_normals(mesh)
+    areas = [
+        float(vertex_areas(TriangleMesh(mesh.vertices + sign * step, mesh.faces))[at].sum()) for sign in (-1, 0, 1)
+    ]
+    return (areas[2] - areas[0]) / (4.0 * OFFSET_MM * areas[1])
 
 
 def thickness_from_labels(
@@ -127,7 +165,7 @@ def thickness_from_labels(
     if (voxels := thickness.report["voxels_through_cortex"]) < MIN_VOXELS:
         log.warning("the labels of the cortex are %.1f voxels thick: its thickness is inaccurate", voxels)
     elif (ratio := thickness.report["area_ratio"]) < MIN_AREA_RATIO:
-        log.warning("the pial area is %.2f times the cortex's volume over its thickness: %s", ratio, HIDDEN)
+        log.warning("the pial area is %.2f of a complete surface's around this cortex: %s", ratio, HIDDEN)
     return thickness
 
 
@@ -192,3 +230,51 @@ def thickness_from_white(
 def posed_whites(pose: Pose, whites: Mapping[str, TriangleMesh]) -> dict[str, TriangleMesh]:
     """Return the white surfaces by side, in the pose of the pial surfaces."""
     return {side: transformed(mesh, pose.of_file(side)) for side, mesh in whites.items()}
+
+
+def white_from_labels(
+    labels: Labels,
+    affine: Floats,
+    scheme: LabelScheme,
+    pial: Mapping[Side, TriangleMesh],
+    pose: Pose,
+    *,
+    edge_length_mm: float = 1.0,
+) -> dict[Side, TriangleMesh]:
+    """Return by side the surface around the tissue within the cortex of an (i, j, k) label volume.
+
+    It is made like the pial surface in `pial.from_labels`, in the same pose. Where the cerebrum has no cortex, as on
+    the medial wall, both surfaces coincide. MeshError if it keeps self-intersections.
+    """
+    cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
+    core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
+    volume = float(core.sum() * abs(np.linalg.det(cerebrum.affine[:3, :3])))
+    field, smallest = smooth_mask(core), cerebrum.smallest_part
+    even = surface_of_mask(field, cerebrum.affine, volume, edge_length_mm, smallest=smallest)
+    return _cut_as_pial(even.mesh, pial)
+
+
+def white_from_surfaces(
+    whites: Mapping[str, TriangleMesh],
+    pial: Mapping[Side, TriangleMesh],
+    pose: Pose,
+    *,
+    max_hole_mm: float = 3.0,
+    edge_length_mm: float = 1.0,
+) -> dict[Side, TriangleMesh]:
+    """Pose and remesh white surfaces of "left" and "right" or of the "whole"; return them by side.
+
+    MeshError if one cannot be made a closed surface without handles and self-intersections.
+    """
+    even = {
+        name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh
+        for name, mesh in posed_whites(pose, whites).items()
+    }
+    return _cut_as_pial(even["whole"], pial) if "whole" in even else {side: even[side] for side in pial}
+
+
+def _cut_as_pial(mesh: TriangleMesh, pial: Mapping[Side, TriangleMesh]) -> dict[Side, TriangleMesh]:
+    if len(pial) == 1:
+        return dict.fromkeys(pial, mesh)
+    left, right = cut_sides(mesh, nearer_left(mesh, pial["left"], pial["right"]))
+    return {"left": left, "right": right}

@@ -44,22 +44,25 @@ def remesh(
     return from_meshlab(document)
 
 
-def untangle(mesh: TriangleMesh) -> TriangleMesh:
+def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
     """Remove self-intersections by Laplacian smoothing of the faces concerned.
 
-    The number of vertices and the topology are kept. Each round smooths a wider neighbourhood.
+    The number of vertices and the topology are kept. Each round smooths a wider neighbourhood. Also return the number
+    of self-intersecting faces before, and of those that remain.
     """
-    for round_ in range(UNTANGLING_ROUNDS):
+    counts = []
+    for round_ in range(UNTANGLING_ROUNDS + 1):
         document = in_meshlab(mesh)
         document.compute_selection_by_self_intersections_per_face()
-        if not document.current_mesh().face_selection_array().any():
+        counts.append(int(document.current_mesh().face_selection_array().sum()))
+        if not counts[-1] or round_ == UNTANGLING_ROUNDS:
             break
         for _ in range(1 + round_ // 2):
             document.apply_selection_dilatation()
         document.compute_selection_transfer_face_to_vertex()
         document.apply_coord_laplacian_smoothing(stepsmoothnum=2, cotangentweight=False, selected=True)
         mesh = from_meshlab(document)
-    return mesh
+    return mesh, counts[0], counts[-1]
 
 
 def in_meshlab(mesh: TriangleMesh) -> pymeshlab.MeshSet:

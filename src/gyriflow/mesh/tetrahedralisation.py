@@ -118,7 +118,7 @@ def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
     even = remesh(surface, edge_mm)
     crossing = crossing_faces(even)
     if crossing:
-        even = untangle(even)
+        even, _, _ = untangle(even)
         crossing = crossing_faces(even)
     log.info("surface remeshed to %d faces, edges of %.3f mm, %d faces cross", len(even.faces), edge_mm, crossing)
     if crossing:

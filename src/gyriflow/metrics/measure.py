@@ -217,16 +217,16 @@ def thickness_metrics(values: Floats, areas: Floats) -> Metrics:
     }
 
 
-def area_ratio(whole: Metrics) -> Metrics:
-    """Return the pial area over the area of a sheet of cortex, or nothing where cortex or thickness is not known.
+def area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:
+    """Return the pial area over that of a complete surface, or nothing where cortex or thickness is not known.
 
-    A cortical sheet of volume V and thickness H has the area V/H in its middle and a larger one outside: a ratio much
-    below 1 means fused sulci.
+    A cortical sheet of volume V and thickness T has the area V/T in its middle and (1 + H T) V/T outside, with the
+    `mean_curvature` H in 1/mm: a ratio below 1 means fused sulci.
     """
     if not {"volume_cortex", "mean_thickness"} <= set(whole):
         return {}
     sheet_cm2 = whole["volume_cortex"] / ML_PER_MM3 / whole["mean_thickness"] * CM2_PER_MM2
-    return {"area_ratio": whole["area"] / sheet_cm2}
+    return {"area_ratio": whole["area"] / (1.0 + mean_curvature * whole["mean_thickness"]) / sheet_cm2}
 
 
 def spectrum_metrics(side: Hemisphere) -> Metrics:
@@ -326,7 +326,9 @@ def measure_brain(
     # without caps of medial walls
     whole_metrics["area"] = sum(area_cm2(side.mesh) for side in sides)
     whole_metrics |= {metric: volume for metric, volume in volumes.items() if volume is not None}
-    metrics = {"whole": whole_metrics | area_ratio(whole_metrics)}
+    bent = [np.average(side.curvature_maps.mean, weights=vertex_areas(side.mesh)) for side in sides]
+    mean_curvature = float(np.average(bent, weights=[area_cm2(side.mesh) for side in sides]))
+    metrics = {"whole": whole_metrics | area_ratio(whole_metrics, mean_curvature)}
     for side in sides:
         sizes = size_metrics(side.mesh, side.crossing)
         metrics[side.name] = sizes | _folding_and_thickness([side]) | spectrum_metrics(side)

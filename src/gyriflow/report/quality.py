@@ -209,7 +209,7 @@ def _facts(row: Mapping[str, Any]) -> dict[str, str]:
     if thickness is not None:
         facts["thickness"] = f"{thickness:.2f} mm (measured on {100 * row['thickness_measured_share']:.0f} %)"
     if row["area_ratio"] is not None:
-        facts["area / (cortex volume / thickness)"] = f"{row['area_ratio']:.2f}"
+        facts["area / area of a complete surface"] = f"{row['area_ratio']:.2f}"
     return facts
 
 

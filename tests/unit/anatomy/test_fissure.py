@@ -45,6 +45,12 @@ def test_two_closed_pieces_are_the_hemispheres_though_they_reach_over_the_plane(
     assert left.tolist() == [True] * 1280 + [False] * 1280
 
 
+def test_asymmetry_is_the_distance_to_the_mirror_image():
+    # radii that differ by a millimetre
+    mesh = merged(ball_at(-14.0, 3.0, 0.0), sphere(11.0, 4, (14.0, 3.0, 0.0)))
+    assert mid_plane(mesh).asymmetry_mm == pytest.approx(1.0, rel=0.2)
+
+
 def test_a_lump_beside_a_connected_brain_is_no_hemisphere():
     # whose middle is a little off the plane, on the other side than the lump
     brain = ellipsoid((24, 33, 22), centre=(0.5, 0, 0))

@@ -5,11 +5,12 @@ import pytest
 from facts import Facts
 from odd_brains import CEREBRUM, VENTRICLES, positions, with_fourth_ventricle
 from scipy import ndimage
-from shapes import phantom
+from shapes import phantom, rigid
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.labels import (
+    border_share,
     cerebrum_mask,
     outside_ventricles,
     read_cerebrum,
@@ -139,6 +140,13 @@ def test_a_ball_on_a_thin_stalk_is_cut_off_with_the_stalk():
     assert found["stalk_mm2"] == pytest.approx(np.pi, rel=0.6)
     # the ball's, nearly: in the affine's mm
     assert found["place_mm"] == pytest.approx([24.0, 24.0, 17.0], abs=1.5)
+    # long voxels, their axes exchanged and turned
+    turn, order = rigid(20, -30, 10, shift=(5, -7, 2)), (2, 0, 1)
+    affine = turn @ AFFINE @ np.diag([1.0, 1.0, 2.0, 1.0])[:, [*order, 3]]
+    (same,) = without_stalks(mask[:, :, ::2].transpose(order), affine)[1]
+    assert same["volume_mm3"] == pytest.approx(found["volume_mm3"], rel=0.1)
+    assert same["stalk_mm2"] == pytest.approx(found["stalk_mm2"], rel=0.6)
+    assert same["place_mm"] == pytest.approx(turn[:3, :3] @ found["place_mm"] + turn[:3, 3], abs=0.6)
 
 
 @pytest.mark.parametrize("case", ["a thick stalk", "a blade"])
@@ -245,6 +253,32 @@ def test_stray_voxels_and_voids_change_neither_the_cerebrum_nor_its_volume(brain
     expected = clean.report["label_volumes_mL"]["cerebrum"]
     assert found.report["label_volumes_mL"]["cerebrum"] == pytest.approx(expected, rel=1e-6)
     assert Facts(found.report["outside"]["parts"], "mL", "%") in found.warnings
+
+
+@pytest.mark.parametrize(("axis", "end"), [(axis, end) for axis in range(3) for end in (0, -1)])
+def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_told_with_the_share(axis, end):
+    block = np.zeros((20, 18, 16), dtype=bool)
+    block[5:13, 5:13, 5:13] = True
+    assert border_share(block) == 0.0
+    shift = -5 if end == 0 else block.shape[axis] - 13
+    # a side of 8 × 8 voxels; the rest of the surface has those of the other five
+    rest = 8**3 - 6 * 6 * 7
+    assert border_share(np.roll(block, shift, axis)) == pytest.approx(64 / (64 + rest))
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
+def test_volumes_of_labels_add_up_in_long_turned_voxels(order):
+    axes = np.arange(-21.0, 21.0, 0.7), np.arange(-21.0, 21.0, 0.7), np.arange(-21.0, 21.0, 2.1)
+    radius = np.sqrt(sum(axis**2 for axis in np.meshgrid(*axes, indexing="ij"))).transpose(order)
+    labels = np.digitize(radius, [5.0, 14.0, 18.0])
+    labels = np.array([2, 1, 5, 0])[labels]
+    affine = rigid(20, -30, 10) @ np.diag([0.7, 0.7, 2.1, 1.0])[:, [*order, 3]]
+    volumes = read_cerebrum(labels, affine, ATLAS).report["label_volumes_mL"]
+    balls = {radius: 4 / 3 * np.pi * radius**3 / 1e3 for radius in (5.0, 14.0, 18.0)}
+    expected = {"cerebrum": balls[18.0], "ventricles": balls[5.0], "tissue": balls[18.0] - balls[5.0]}
+    expected |= {"cortex": balls[18.0] - balls[14.0], "inside_cortex": balls[14.0] - balls[5.0]}
+    assert volumes == pytest.approx(expected, rel=0.04)
+    assert volumes["cortex"] + volumes["inside_cortex"] + volumes["ventricles"] == pytest.approx(volumes["cerebrum"])
 
 
 FETA = np.array([0, 3, 4, 5, 1, 2, 6, 7, 3])

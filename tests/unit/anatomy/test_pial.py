@@ -17,6 +17,7 @@ from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
 from gyriflow.anatomy.plausible import expected_volume_ml, proportion_warnings, require_plausible_size
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError, MeshError
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.remeshing import self_intersecting_faces
 from gyriflow.geometry.triangles import (
     TriangleMesh,
@@ -179,6 +180,10 @@ def test_overlapping_hemispheres_are_moved_apart(halves):
     assert 0.5 < surface.report["moved_apart_mm"] < 2.0
     assert smallest_gap(*pieces(surface.whole)) == pytest.approx(0.5, abs=0.1)
     assert Facts(f"{surface.report['moved_apart_mm']:.2f} mm", "0.5 mm") in surface.report["warnings"]
+    # white surfaces and maps of either file follow its hemisphere
+    for side, given in (("left", left), ("right", halves[1])):
+        followed = transformed(given, surface.pose.of_file(side)).vertices
+        assert np.quantile(nearest_on(followed, getattr(surface, side))[0], 0.95) < 0.4
 
 
 @pytest.mark.slow

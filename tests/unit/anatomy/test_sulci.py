@@ -16,7 +16,8 @@ from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import faults, pieces, surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
 from gyriflow.anatomy.terraces import without_terraces
-from gyriflow.anatomy.thickness import cortical_thickness
+from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
@@ -41,12 +42,12 @@ def ball():
     return depth > 0, places, depth, scaling(VOXEL_MM, axis[0])
 
 
-def with_sulcus(depth_mm, thickness_mm=THICKNESS_MM):
+def with_sulcus(depth_mm):
     """Return a ball with a shut sulcus all round it, in a plane that is oblique to the voxels."""
     body, places, depth, affine = ball()
     across = np.abs(places @ np.array([0.8, 0.36, 0.48]))
     to_end = np.hypot(across, np.maximum(depth - depth_mm, 0.0))
-    return body, body & (depth > thickness_mm) & (to_end > thickness_mm), affine
+    return body, body & (depth > THICKNESS_MM) & (to_end > THICKNESS_MM), affine
 
 
 @pytest.mark.parametrize("depth_mm", [4.0, 6.0])
@@ -116,14 +117,23 @@ def test_a_hemisphere_alone_has_its_sulcus_opened():
     y[cerebrum] = np.abs(coordinates[:, 1] - coordinates[:, 1].mean() - 8.0)
     sheet = cerebrum & (y < 2.0) & (depth < 7.0) & np.isin(labels, scheme.white_matter)
     labels = np.where(sheet, scheme.cortex[0], labels)
-    areas = {}
+    # a tunnel, which is filled before sulci are opened
+    middle = np.argwhere(cerebrum).mean(axis=0)
+    rows = np.indices(labels.shape) - np.reshape(middle, (3, 1, 1, 1))
+    labels[(np.abs(rows[0]) < 2) & (np.abs(rows[2] + 4) < 2)] = 0
+    areas, expected_ml = {}, {}
     for opened in (False, True):
         surface = from_labels(labels, affine, scheme, "left", week=24.0, open_sulci=opened)
         areas[opened] = surface.report["area_cm2"]["left"]
+        expected_ml[opened] = surface.report["smoothing"]["volume_expected_mL"]
         assert surface.report["euler_number"] == 2
     # both walls of the slit, which is shorter than the sheet by its rounded ends
     walls = 2.0 * CM2_PER_MM2 * sheet.sum() * size.prod() / 4.0
     assert areas[True] - areas[False] == pytest.approx(walls, rel=0.25)
+    filled_ml = expected_ml[False] - surface.report["label_volumes_mL"]["cerebrum"]
+    assert filled_ml > 0.005
+    opened_ml = surface.report["sulci"]["opened_mL"]
+    assert expected_ml[True] == pytest.approx(expected_ml[False] - opened_ml, abs=0.1 * filled_ml)
 
 
 def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
@@ -136,12 +146,32 @@ def test_labels_that_lack_white_matter_are_told_and_stay_as_they_are():
     np.testing.assert_array_equal(grid, affine)
 
 
-def test_cortex_of_a_voxel_is_told_and_stays_as_it_is():
-    body, core, affine = with_sulcus(6.0, thickness_mm=VOXEL_MM)
+def test_cortex_of_a_voxel_stays_fused_and_has_one_number_of_voxels():
+    labels, affine = phantom(24.0, 2.0)
+    scheme = SCHEMES["spina-bifida-atlas"]
+    surface = from_labels(labels, affine, scheme, week=28.0, edge_length_mm=3.0, open_sulci=True)
+    placed = surface.whole, surface.pose, surface.fissure_x_mm
+    voxels = thickness_from_labels(labels, affine, scheme, *placed).report["voxels_through_cortex"]
+    assert voxels == pytest.approx(1.0, abs=0.2)
+    reason = surface.report["sulci"]["stays_fused"]
+    assert reason == Facts(f"{voxels:.1f} voxels")
+    assert Facts(reason) in surface.report["warnings"]
+
+
+def test_uneven_cortex_is_opened_on_both_sides():
+    body, places, depth, affine = ball()
+    across, along = np.abs(places @ np.array([0.8, 0.36, 0.48])), places @ np.array([0.0, 0.8, -0.6])
+    thickness = np.where(along < 0, 1.3, 2.6)
+    to_end = np.hypot(across, np.maximum(depth - 6.0, 0.0))
+    core = body & (depth > thickness) & (to_end > thickness)
     field = smooth_mask(body)
-    same, _, report = open_fused_sulci(field, affine, core)
-    assert report["stays_fused"] == Facts("1.0 voxels")
-    assert same is field
+    opened, fine, _ = open_fused_sulci(field, affine, core)
+    slits = transform_points(np.argwhere(opened < 0.5), fine)
+    slits = slits[np.linalg.norm(slits, axis=1) < RADIUS_MM - 0.5]
+    sheet = places[body & (across < 0.3) & (depth < 5.5)]
+    is_open = np.linalg.norm(sheet[:, None] - slits, axis=-1).min(axis=1) < VOXEL_MM
+    for half in (-1, 1):
+        assert is_open[sheet @ np.array([0.0, 0.8, -0.6]) * half > 1.0].mean() > 0.95
 
 
 def voxels(half, size=VOXEL_MM):

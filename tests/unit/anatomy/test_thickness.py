@@ -4,15 +4,16 @@ import igl
 import numpy as np
 import pytest
 from facts import Facts
-from shapes import rigid, scaling
+from shapes import ellipsoid, rigid, scaling, sphere
 from skimage.measure import marching_cubes
 
-from gyriflow.anatomy.extraction import isosurface, make_simple, smooth_mask
-from gyriflow.anatomy.repair import make_even
-from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
+from gyriflow.anatomy.extraction import smooth_mask
+from gyriflow.anatomy.repair import surface_of_mask
+from gyriflow.anatomy.thickness import cortical_thickness, mean_curvature, summary, thickness_from_labels
 from gyriflow.errors import InputError
+from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.poses import Pose
-from gyriflow.geometry.triangles import transformed
+from gyriflow.geometry.triangles import area, flipped, merged, transformed
 from gyriflow.settings.schemes import LabelScheme
 
 FOLDS_MM = 2.0
@@ -39,7 +40,7 @@ def layered(folds_mm, voxel_mm):
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     depth, inside = depth_below(points, folds_mm)
     affine = scaling(voxel_mm, axis[0])
-    pial, _ = make_even(isosurface(make_simple(smooth_mask(inside, 1.0))[0], affine), 1.0)
+    pial = surface_of_mask(smooth_mask(inside), affine, inside.sum() * voxel_mm**3, 1.0).mesh
     return pial, depth, inside, affine
 
 
@@ -110,17 +111,51 @@ def test_a_cortex_of_no_usual_thickness_or_of_about_a_voxel_is_told(ball, caplog
     assert caplog.messages == messages
 
 
-@pytest.mark.parametrize(("shut_mm", "ratio"), [(0.0, 1.11), (26.0, 0.86), (40.0, 0.78)])
-def test_area_that_shut_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, shut_mm, ratio):
-    """A shut sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as `shut_mm`."""
+@pytest.mark.parametrize("hidden", [0.0, 0.05, 0.1, 0.2])
+def test_area_that_fused_sulci_hide_is_told_by_the_cortex_volume(ball, caplog, hidden):
+    """A fused sulcus through a ball of 20 mm: two banks of 2 mm that touch, as deep as hides a share of the area."""
     pial, depth, inside, affine = ball
+    walls_mm2 = hidden / (1.0 - hidden) * area(pial)
+    # the area of a circle's segment, by its depth
+    deep = np.linspace(0.0, 40.0, 2001)
+    segment = 400.0 * np.arccos(1.0 - deep / 20.0) - (20.0 - deep) * np.sqrt(np.maximum(deep * (40.0 - deep), 0.0))
+    shut_mm = np.interp(0.5 * walls_mm2, segment, deep)
     x, _, z = (affine[0, 3] + 0.8 * index for index in np.indices(inside.shape))
-    banks = inside & (np.abs(x) < 2.0) & (z > 20.0 - shut_mm)
+    # at its end, the sulcus has cortex around it
+    from_end = np.hypot(x, np.maximum(20.0 - shut_mm - z, 0.0))
+    banks = inside & (from_end < 2.0) & (hidden > 0)
     labels = np.where(inside, np.where((depth < 2.0) | banks, 5, 1), 0)
     scheme = LabelScheme(name="a", cerebrum=(1, 5), cortex=(5,))
     found = thickness_from_labels(labels, affine, scheme, pial, Pose())
-    assert found.report["area_ratio"] == pytest.approx(ratio, abs=0.04)
-    assert caplog.messages == [Facts("cortex", f"{found.report['area_ratio']:.2f}")] * (ratio < 0.95)
+    assert found.report["area_ratio"] == pytest.approx(1.0 - hidden, abs=0.03)
+    assert caplog.messages == [Facts("cortex", f"{found.report['area_ratio']:.2f}")] * (
+        found.report["area_ratio"] < 0.95
+    )
+    assert bool(caplog.messages) == (hidden > 0.05)
+
+
+@pytest.mark.parametrize(("size", "tolerance"), [((0.8,) * 3, 0.01), ((1.2,) * 3, 0.01), ((1.0, 1.0, 3.0), 0.02)])
+def test_both_borders_are_where_the_voxels_have_them(size, tolerance):
+    semi_axes, turn = np.array([16.0, 20.0, 13.0]), rigid(20, 30, 10)
+    shape = np.ceil(2 * (semi_axes.max() + 6) / np.array(size)).astype(int)
+    affine = turn @ scaling(size, np.array([0.13, 0.2, -0.1]) - semi_axes.max() - 6)
+    points = np.moveaxis(np.indices(shape), 0, -1) @ affine[:3, :3].T + affine[:3, 3]
+    inside = ((points / semi_axes) ** 2).sum(axis=-1) < 1.0
+    whole, depth = ellipsoid(semi_axes, 5), np.zeros(shape)
+    depth[inside] = nearest_on(points[inside], whole)[0]
+    pial = surface_of_mask(smooth_mask(inside), affine, inside.sum() * np.prod(size), 1.2).mesh
+    found = cortical_thickness(pial, inside, inside & (depth < 2.0), affine)
+    assert found.report["mean_mm"] == pytest.approx(2.0, rel=tolerance)
+    assert found.report["voxel_mm"] == pytest.approx(max(size))
+    if len(set(size)) == 1:
+        assert found.report["voxels_through_cortex"] == pytest.approx(2.0 / size[0], rel=0.02)
+
+
+def test_mean_curvature_is_that_of_the_vertices_asked_for():
+    mesh = merged(sphere(8.0), sphere(20.0, centre=(40.0, 0.0, 0.0)))
+    is_small = mesh.vertices[:, 0] < 15.0
+    assert mean_curvature(mesh, is_small) == pytest.approx(1 / 8, rel=0.005)
+    assert mean_curvature(flipped(mesh), ~is_small) == pytest.approx(-1 / 20, rel=0.005)
 
 
 def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
@@ -128,5 +163,35 @@ def test_a_surface_that_lies_deep_in_the_labels_is_not_measured(ball):
     # the voxels go on beyond the surface, as where a fissure was opened
     larger = np.ones_like(inside)
     larger[:3] = False
-    with pytest.raises(InputError, check=Facts((larger & (depth < 3.0)).sum())):
-        cortical_thickness(pial, larger, larger & (depth < 3.0), affine)
+    cortex = larger & (depth < 3.0)
+    with pytest.raises(InputError, check=Facts(cortex.sum())):
+        cortical_thickness(pial, larger, cortex, affine)
+    # but for opened sulci, on both sides of the fissure
+    x = pial.vertices[:, 0] - 1.5
+    found = cortical_thickness(pial, larger, cortex, affine, fissure_x_mm=1.5)
+    assert found.is_measured[np.abs(x) > 3.5].all()
+    assert not found.is_measured[np.abs(x) < 2.5].any()
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
+def test_long_voxels_have_their_length_along_their_own_axis(ball, order):
+    pial, depth, inside, affine = ball
+    inside, depth = inside[:, :, ::3].transpose(order), depth[:, :, ::3].transpose(order)
+    turn = rigid(20, -30, 10, shift=(5, -7, 2))
+    affine = turn @ affine @ np.diag([1.0, 1.0, 3.0, 1.0])[:, [*order, 3]]
+    # bare below, where the next cortex is a long voxel away
+    z = pial.vertices[:, 2]
+    height = np.indices(inside.shape)[order.index(2)]
+    cortex = inside & (depth < 3.2) & (height > 10)
+    found = cortical_thickness(transformed(pial, turn), inside, cortex, affine)
+    bare = -25 + 0.13 + 2.4 * 10.5
+    share = found.is_measured[z > bare + 2.4].mean()
+    assert share == pytest.approx(0.968, abs=0.003)
+    assert not found.is_measured[z < bare - 4.0].any()
+
+
+def test_a_summary_is_weighted_by_area_and_leaves_out_what_was_not_measured():
+    values, areas = np.array([1.0, 2.0, 4.0, 9.0]), np.array([1.0, 2.0, 1.0, 6.0])
+    found = summary(values, np.array([True, True, True, False]), areas)
+    expected = {"mean_mm": 2.25, "median_mm": 2.0, "quantile05_mm": 1.0, "quantile95_mm": 4.0}
+    assert found == pytest.approx(expected | {"sd_mm": np.sqrt(4.75 / 4), "measured_area_share": 0.4})

@@ -5,7 +5,7 @@ import pytest
 from shapes import scaling, sphere
 
 from gyriflow.anatomy.fissure import split
-from gyriflow.anatomy.white import white_from_labels, white_from_surfaces
+from gyriflow.anatomy.thickness import white_from_labels, white_from_surfaces
 from gyriflow.geometry.poses import Pose
 from gyriflow.geometry.triangles import transformed
 from gyriflow.metrics.measure import measure_white

@@ -87,8 +87,9 @@ def test_volumes_of_tissues_are_of_the_whole_where_labels_know_them(apart: Brain
 
 def test_the_pial_area_is_compared_with_that_of_a_sheet_of_the_cortex() -> None:
     sizes = {"area": 300.0, "volume_cortex": 80.0}
-    assert area_ratio(sizes | {"mean_thickness": 2.0}) == {"area_ratio": pytest.approx(0.75)}
-    assert area_ratio(sizes) == {}
+    assert area_ratio(sizes | {"mean_thickness": 2.0}, 0.0) == {"area_ratio": pytest.approx(0.75)}
+    assert area_ratio(sizes | {"mean_thickness": 2.0}, 0.125) == {"area_ratio": pytest.approx(0.6)}
+    assert area_ratio(sizes, 0.125) == {}
 
 
 def test_neither_the_fissure_nor_a_cut_is_a_sulcus(apart: BrainMetrics, cut: BrainMetrics) -> None:
