@@ -131,7 +131,9 @@ def main() -> None:
     parameters = parameters_from(values)
     volumes, result, before = volumes_between(mesh.vertices, mesh.tets), [], None
     for steps in arguments.steps:
-        rows, growth = follow(mesh, parameters.model_copy(update={"step_s": SECONDS_PER_GW / steps}), maps, arguments.filter)
+        rows, growth = follow(
+            mesh, parameters.model_copy(update={"step_s": SECONDS_PER_GW / steps}), maps, arguments.filter
+        )
         run: dict[str, Any] = {"steps_per_week": steps, "rows": rows}
         if before is not None:
             change, size = (float(((x**2).sum(axis=1) * volumes).sum()) for x in (growth - before, growth))

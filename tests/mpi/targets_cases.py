@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import COMM
-from facts import Facts
 from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blocks
+from facts import Facts
 from scipy.spatial.transform import Rotation
 from shapes import box_mesh, ellipsoid_mesh, rigid
 

@@ -36,7 +36,9 @@ with step(snakemake.log[0]):
         targets = read_weekly_shapes(files.targets)
         passed, stops = targets.passed, targets.stops
         weekly = targets.weeks[passed].tolist()
-        sizes = {name: dict(zip(weekly, values[passed].tolist(), strict=True)) for name, values in targets.sizes.items()}
+        sizes = {
+            name: dict(zip(weekly, values[passed].tolist(), strict=True)) for name, values in targets.sizes.items()
+        }
         maps |= target_maps(weekly[1:], targets.positions[passed[1:]])
     curves = read_table(files.curves) if files.curves else None
     inputs = params.settings, params.weeks, read_json(files.surface), sizes, stops, curves, params.series

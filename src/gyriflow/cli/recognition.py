@@ -14,7 +14,7 @@ from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
-from ..io.files import files_in, read_json, reading
+from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
 from ..io.yaml_files import SCHEMES

@@ -87,8 +87,8 @@ class SelfContact:
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
     distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
     below the small gap at the start of the run, neighbours aside: a body that does not grow must not move, except where
-    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory. MeshError
-    where the surface crosses itself at the start.
+    neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory.
+    MeshError where the surface crosses itself at the start.
     """
 
     def __init__(

@@ -263,7 +263,10 @@ class ElasticFit:
             last, second = self._stops(stop, after, passed[i + 1 :])
             return last, [*first, stop, *second]
         if len(faults):
-            place, text = np.round(faults[0], 1).tolist(), "%d elements or faces are inverted or cross near %s mm on the way"
+            place, text = (
+                np.round(faults[0], 1).tolist(),
+                "%d elements or faces are inverted or cross near %s mm on the way",
+            )
             log.warning(text, len(faults), place)
         return untangled, []
 

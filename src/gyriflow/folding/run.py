@@ -21,8 +21,18 @@ from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
 from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import FRAMES, STEPS, SUMMARY, frame_path, layer_fields, log_growth_at_vertices
-from .output import peak_memory_mib, print_line, progress_line, warn
+from .output import (
+    FRAMES,
+    STEPS,
+    SUMMARY,
+    frame_path,
+    layer_fields,
+    log_growth_at_vertices,
+    peak_memory_mib,
+    print_line,
+    progress_line,
+    warn,
+)
 from .simulation import Folding, advance
 from .steering import missed_curves
 from .targets import missed_targets, shrinkage_note

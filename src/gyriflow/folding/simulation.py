@@ -11,8 +11,8 @@ from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.weeks import WEEK_RANGE
 from ..settings.varying import Maps, value_at, value_range
+from ..settings.weeks import WEEK_RANGE
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact
@@ -136,9 +136,8 @@ class Folding:
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:
-        """Return the deformation (m, 3, 3) of all elements by growth before a step and in it, None if it is by rates."""
-        mean = growth.mean_deformation(self.elements)
-        if mean is None:
+        """Return the deformation (m, 3, 3) of all elements by growth before a step and in it, None if it is by
+        rates.""" mean = growth.mean_deformation(self.elements) if mean is None:
             return None
         grown = self.domain.gather_cells(mean)
         return grown if state.growth is None else grown @ state.growth

@@ -1,7 +1,7 @@
 """Growth towards known shapes: in each step the growth that keeps the brain on a path through its targets.
 
-This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result. docs/model.md has the equations.
-Each element takes the stretch of its own way along the path X*(t), so that growth is compatible: a body that touches
+This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result. docs/model.md has the
+equations. Each element takes the stretch of its own way along the path X*(t), so that growth is compatible: a body that touches
 nothing follows the path without stress. Feedback with a time constant corrects the misfit that contact leaves.
 """
 
@@ -16,13 +16,13 @@ from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import smooth_integrals, vertex_sizes
+from ..geometry.jacobians import lower_bounds
+from ..geometry.paths import Path, path_through
 from ..geometry.tetrahedra import NODES_OF_ORDER, TetrahedralMesh, volumes_between
 from ..settings.folding import AXES, FoldingParameters
 from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
 from .growth import Floats, GrowthInputs, Size, StepGrowth, StepStart
-from ..geometry.jacobians import lower_bounds
-from ..geometry.paths import Path, path_through
 from .stretches import deformation_gradients, inverse_stretch
 from .tissue import Elements, Tissue
 
@@ -48,8 +48,8 @@ class TargetGrowth(StepGrowth):
     """Growth of a step towards a shape: the stretch U of each element on its way to `goal_mm` (n, 3).
 
     `misfit_mm` is the root mean square distance to the path at the start of the step, without rigid motion. Elements
-    whose stretch is beyond `MAX_LOG_STRETCH` grow by that, and those that the goal inverts do not grow; `inverse` counts
-    both as `held`, with `total` over the ranks. `shrinking` elements lose more than `MAX_SHRINKAGE_PER_DAY`.
+    whose stretch is beyond `MAX_LOG_STRETCH` grow by that, and those that the goal inverts do not grow; `inverse`
+    counts both as `held`, with `total` over the ranks. `shrinking` elements lose more than `MAX_SHRINKAGE_PER_DAY`.
     """
 
     goal_mm: Floats
@@ -146,7 +146,9 @@ def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:
         distance = f"{last['to_path_mm']:.2f} mm from its target shape (root mean square)"
         warnings.append(f"at GW {last['week']:g} the brain is {distance}: contact or stiffness prevents the growth")
     if held := max(row["held_elements"] for row in rows):
-        warnings.append(f"up to GW {last['week']:g} {held} elements grow less than their path asks for, which bends or inverts them")
+        warnings.append(
+            f"up to GW {last['week']:g} {held} elements grow less than their path asks for, which bends or inverts them"
+        )
     return warnings
 
 

@@ -122,8 +122,8 @@ def inverted_on_the_way(
     """Return whether each (m, 4) or (m, 10) element is inverted anywhere on the straight way of its vertices.
 
     The volume of a linear element is a cubic of the way. It is positive if all Bernstein coefficients are; else the
-    roots of the cubic decide. With `least` it must stay above that fraction of the volume before. A quadratic element is
-    checked by bounds (`lower_bounds`) at the quarters of the way.
+    roots of the cubic decide. With `least` it must stay above that fraction of the volume before. A quadratic element
+    is checked by bounds (`lower_bounds`) at the quarters of the way.
     """
     if tets.shape[1] == len(NODES):
         on_way = (before + part * (after - before) for part in (0.25, 0.5, 0.75, 1.0))

@@ -46,7 +46,8 @@ def path_through(
     step_gw: float = 1 / 7,
     stops: Collection[float] = (),
 ) -> Path:
-    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, as a run with steps of `step_gw` takes it.
+    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, as a run with steps of `step_gw` takes
+    it.
 
     Each shape is first aligned rigidly to the one before. Shapes observed at almost the same time are merged
     (`merged_shapes`); `stops` are the weeks of shapes that were not observed but lie between. The velocity is

@@ -92,8 +92,8 @@ def resample_by_size(
     """Return the (w, n, 3) positions of a mesh at w weeks, as an atlas that grows along its curve of volume.
 
     `atlas` (k, n, 3) are the mesh's positions where the atlas has the k ages `knots`. At each week the shape is that
-    between the shapes whose ages are around it. Its volume is that of the curve, as a multiple of the curve's at the age
-    of the first shape.
+    between the shapes whose ages are around it. Its volume is that of the curve, as a multiple of the curve's at the
+    age of the first shape.
     """
     sizes = vertex_sizes(mesh.vertices, linear_pieces(mesh))
     shapes = np.stack([positions_at(week, atlas, knots, sizes) for week in np.clip(weeks, *knots[[0, -1]])])

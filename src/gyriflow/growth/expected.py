@@ -16,7 +16,7 @@ from ..settings.growth import BEFORE_GW
 from .atlas_ages import MIN_SPACING_GW, AtlasAges
 from .atlas_path import AtlasPath, positions_at, resample_by_size
 from .fitting import fit_onto_surface
-from .series_shapes import FittedBody, SeriesShapes, fit_body, tissue_below, warn_of_misfit, with_stops
+from .series_shapes import FittedBody, SeriesShapes, fit_body, tissue_below, with_stops
 
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""
@@ -130,10 +130,10 @@ def predict_shapes(
 ) -> Prediction:
     """Predict the shapes of a mesh from its week to that of the atlas after the end week, and at further weeks.
 
-    The mesh is carried into the brain of `pair_week` of the atlas and along the atlas' path, whose brains count at their
-    age by size (`resample_by_size`). One body follows the prediction from week to week of the atlas, so that no element
-    is inverted and no faces cross. Curve, ages and the weeks that the body passes are those of the atlas, and the path
-    ends two weeks of the atlas after the end: so a shape does not depend on what else is predicted.
+    The mesh is carried into the brain of `pair_week` of the atlas and along the atlas' path, whose brains count at
+    their age by size (`resample_by_size`). One body follows the prediction from week to week of the atlas, so that no
+    element is inverted and no faces cross. Curve, ages and the weeks that the body passes are those of the atlas, and
+    the path ends two weeks of the atlas after the end: so a shape does not depend on what else is predicted.
 
     `age_shift_gw`, by which a brain of the atlas is older than stated, `smoothing_mm` and `fading_gw` vary in an
     ensemble; `norm_ml` as for `ages_by_size`.

@@ -71,8 +71,8 @@ def run_parameters(
     """Return the parameters of a run as its `params.yaml` has them, with measured sizes as numbers by week.
 
     `settings` are its own, `weeks` its output weeks, `surface` is the report of the start brain's surface, and
-    `target_sizes` are those of the shapes that it grows towards, by week, the start first; empty where there are none. `stops` are those of the weeks without an observed brain.
-    Curves and series are as for `followed_sizes`.
+    `target_sizes` are those of the shapes that it grows towards, by week, the start first; empty where there are none.
+    `stops` are those of the weeks without an observed brain. Curves and series are as for `followed_sizes`.
     """
     growth = {**settings["growth"], **target_sizes}
     targets = list(next(iter(target_sizes.values()), ()))[1:]

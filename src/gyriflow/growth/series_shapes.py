@@ -109,8 +109,8 @@ def follow_series(
     With `open_sulci` the surfaces have slits that registration by labels does not show. Then points are matched by the
     tissue below them, too, and a body is drawn to its surface several times.
 
-    The mesh belongs to the first of the `weeks`, `pairs` lead from each brain to the next, all by registration or all by
-    matched surfaces, and `surfaces` are the pial surfaces of the later brains, all in the spaces of these
+    The mesh belongs to the first of the `weeks`, `pairs` lead from each brain to the next, all by registration or all
+    by matched surfaces, and `surfaces` are the pial surfaces of the later brains, all in the spaces of these
     correspondences.
 
     InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
@@ -119,7 +119,9 @@ def follow_series(
     pieces = linear_pieces(mesh)
     extend = harmonic_continuation(mesh.vertices, pieces, used)
     shapes: list[tuple[float, Floats, bool]] = [(weeks[0], mesh.vertices, False)]
-    for week, (places, goals, target) in zip(weeks[1:], _carried(boundary, used, shapes, pairs, surfaces, open_sulci), strict=False):
+    for week, (places, goals, target) in zip(
+        weeks[1:], _carried(boundary, used, shapes, pairs, surfaces, open_sulci), strict=False
+    ):
         before = shapes[-1]
         if target is not None:
             goals = fit_onto_surface(TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1])

@@ -23,9 +23,9 @@ MAX_SURFACE_STEP = 0.05
 def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Return a linear mesh whose flattest elements are improved; the mesh itself if none is flat.
 
-    A vertex of a flat element is moved to or from the opposite face, or along the line between its middle edges, if that
-    raises the least radius ratio of all elements around the vertex, none of which is inverted. Vertices of the surface
-    move less than a twentieth of an edge.
+    A vertex of a flat element is moved to or from the opposite face, or along the line between its middle edges, if
+    that raises the least radius ratio of all elements around the vertex, none of which is inverted. Vertices of the
+    surface move less than a twentieth of an edge.
     """
     flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
     if not 0 < len(flat) <= MAX_FLAT:
@@ -38,7 +38,8 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
             moves = [
-                move for vertex in mesh.tets[element] if (move := _best_move(vertices, mesh.tets, element, vertex, on_surface))
+                move for vertex in mesh.tets[element] if (move := _best_move(vertices, mesh.tets, element, vertex,
+                on_surface))
             ]
             if not moves:
                 break
@@ -53,16 +54,11 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
 def _best_move(
     vertices: Floats, tets: Ints, element: int, vertex: int, on_surface: Floats
 ) -> tuple[float, int, Floats] | None:
-    """Return the gain in the least ratio around a vertex by its best move, the vertex and its place; None without gain."""
-    star = tets[(tets == vertex).any(axis=1)]
-    others = vertices[tets[element][tets[element] != vertex]]
-    normal = np.cross(others[1] - others[0], others[2] - others[0])
-    across = vertices[vertex] - others.mean(axis=0)
-    edge = float(np.linalg.norm(others - vertices[vertex], axis=1).max())
-    directions = [normal, across, *(vertices[vertex] - other for other in others)]
-    least = _ratios(vertices, star).min()
-    best = None
-    for direction in directions:
+    """Return the gain in the least ratio around a vertex by its best move, the vertex and its place; None without
+    gain.""" star = tets[(tets == vertex).any(axis=1)] others = vertices[tets[element][tets[element] != vertex]] normal
+    = np.cross(others[1] - others[0], others[2] - others[0]) across = vertices[vertex] - others.mean(axis=0) edge =
+    float(np.linalg.norm(others - vertices[vertex], axis=1).max()) directions = [normal, across, *(vertices[vertex] -
+    other for other in others)] least = _ratios(vertices, star).min() best = None for direction in directions:
         length = np.linalg.norm(direction)
         for step in STEPS if length > 0 else ():
             size = min(step, MAX_SURFACE_STEP) if on_surface[vertex] else step

@@ -1,7 +1,5 @@
 """What is to be expected of a brain: surfaces met sharply, and growth carried through a known map."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from facts import Facts
@@ -239,7 +237,9 @@ def sampled(moved, points, spacing_mm=3.0):
 def path_of(weeks, growing, stops=()):
     """Return the path of an atlas whose brain is the ball, at other vertices, that grows from week to week."""
     mesh = ellipsoid_mesh(12, (20.0, 20.0, 20.0))
-    return AtlasPath(mesh.tets, SeriesShapes(list(weeks), np.stack([growing(mesh.vertices, w) for w in weeks]), list(stops)))
+    return AtlasPath(
+        mesh.tets, SeriesShapes(list(weeks), np.stack([growing(mesh.vertices, w) for w in weeks]), list(stops))
+    )
 
 
 def uneven(places, week):
@@ -321,7 +321,9 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     start, found = prediction(25.0, further_weeks=[24.5])
     assert found.shapes.weeks == [22.3, 23.0, 24.0, 25.0, 26.0]
     volumes = sizes_of(start, found.shapes.positions)["volume_ml"]
-    wanted = np.array([np.linalg.det(np.diag(1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) for week in found.shapes.weeks])
+    wanted = np.array(
+        [np.linalg.det(np.diag(1 + np.array([0.08, 0.12, 0.1]) * (week - 22))) for week in found.shapes.weeks]
+    )
     # a part of the difference in size is smoothed away
     assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.04)
     assert set(found.baselines) == {"atlas", "atlas_deformed"}

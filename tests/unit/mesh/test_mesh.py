@@ -17,7 +17,6 @@ from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length,
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
-from gyriflow.mesh import tetrahedralisation
 from gyriflow.mesh.nodes import curve_edges
 from gyriflow.mesh.quality import (
     dihedral_angles,
@@ -241,7 +240,6 @@ def test_tetgen_keeps_the_remeshed_surface_exactly(filled):
     np.testing.assert_array_equal(*(np.unique(surface.vertices, axis=0) for surface in (own, even)))
     assert signed_volumes(filled).sum() == pytest.approx(signed_volume(even), rel=1e-12)
     assert (signed_volumes(filled) > 0).all()
-
 
 
 def test_elements_of_tetgen_grow_inwards_up_to_the_core(filled):
