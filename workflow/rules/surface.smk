@@ -21,7 +21,9 @@ def surface_settings(*names):
 def given_surface(wildcards):
     """Return the files that a brain's pial surface is made from."""
     brain = brain_of(wildcards)
-    return [SHAPE.format(brain=brain.id)] if brain.source == "shape" else brain.config.files
+    if brain.source == "shape":
+        return [SHAPE.format(brain=brain.id)]
+    return [brain.labels.path] if brain.labels else brain.config.files
 
 
 def pial_settings(wildcards):

@@ -32,10 +32,7 @@ PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
 
 REMOVED_KEYS = {
-    (
-        "Contact",
-        "distance_mm",
-    ): "contact begins at a fifth of the mean edge, or at the smallest gap at the start",
+    ("Contact", "distance_mm"): "contact begins at a fifth of the mean edge, or at the smallest gap of the start",
     ("Contact", "gap_mm"): "the planes are those of the paper, 0.625 mm from the middle of the fissure",
     ("Solver", "max_newton"): "a step is halved after 20 Newton iterations without progress",
     ("MeshSettings", "min_radius_ratio"): "elements with a radius ratio below 0.001 are refused",
@@ -160,7 +157,7 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
     path = tuple(part for part in details["loc"] if not str(part).startswith("(") and part != "[key]")
     text = details["msg"].removeprefix("Value error, ")
     if details["type"] == "extra_forbidden":
-        text = unknown_key(kind, path)
+        text = unknown_key(kind, path) or "unknown key"
     elif details["type"] not in (PROBLEM, "missing"):
         text += f"; found {details['input']!r}"
     # YAML reads 021 as the number 17
