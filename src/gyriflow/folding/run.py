@@ -183,8 +183,8 @@ def quality_warning(folding: Folding, state: State, week: float) -> str:
     if not flat:
         return ""
     return (
-        f"at GW {week:g} {flat} elements are flatter than a mesh may be at the start (radius ratio {ratios.min():.3f} of "
-        f"{MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
+        f"at GW {week:g} {flat} elements are flatter than a mesh may be at the start (radius ratio {ratios.min():.3f} "
+        f"of {MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
     )
 
 

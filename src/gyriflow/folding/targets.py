@@ -159,6 +159,6 @@ def shrinkage_note(rows: Sequence[dict[str, Any]]) -> str:
         return ""
     least = min(row["min_J"] for row in rows)
     return (
-        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of their volume in a day (least det F of a "
-        f"step {least:.2f}): an error of the registration, not of tissue"
+        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of their volume in a day (least det F of "
+        f"a step {least:.2f}): an error of the registration, not of tissue"
     )

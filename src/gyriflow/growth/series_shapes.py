@@ -174,8 +174,8 @@ def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -
     log.info("GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm", week, mean, far)
     if mean > MAX_MISFIT_MM:
         log.warning(
-            "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body cannot "
-            "reach all of it without inverted elements or crossing folds",
+            "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body "
+            "cannot reach all of it without inverted elements or crossing folds",
             week,
             mean,
             far,
