@@ -9,7 +9,7 @@ import pandas as pd
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
-from .distances import aligned_distances
+from .comparison import aligned_distances
 
 SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
@@ -25,14 +25,14 @@ COEFFICIENTS = ["subject", "run", "hemisphere", "mode", "band", "coefficient_sha
 """Columns of the coefficients that spectra are cut with."""
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
-DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
+DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "observed_value", "distance", "unit", "flag")
 """Columns of `distances_to`."""
 PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
     *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
 )
 """Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim paper."""
-LABELS = ("subject", "run", "real", "real_population", "same_population")
+LABELS = ("subject", "run", "observed", "observed_population", "same_population")
 COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
 
 Parts = Mapping[str, TriangleMesh]
@@ -124,16 +124,24 @@ def distances_to(
 def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
     pairs = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], observed, ["hemisphere", "proxy", "band"])
     for pair in pairs.sort_values("band", kind="stable").to_dict("records"):
-        values = pair["relative_power"], pair["relative_power_real"]
-        if not (pair["complete"] and pair["complete_real"]):
+        values = pair["relative_power"], pair["relative_power_observed"]
+        if not (pair["complete"] and pair["complete_observed"]):
             values = np.nan, np.nan
         measure = f"{SPECTRUM_PREFIXES[pair['proxy']]}relative_power_B{pair['band']}"
-        yield _band_row(pair["hemisphere"], measure, *values, resolved=pair["resolved"] and pair["resolved_real"])
+        yield _band_row(pair["hemisphere"], measure, *values, resolved=pair["resolved"] and pair["resolved_observed"])
 
 
-def _band_row(hemisphere: str, measure: str, value: float, real_value: float, *, resolved: bool) -> tuple:
-    flag = NOT_RESOLVED if not resolved else "cut off" if np.isnan(value + real_value) else "ok"
-    return hemisphere, measure, value, real_value, abs(value - real_value) if flag == "ok" else np.nan, "1", flag
+def _band_row(hemisphere: str, measure: str, value: float, observed_value: float, *, resolved: bool) -> tuple:
+    flag = NOT_RESOLVED if not resolved else "cut off" if np.isnan(value + observed_value) else "ok"
+    return (
+        hemisphere,
+        measure,
+        value,
+        observed_value,
+        abs(value - observed_value) if flag == "ok" else np.nan,
+        "1",
+        flag,
+    )
 
 
 def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.DataFrame:
@@ -152,7 +160,7 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
         simulated and observed brains in the comparison.
     """
     numbers = comparison[comparison["measure"] == WEYL_NUMBER]
-    cuts = numbers.groupby("hemisphere")[["value", "real_value"]].max().max(axis=1).to_dict()
+    cuts = numbers.groupby("hemisphere")[["value", "observed_value"]].max().max(axis=1).to_dict()
     shares = {}
     for (run, subject, side), modes in coefficients.groupby(["run", "subject", "hemisphere"]):
         cut = cuts.get(side, np.inf)
@@ -160,13 +168,13 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
         power = powers.groupby("band").sum().reindex(range(1, max(FOLD_BANDS) + 1))
         shares[run, subject, side] = power / power.sum() if len(modes) >= cut else power * np.nan
     rows = []
-    flags = comparison.set_index(["run", "subject", "real", "hemisphere", "measure"])["flag"]
+    flags = comparison.set_index(["run", "subject", "observed", "hemisphere", "measure"])["flag"]
     for row in numbers.to_dict("records"):
         labels, side = [row[name] for name in LABELS], row["hemisphere"]
-        simulated, observed = shares[row["run"], row["subject"], side], shares[MEASURED, row["real"], side]
+        simulated, observed = shares[row["run"], row["subject"], side], shares[MEASURED, row["observed"], side]
         for band in FOLD_BANDS:
             name = f"shape_index_relative_power_B{band}"
-            resolved = flags[row["run"], row["subject"], row["real"], side, name] != NOT_RESOLVED
+            resolved = flags[row["run"], row["subject"], row["observed"], side, name] != NOT_RESOLVED
             values = simulated[band], observed[band]
             rows.append([*labels, *_band_row(side, f"{name}_weyl", *values, resolved=resolved)])
     return joined_comparisons([comparison, pd.DataFrame(rows, columns=COMPARISON_COLUMNS)])
@@ -176,14 +184,22 @@ def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
     rows = metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])]
     for pair in _pairs(rows, observed, ["hemisphere", "metric"]).to_dict("records"):
         has_distance = pair["metric"] not in WITHOUT_DISTANCE
-        distance = abs(pair["value"] / pair["value_real"] - 1) if has_distance else np.nan
-        yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
+        distance = abs(pair["value"] / pair["value_observed"] - 1) if has_distance else np.nan
+        yield (
+            pair["hemisphere"],
+            pair["metric"],
+            pair["value"],
+            pair["value_observed"],
+            distance,
+            str(pair["unit"]),
+            "ok",
+        )
 
 
 def _pairs(table: pd.DataFrame, observed: str, keys: list[str]) -> pd.DataFrame:
-    is_real = table["run"] == MEASURED
-    observed_rows = table[is_real & (table["subject"] == observed)]
-    return table[~is_real].merge(observed_rows, on=keys, suffixes=("", "_real"))
+    is_observed = table["run"] == MEASURED
+    observed_rows = table[is_observed & (table["subject"] == observed)]
+    return table[~is_observed].merge(observed_rows, on=keys, suffixes=("", "_observed"))
 
 
 def member_row(
@@ -217,7 +233,7 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     Parameters
     ----------
     comparison
-        The columns subject, run, real and `DISTANCE_COLUMNS`.
+        The columns subject, run, observed and `DISTANCE_COLUMNS`.
     members
         Rows of `member_row`.
     varied
@@ -226,11 +242,11 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     Returns
     -------
     DataFrame
-        subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
+        subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
         distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
         of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
     """
-    keys, varied = ["subject", "real", "hemisphere", "measure"], list(varied)
+    keys, varied = ["subject", "observed", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]
     table = comparison[comparison["distance"].notna() | (comparison["flag"] == NOT_RESOLVED)].merge(
         members[["subject", "run", *varied, "resolution"]], on=["subject", "run"]
