@@ -23,7 +23,7 @@ ATLAS_MARGIN = 0.02
 
 
 @dataclass(frozen=True)
-class TestedError:
+class ErrorInTests:
     """What tests say of the error of a prediction, as logarithm of predicted over observed.
 
     Attributes
@@ -75,7 +75,7 @@ def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
     return pd.DataFrame({"start": rows["start"], "week": week, "horizon": rows["horizon"], "error": error})
 
 
-def tested_error(errors: pd.DataFrame, week: float, horizon: float) -> TestedError | None:
+def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorInTests | None:
     """Return the tested error of a prediction of a week over a horizon, from `log_errors`; None without tests.
 
     The tests that count are those of this week and of earlier ones, over this horizon and shorter ones, or over the
@@ -97,10 +97,10 @@ def tested_error(errors: pd.DataFrame, week: float, horizon: float) -> TestedErr
     last = smaller[-1]
     half = max(found.largest for found in smaller)
     is_beyond = bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6)
-    return TestedError(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
+    return ErrorInTests(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
 
 
-def _counted(errors: pd.DataFrame, week: float, horizon: float) -> TestedError:
+def _counted(errors: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
     reached = errors[errors["week"] <= week]
     shortest = reached.groupby("week")["horizon"].transform("min")
     counted = reached[reached["horizon"] <= np.maximum(horizon, shortest)]
@@ -117,8 +117,8 @@ def _counted(errors: pd.DataFrame, week: float, horizon: float) -> TestedError:
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
     if count >= MIN_STARTS:
         rank = int(np.ceil((count + 1) * LEVEL))
-        return TestedError(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
-    return TestedError(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
+        return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
+    return ErrorInTests(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
 
 
 def _bias(means: Floats) -> tuple[float, bool]:
@@ -129,7 +129,7 @@ def _bias(means: Floats) -> tuple[float, bool]:
     return float(means.mean()), bool(abs(means.mean()) > error)
 
 
-def error_words(metric: str, tested: TestedError) -> str:
+def error_words(metric: str, tested: ErrorInTests) -> str:
     """Describe a tested error, such as "largest error of 2 tests, −10 to +11 %: 2 in 3 brains at most"."""
     low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
     ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
@@ -138,9 +138,9 @@ def error_words(metric: str, tested: TestedError) -> str:
         words = f"largest error of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
         words += f": {tested.starts} in {tested.starts + 1} brains at most"
     else:
-        words = f"{LEVEL:.0%} of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
+        words = f"{100 * LEVEL:.0f} % of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
     if tested.is_corrected:
-        words += f", about the prediction less the mean error of {np.expm1(tested.bias):+.0%}".replace("-", "−")
+        words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
     return words + ("; no test went as far" if tested.is_beyond else "")
 
 
@@ -155,7 +155,7 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         errors = log_errors(tests, metric)
         for start, own in errors.groupby("start"):
             others = errors[errors["start"] != start]
-            found = [tested_error(others, row.week, row.horizon) for row in own.itertuples()]
+            found = [error_in_tests(others, row.week, row.horizon) for row in own.itertuples()]
             inside = [
                 abs(error - known.bias * known.is_corrected) <= known.largest
                 for error, known in zip(own["error"], found, strict=True)
@@ -194,7 +194,7 @@ def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week
     """
     horizon, errors = week - start_week, {}
     for metric in QUANTITIES:
-        found = tested_error(log_errors(tests, metric), week, horizon)
+        found = error_in_tests(log_errors(tests, metric), week, horizon)
         errors[metric] = "not tested" if found is None else error_words(metric, found)
     held = held_intervals(tests).groupby("metric").agg(tests=("tests", "sum"), held=("held", "sum"))
     advantage = ""

@@ -10,7 +10,7 @@ from scipy.stats import t
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
-from .accuracy import LEVEL, QUANTITIES, TestedError, from_log, log_errors, log_value, tested_error
+from .accuracy import LEVEL, QUANTITIES, ErrorInTests, error_in_tests, from_log, log_errors, log_value
 
 SULCUS, GYRUS = -0.375, 0.375
 """Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
@@ -51,9 +51,9 @@ def interval_table(
     -------
     DataFrame
         Columns week, metric, unit, run (its value), members (number of values), mean, sd (NaN for one), tested_starts,
-        largest_error, bias (fractions, of `accuracy.tested_error`; NaN without tests), is_corrected, coverage (share of
-        brains in the interval: at most this much by `tested_starts`, or `LEVEL` of further members without tests), low,
-        high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
+        largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without tests), is_corrected, coverage (share
+        of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of further members without tests),
+        low, high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
         there.
     """
     keys = ["week", "metric"]
@@ -64,7 +64,7 @@ def interval_table(
     for metric, table in varied.groupby("metric"):
         errors, widest = log_errors(tests, str(metric)), 0.0
         for week, group in table.groupby("week")["value"]:
-            tested = tested_error(errors, float(week), float(week - start)) if week > start else None
+            tested = error_in_tests(errors, float(week), float(week - start)) if week > start else None
             level = tested.coverage if tested else LEVEL
             logs = log_value(str(metric), group.to_numpy(dtype=float))
             half = np.hypot(spread_of_members(logs, level), tested.largest if tested else 0.0)
@@ -83,7 +83,7 @@ def interval_table(
     )
 
 
-def tested_columns(tested: TestedError | None) -> dict[str, float | bool]:
+def tested_columns(tested: ErrorInTests | None) -> dict[str, float | bool]:
     """Return the columns of `interval_table` that are about tests."""
     if tested is None:
         return {"tested_starts": 0, "largest_error": np.nan, "bias": np.nan, "is_corrected": False}

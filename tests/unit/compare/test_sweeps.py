@@ -75,9 +75,9 @@ def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
         ("whole", "surface_distance95"): 2.5,
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
-    assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
+    assert table.loc[("left", "relative_power_B4"), "observed_value"] == 0.4
     # the number of modes has no distance
-    assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
+    assert tuple(table.loc[("left", "weyl_number"), ["value", "observed_value"]]) == (600, 700)
 
 
 def parts(radius):
@@ -100,12 +100,12 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
     table = comparison_table("sim", "a", populations, metrics, both, parts(10.0), observed)
     assert list(table) == COMPARISON_COLUMNS
     assert set(table["subject"] + table["run"]) == {"asim"}
-    named = table.groupby("real")[["real_population", "same_population"]].first()
+    named = table.groupby("observed")[["observed_population", "same_population"]].first()
     assert named.to_dict("index") == {
-        "b": {"real_population": "normal", "same_population": True},
-        "c": {"real_population": "operated", "same_population": False},
+        "b": {"observed_population": "normal", "same_population": True},
+        "c": {"observed_population": "operated", "same_population": False},
     }
-    distances = table.set_index(["real", "hemisphere", "measure"])["distance"]
+    distances = table.set_index(["observed", "hemisphere", "measure"])["distance"]
     assert distances["b", "whole", "area"] == pytest.approx(0.1)
     assert distances["c", "whole", "area"] == pytest.approx(0.5)
     assert distances["b", "whole", "surface_distance"] == pytest.approx(2.0, abs=0.1)
@@ -137,9 +137,9 @@ MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 
 
 def compared(**distances):
     rows = [
-        {"subject": "a", "run": run, "real": "b", "real_population": "other", "same_population": False,
+        {"subject": "a", "run": run, "observed": "b", "observed_population": "other", "same_population": False,
          "hemisphere": "left", "measure": "shape_index_relative_power_B4",
-         "value": 0.1, "real_value": 0.3, "distance": distance, "unit": "1", "flag": "ok"}
+         "value": 0.1, "observed_value": 0.3, "distance": distance, "unit": "1", "flag": "ok"}
         for run, distance in distances.items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -169,10 +169,10 @@ def coefficients(run, subject, *bands):
 
 
 def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared():
-    number = {"measure": "weyl_number", "value": 5.0, "real_value": 6.0, "unit": "1", "flag": "ok"}
+    number = {"measure": "weyl_number", "value": 5.0, "observed_value": 6.0, "unit": "1", "flag": "ok"}
     known = {"measure": "shape_index_relative_power_B5", "flag": "not resolved"}
     bands = [{"measure": f"shape_index_relative_power_B{band}", "flag": "ok"} for band in (4, 6)]
-    labels = {"subject": "a", "real": "b", "real_population": "", "same_population": True, "hemisphere": "left"}
+    labels = {"subject": "a", "observed": "b", "observed_population": "", "same_population": True, "hemisphere": "left"}
     rows = [{**labels, "run": run, **row} for run in ("thin", "few") for row in (number, known, *bands)]
     modes = [
         coefficients("thin", "a", 4, 4, 5, 5, 6, 6),
@@ -180,7 +180,7 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
         coefficients("real", "b", 4, 5, 5, 5, 5, 6),
     ]
     table = with_common_cut(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.concat(modes))
-    table = table.set_index(["run", "measure"])[["value", "real_value", "distance", "flag"]]
+    table = table.set_index(["run", "measure"])[["value", "observed_value", "distance", "flag"]]
     cut = {band: tuple(table.loc["thin", f"shape_index_relative_power_B{band}_weyl"]) for band in (4, 5, 6)}
     nan = pytest.approx(float("nan"), nan_ok=True)
     # modes 1 to 5: two of B4, two of B5, one of B6 against one and four; its own number, 5, would leave B6 out
@@ -209,8 +209,8 @@ def sweep(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, .
         rows += [(run, side, f"shape_index_relative_power_B{band}_weyl", value, true) for band, value, true in cut]
         rows.append((run, "whole", "crossing_faces", crossing, 0))
         rows.append((run, side, "weyl_number", 1800.0 if side == "left" else 700.0, 600.0))
-    comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "real_value"]).assign(
-        real="r28", flag="ok"
+    comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "observed_value"]).assign(
+        observed="r28", flag="ok"
     )
     members = pd.DataFrame({"run": ["thin", "thick"], "outcome": ["finished", "diverged"]})
     nearest = pd.DataFrame(
@@ -352,7 +352,7 @@ def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
 
 def test_a_caption_names_the_observed_brains_and_another_population():
     table = compared(t1=0.3)
-    both = pd.concat([table, table.assign(real="c")])
+    both = pd.concat([table, table.assign(observed="c")])
     mixed, same = (
         comparison_caption("thickness", 28.0, both.assign(same_population=known)) for known in ([False, True], True)
     )
