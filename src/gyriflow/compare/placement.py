@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial import cKDTree
+from scipy.stats import norm, t
 
 from ..geometry.alignment import MIRROR, align
 from ..geometry.matching import Match, match_points, match_surface, nearest_on, values_at
@@ -103,15 +104,21 @@ class Resampling:
         return np.concatenate(parts)
 
     def correlations(self, truth: Floats, values: Floats) -> Floats:
-        """Return the correlation of two maps (n,), and that in each bootstrap sample; NaN where one is constant."""
+        """Return the correlation of two maps (n,), and that in each bootstrap sample; NaN where one is constant.
+
+        Samples are spread as Student's t of as many units as the power of `truth` comes from, Σp²⁻¹ of the shares p.
+        """
         r = correlation(truth, values, self.areas)
         x, y = self.coordinates(truth), self.coordinates(values)
         sums = np.stack([np.bincount(self.units, product) for product in (x * x, y * y, x * y)], axis=1)
         xx, yy, xy = (self.drawn @ sums).T
         has_both = (xx > 0) & (yy > 0)
         drawn = np.where(has_both, xy / np.sqrt(np.where(has_both, xx * yy, 1.0)), np.nan)
-        # the sides of a symmetric brain are not exactly equal
-        return np.append(r, drawn[1:] + (r - drawn[0]))
+        shares = sums[:, 0] / max(sums[:, 0].sum(), np.finfo(float).tiny)
+        freedom = max(1 / max((shares**2).sum(), np.finfo(float).tiny) - 2, 1.0)
+        spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
+        # about r, since the sides of a symmetric brain are not exactly equal
+        return np.append(r, r + spread * (drawn[1:] - drawn[0]))
 
 
 def make_resampling(surface: PreparedSurface) -> Resampling:
