@@ -56,7 +56,7 @@ BY_TESTS = {
     "compare/test_prediction.py": [
         ("src/gyriflow/compare/prediction.py", 'if model != "run"]', 'if model != "target"]'),
         ("src/gyriflow/compare/prediction.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
-        ("src/gyriflow/compare/prediction.py", "table[name] / curve - 1", "curve / table[name] - 1"),
+        ("src/gyriflow/compare/prediction.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
         ("src/gyriflow/compare/prediction.py", 'week - labels["start_week"]', "week"),
     ],
     "compare/test_comparison.py": [

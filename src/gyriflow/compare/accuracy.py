@@ -155,7 +155,8 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         errors = log_errors(tests, metric)
         for start, own in errors.groupby("start"):
             others = errors[errors["start"] != start]
-            found = [error_in_tests(others, row.week, row.horizon) for row in own.itertuples()]
+            places = own[["week", "horizon"]].to_numpy(dtype=float)
+            found = [error_in_tests(others, week, horizon) for week, horizon in places]
             inside = [
                 abs(error - known.bias * known.is_corrected) <= known.largest
                 for error, known in zip(own["error"], found, strict=True)

@@ -63,8 +63,9 @@ def interval_table(
     rows, start = [], own["week"].min()
     for metric, table in varied.groupby("metric"):
         errors, widest = log_errors(tests, str(metric)), 0.0
-        for week, group in table.groupby("week")["value"]:
-            tested = error_in_tests(errors, float(week), float(week - start)) if week > start else None
+        for at, group in table.groupby("week")["value"]:
+            week = float(str(at))
+            tested = error_in_tests(errors, week, week - start) if week > start else None
             level = tested.coverage if tested else LEVEL
             logs = log_value(str(metric), group.to_numpy(dtype=float))
             half = np.hypot(spread_of_members(logs, level), tested.largest if tested else 0.0)

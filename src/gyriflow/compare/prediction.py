@@ -103,6 +103,7 @@ def add_curves(table: pd.DataFrame, sizes: Mapping[float, Mapping[str, float]]) 
     curve_volume_ml, area_off_curve and volume_off_curve (fractions of the curve's); NaN without a curve.
     """
     for name in ("area_cm2", "volume_ml"):
-        curve = [sizes.get(week, {}).get(name, np.nan) for week in table["week"]]
-        table = table.assign(**{f"curve_{name}": curve, f"{name.split('_')[0]}_off_curve": table[name] / curve - 1})
+        curve = np.array([sizes.get(week, {}).get(name, np.nan) for week in table["week"]])
+        columns = {f"curve_{name}": curve, f"{name.split('_')[0]}_off_curve": table[name] / curve - 1}
+        table = table.join(pd.DataFrame(columns, index=table.index))
     return table

@@ -67,9 +67,9 @@ def validation_chart(
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
         for _, rows in validation.groupby("start_week"):
             weeks = rows.drop_duplicates("week")
-            headroom, style = weeks[f"headroom_{measure}"], {"color": OBSERVED_COLOUR, "markersize": 6}
-            bars = _bars(weeks, "headroom", measure)
-            axes.errorbar(weeks["week"], headroom, yerr=bars, fmt="*", elinewidth=0.7, **style)
+            headroom, bars = weeks[f"headroom_{measure}"], _bars(weeks, "headroom", measure)
+            style: dict[str, Any] = {"color": OBSERVED_COLOUR, "markersize": 6, "elinewidth": 0.7}
+            axes.errorbar(weeks["week"], headroom, yerr=bars, fmt="*", **style)
         for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
             gain = rows[f"gain_{measure}"]
             axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)

@@ -10,6 +10,7 @@ from gyriflow.compare.comparison import (
     aligned_distances,
     bootstrap_distances,
     compare,
+    observed_brain,
     pairwise_distances,
     roughness_mm,
     surface_distances,
@@ -60,9 +61,9 @@ def test_columns_that_are_left_out_change_no_other():
 
 
 def test_flatter_waves_are_too_smooth_and_deeper_ones_too_folded():
-    flat, deep = (
-        compare(bumpy(1, height), OBSERVED, radius_mm=3.0, groups=["folds", "quality"])[0] for height in (0.4, 1.6)
-    )
+    observed, heights = observed_brain("b", REAL, 3.0), (0.4, 1.6)
+    groups = ["folds", "quality"]
+    flat, deep = (compare(bumpy(1, height), observed, radius_mm=3.0, groups=groups)[0] for height in heights)
     assert flat["curvature_rms_ratio"] < 0.97 < 1.05 < deep["curvature_rms_ratio"]
     assert flat["roughness_ratio"] < 1 < deep["roughness_ratio"] - 0.03
 
