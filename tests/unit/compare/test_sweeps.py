@@ -26,7 +26,6 @@ from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     NO_NEAREST,
     comparison_table,
-    distances_to,
     joined_comparisons,
     member_row,
     nearest_runs,
@@ -55,33 +54,44 @@ METRICS = pd.DataFrame(
     ],
     columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
 )
-SPECTRAL = pd.DataFrame(
-    {"real": ["b"], "hemisphere": "left", "metric": "spectral_distance_B4", "value": 0.2, "flag": "ok"}
-)
-SURFACES = {"whole": {"distance_mm": 1.5, "distance95_mm": 2.5}}
+
+
+def parts(radius):
+    return {"whole": sphere(radius, 3), "left": sphere(radius / 2, 3)}
 
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
-    table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index(["hemisphere", "measure"])
+    both = both.assign(week=28.0, power=both["relative_power"])
+    surfaces = [{"whole": sphere(radius, 3)} for radius in (10.0, 11.5)]
+    table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surfaces[0], {"b": surfaces[1]})
+    table = table.set_index(["hemisphere", "measure"])
     assert table["distance"].dropna().to_dict() == {
         ("left", "relative_power_B4"): pytest.approx(0.1),
         ("left", "relative_power_B5"): pytest.approx(0.1),
         ("left", "shape_index_relative_power_B4"): pytest.approx(0.2),
         ("left", "shape_index_relative_power_B5"): pytest.approx(0.2),
         ("whole", "area"): pytest.approx(0.1),
-        ("left", "spectral_distance_B4"): 0.2,
-        ("whole", "surface_distance"): 1.5,
-        ("whole", "surface_distance95"): 2.5,
+        ("whole", "surface_distance"): pytest.approx(1.5, abs=0.05),
+        ("whole", "surface_distance95"): pytest.approx(1.5, abs=0.05),
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
     assert table.loc[("left", "relative_power_B4"), "observed_value"] == 0.4
     # the number of modes has no distance
     assert tuple(table.loc[("left", "weyl_number"), ["value", "observed_value"]]) == (600, 700)
+    assert (table.loc[("whole", "area"), "unit"], table.loc[("left", "weyl_number"), "unit"]) == ("cm2", "1")
 
 
-def parts(radius):
-    return {"whole": sphere(radius, 3), "left": sphere(radius / 2, 3)}
+def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
+    both = pd.concat(
+        [spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1)).assign(complete=False)]
+    )
+    both = both.assign(week=28.0, power=both["relative_power"])
+    surface = {"whole": sphere(10.0, 2)}
+    table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surface, {"b": surface})
+    (row,) = table[table["measure"] == "relative_power_B4"].to_dict("records")
+    assert row["flag"] == "cut off"
+    assert np.isnan([row["value"], row["observed_value"], row["distance"]]).all()
 
 
 def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named():
