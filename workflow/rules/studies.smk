@@ -88,6 +88,9 @@ rule replication:
         frames=study.files(FOLDING["frames"])[:1],
         params=study.files(PARAMETERS)[:1],
         rates=GROWTH["rates"] if study.series_with_rates else [],
+        surfaces=[
+            row.parts["whole"] for simulation in study.run_simulations[:1] for row in simulation.measurements
+        ],
         sides=[
             PIAL[side].format(brain=simulation.start.id)
             for simulation in study.run_simulations[:1]
@@ -110,6 +113,7 @@ rule replication:
             if name in study.sweeps
         },
         run=next(iter(study.pairs), (None, None)),
+        weeks=[week for simulation in study.run_simulations[:1] for week in simulation.weeks],
         costs=CONFIG.costs.model_dump(),
     script:
         "../scripts/replication.py"

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.alignment import MIRROR
-from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, convex_hull, transformed
 from ..settings.stages import CostSettings
 from ..settings.terms import FOLD_BANDS
 from .comparison import aligned_distances
@@ -98,6 +98,7 @@ def replication_table(
     used_rate: Any = None,
     from_back: float | None = None,
     mirror_mm: float | None = None,
+    surfaces: Mapping[float, TriangleMesh] | None = None,
 ) -> pd.DataFrame:
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
@@ -119,6 +120,8 @@ def replication_table(
         `place_of_largest` of the displacement from 24 to 25 GW.
     mirror_mm
         `mirror_distance` of the start brain's hemispheres.
+    surfaces
+        Whole pial surfaces of the same run by week.
 
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.
@@ -129,6 +132,7 @@ def replication_table(
         _largest(published["largest"], from_back),
         _growth_rate(published["growth_rate"], rates, used_rate),
         *_modes(modes, _sweep_of(modes, sweeps)),
+        _gyrification(published["gyrification_index"], surfaces or {}),
     ]
     for entry in published["nearest"]:
         sweep = _sweep_of(entry, sweeps)
@@ -205,6 +209,14 @@ def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: Cost
         result = f"{entry['quantity']} per gestational week"
         paper = f"{entry['value']:g} ({published['machine']})"
         yield result, published["place"], paper, f"{value:.3g} ({size})", NOT_COMPARABLE
+
+
+def _gyrification(published: Mapping[str, Any], surfaces: Mapping[float, TriangleMesh]) -> tuple[str, ...]:
+    """Give the paper's index: pial area over that of one convex hull of both hemispheres, the fissure included."""
+    ratios = {week: area(mesh) / area(convex_hull(mesh)) for week, mesh in surfaces.items()}
+    here = ", ".join(f"{ratio:.2f} at {week:g} GW" for week, ratio in ratios.items())
+    verdict = NOT_TESTABLE if ratios else NOT_RUN
+    return published["finding"], published["place"], published["paper"], here or MISSING, verdict
 
 
 def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[tuple[str, ...]]:

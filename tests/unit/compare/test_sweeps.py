@@ -31,6 +31,8 @@ from gyriflow.compare.sweeps import (
     nearest_runs,
     with_common_cut,
 )
+from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.stages import CostSettings
 
@@ -358,6 +360,16 @@ def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     none = published_nearest(PUBLISHED, {"ratio": sweeps["ratio"]})
     assert len(none) == 0
     assert list(none) == list(table)
+
+
+def test_the_papers_gyrification_index_has_one_hull_for_both_hemispheres():
+    # a ball of 10 mm on either side, 30 mm apart: two spheres over a capsule
+    halves = [transformed(sphere(10.0, 4), motion(shift=(x, 0, 0))) for x in (-15, 15)]
+    found = verdicts(moves(), surfaces={21.0: halves[0], 25.0: merged(*halves)})
+    ratio = 2 * 4 * np.pi * 100 / (4 * np.pi * 100 + 2 * np.pi * 10 * 30)
+    name = PUBLISHED["gyrification_index"]["finding"]
+    assert found[name] == (f"1.00 at 21 GW, {ratio:.2f} at 25 GW", NOT_TESTABLE)
+    assert verdicts(moves())[name] == (MISSING, NOT_RUN)
 
 
 def test_a_caption_names_the_observed_brains_and_another_population():
