@@ -24,7 +24,7 @@ ATLAS_MARGIN = 0.02
 
 @dataclass(frozen=True)
 class ErrorInTests:
-    """What tests say of the error of a prediction, as logarithm of predicted over observed.
+    """The error of a prediction by tests, as logarithm of predicted over observed.
 
     Attributes
     ----------
@@ -158,12 +158,12 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
             places = own[["week", "horizon"]].to_numpy(dtype=float)
             found = [error_in_tests(others, week, horizon) for week, horizon in places]
             inside = [
-                abs(error - known.bias * known.is_corrected) <= known.largest
-                for error, known in zip(own["error"], found, strict=True)
-                if known
+                abs(error - interval.bias * interval.is_corrected) <= interval.largest
+                for error, interval in zip(own["error"], found, strict=True)
+                if interval
             ]
             if inside:
-                at_most = max(known.coverage for known in found if known)
+                at_most = max(interval.coverage for interval in found if interval)
                 rows.append((metric, start, len(inside), sum(inside), at_most))
     return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
 
@@ -185,7 +185,7 @@ def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple
 
 
 def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week: float) -> dict[str, Any]:
-    """Return what tests say of the prediction of a week, for the report.
+    """Describe the errors of tests for the report of a prediction of a week.
 
     Returns
     -------
