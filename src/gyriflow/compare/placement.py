@@ -124,12 +124,13 @@ class Resampling:
 def make_resampling(surface: PreparedSurface) -> Resampling:
     """Compute the modes and patches of a surface, or of its left half if it is its own mirror image."""
     mesh, (image, asymmetry_mm) = surface.mesh, mirror_image(surface)
-    used, sides = np.arange(len(mesh.vertices)), []
+    used: Ints = np.arange(len(mesh.vertices))
+    sides = []
     if asymmetry_mm < SYMMETRY_TOL_MM:
         left = mesh.vertices[:, 0] < image.vertices[:, 0]
         mesh, used = submesh(surface.mesh, left[mesh.faces].sum(axis=1) >= 2)
         sides = [match_points(image.vertices[used], vertex_normals(image)[used], surface.mesh)]
-    itself = Match(np.repeat(used[:, None], 3, axis=1), np.full((len(used), 3), 1 / 3), 0.0 * used, used >= 0)
+    itself = Match(np.repeat(used[:, None], 3, axis=1), np.full((len(used), 3), 1 / 3), np.zeros(len(used)), used >= 0)
     sides.insert(0, itself)
     coarse, areas = remesh(mesh, MODE_EDGE_MM), vertex_areas(mesh)
     modes = modes_below(*laplacian(coarse), (2 * np.pi / SHORTEST_MODE_MM) ** 2).functions

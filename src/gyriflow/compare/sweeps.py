@@ -97,8 +97,8 @@ def comparison_table(
     tables = [bands, sizes, spectral, pd.DataFrame(surfaces).assign(unit="mm", flag="ok")]
     table = pd.concat([table.reindex(columns=COMPARISON_COLUMNS).dropna(axis=1, how="all") for table in tables])
     population = table["observed"].map(populations)
-    labels = {"subject": subject, "run": run, "observed_population": population}
-    table = table.assign(**labels, same_population=population == populations[subject])
+    table = table.assign(subject=subject, run=run, observed_population=population)
+    table["same_population"] = population == populations[subject]
     return table.reindex(columns=COMPARISON_COLUMNS).sort_values("observed", kind="stable", ignore_index=True)
 
 
@@ -148,12 +148,12 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
     flags = comparison.set_index(["run", "subject", "observed", "hemisphere", "measure"])["flag"]
     rows, resolved = [], []
     for row in numbers.to_dict("records"):
-        brains, side = ((row["run"], row["subject"]), (MEASURED, row["observed"])), row["hemisphere"]
+        run, subject, brain, side = (row[name] for name in ("run", "subject", "observed", "hemisphere"))
         for band in FOLD_BANDS:
             name = f"shape_index_relative_power_B{band}"
-            resolved.append(flags[(*brains[0], row["observed"], side, name)] != NOT_RESOLVED)
-            values = {column: shares[(*brain, side)][band] for column, brain in zip(_VALUES, brains, strict=True)}
-            rows.append({**row, "measure": f"{name}_weyl", **values})
+            resolved.append(flags[run, subject, brain, side, name] != NOT_RESOLVED)
+            values = {"value": shares[run, subject, side][band], "observed_value": shares[MEASURED, brain, side][band]}
+            rows.append(row | values | {"measure": f"{name}_weyl"})
     cut_bands = _with_distance(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.Series(resolved, dtype=bool))
     return joined_comparisons([comparison, cut_bands])
 
