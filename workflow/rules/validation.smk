@@ -142,7 +142,7 @@ rule deviation:
         "../scripts/deviation.py"
 
 
-# the start brain's mesh carried to later weeks by registration alone: an upper limit of accuracy
+# the start brain's mesh carried to later weeks by registration alone
 rule registration_ceiling:
     input:
         unpack(lambda w: prepared_files(w.brain, study.ceiling_weeks(w.brain))),
