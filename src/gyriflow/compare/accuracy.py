@@ -116,7 +116,7 @@ def _counted(errors: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
         others, others_corrected = _bias(np.delete(means, number))
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
     if count >= MIN_STARTS:
-        rank = int(np.ceil((count + 1) * LEVEL))
+        rank = int(np.ceil(round((count + 1) * LEVEL, 6)))
         return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
     return ErrorInTests(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
 

@@ -101,6 +101,10 @@ def test_ninety_percent_need_nine_starts():
         assert found.coverage == pytest.approx(coverage)
         assert np.mean(held) == pytest.approx(coverage, abs=0.08), count
     assert "90 % of 19 tests" in error_words("volume", found)
+    # of 20 starts the 19th in size: ⌈21 · 0.9⌉
+    errors = [0.01 * number * (-1) ** number for number in range(1, 21)]
+    found = volume_error([row for n, e in enumerate(errors) for row in rows(f"s{n}", 22, {2.0: e})], 24.0, 2.0)
+    assert (found.is_corrected, found.largest) == (False, pytest.approx(0.19))
 
 
 def test_a_bias_is_corrected_where_it_exceeds_its_error():
