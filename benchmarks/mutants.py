@@ -80,7 +80,7 @@ BY_TESTS = {
     ],
     "compare/test_accuracy.py": [
         ("src/gyriflow/compare/accuracy.py", "count / (count + 1)", "(count - 1) / count"),
-        ("src/gyriflow/compare/accuracy.py", "np.maximum(horizon, shortest)", "horizon"),
+        ("src/gyriflow/compare/accuracy.py", "np.maximum(shorter, shortest)", "shorter"),
         ("src/gyriflow/compare/accuracy.py", "(count + 1) * LEVEL", "count * LEVEL"),
         ("src/gyriflow/compare/accuracy.py", "abs(means.mean()) > error", "True"),
         ("src/gyriflow/compare/accuracy.py", "max(found.largest for found in smaller)", "last.largest"),

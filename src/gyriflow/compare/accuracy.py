@@ -89,8 +89,11 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
         float(min((step for step in steps if step >= value - 1e-6), default=steps[-1]))
         for steps, value in ((weeks, week), (horizons, horizon))
     )
+    shortest = errors.groupby("week")["horizon"].transform("min")
     smaller = [
-        _counted(errors, earlier, shorter)
+        _counted(
+            errors[(errors["week"] <= earlier) & (errors["horizon"] <= np.maximum(shorter, shortest))], earlier, shorter
+        )
         for earlier in weeks[weeks <= week_limit]
         for shorter in horizons[horizons <= horizon_limit]
     ]
@@ -100,19 +103,17 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
     return ErrorInTests(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
 
 
-def _counted(errors: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
-    reached = errors[errors["week"] <= week]
-    shortest = reached.groupby("week")["horizon"].transform("min")
-    counted = reached[reached["horizon"] <= np.maximum(horizon, shortest)]
-    by_start = {start: rows["error"].to_numpy() for start, rows in counted.groupby("start")}
-    means = np.array([values.mean() for values in by_start.values()])
+def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
+    starts, number_of = np.unique(counted["start"].to_numpy(dtype=str), return_inverse=True)
+    errors = [counted["error"].to_numpy()[number_of == number] for number in range(len(starts))]
+    means = np.array([values.mean() for values in errors])
     bias, is_corrected = _bias(means)
     # a start that was not tested as far does not count for the coverage
-    as_far = counted.groupby("start")[["week", "horizon"]].max()
-    count = int(((as_far["week"] >= week) | (as_far["horizon"] >= horizon)).sum())
+    is_as_far = (counted["week"] >= week) | (counted["horizon"] >= horizon)
+    count = len(np.unique(number_of[is_as_far.to_numpy()]))
     # the largest error of each start, about the bias of the others if that is to be corrected
     largest = []
-    for number, values in enumerate(by_start.values()):
+    for number, values in enumerate(errors):
         others, others_corrected = _bias(np.delete(means, number))
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
     if count >= MIN_STARTS:
