@@ -17,7 +17,7 @@ from gyriflow.compare.calibration import (
     spectral_scores,
     to_unit_box,
 )
-from gyriflow.compare.comparison import ObservedBrain, observed_brain
+from gyriflow.compare.comparison import ObservedBrain, compare, observed_brain
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 
@@ -161,6 +161,9 @@ def scores(surface, *names):
 
 def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution():
     near, far = (scores(mesh, "shape_index", "mean_curvature") for mesh in (bumpy(1, height=1.05), bumpy(2)))
+    row, _ = compare(bumpy(2), OBSERVED, radius_mm=3.0, groups=["folds"])
+    assert far == pytest.approx({name: 1 - row[f"r_{name}"] for name in far})
+    assert abs(far["shape_index"] - far["mean_curvature"]) > 0.001
     assert near["shape_index"] < 0.1 < far["shape_index"]
     assert near["mean_curvature"] < 0.1 < far["mean_curvature"]
     flat, other = (scores(mesh, "curvature_distribution") for mesh in (bumpy(1, height=0.05), bumpy(2)))
