@@ -88,9 +88,7 @@ rule replication:
         frames=study.files(FOLDING["frames"])[:1],
         params=study.files(PARAMETERS)[:1],
         rates=GROWTH["rates"] if study.series_with_rates else [],
-        surfaces=[
-            row.parts["whole"] for simulation in study.run_simulations[:1] for row in simulation.measurements
-        ],
+        observed=[brain.pial for brain in study.brains.values()],
         sides=[
             PIAL[side].format(brain=simulation.start.id)
             for simulation in study.run_simulations[:1]
@@ -113,7 +111,7 @@ rule replication:
             if name in study.sweeps
         },
         run=next(iter(study.pairs), (None, None)),
-        weeks=[week for simulation in study.run_simulations[:1] for week in simulation.weeks],
+        observed=list(study.brains),
         costs=CONFIG.costs.model_dump(),
     script:
         "../scripts/replication.py"

@@ -48,7 +48,7 @@ with step(snakemake.log[0]):
         used_rate=read_yaml(files.params[0])["growth_rate_per_s"],
         from_back=from_back,
         mirror_mm=mirror_distance(*sides) if len(sides) == 2 else None,
-        surfaces=dict(zip(params.weeks, map(read_surface, files.surfaces), strict=True)),
+        surfaces=dict(zip(params.observed, map(read_surface, files.observed), strict=True)),
     )
     write_table(output.csv, table)
     write_table(output.nearest, published_nearest(published, sweeps))

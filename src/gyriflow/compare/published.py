@@ -98,7 +98,7 @@ def replication_table(
     used_rate: Any = None,
     from_back: float | None = None,
     mirror_mm: float | None = None,
-    surfaces: Mapping[float, TriangleMesh] | None = None,
+    surfaces: Mapping[str, TriangleMesh] | None = None,
 ) -> pd.DataFrame:
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
@@ -121,7 +121,7 @@ def replication_table(
     mirror_mm
         `mirror_distance` of the start brain's hemispheres.
     surfaces
-        Whole pial surfaces of the same run by week.
+        Whole pial surfaces of observed brains by id.
 
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.
@@ -211,10 +211,10 @@ def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: Cost
         yield result, published["place"], paper, f"{value:.3g} ({size})", NOT_COMPARABLE
 
 
-def _gyrification(published: Mapping[str, Any], surfaces: Mapping[float, TriangleMesh]) -> tuple[str, ...]:
+def _gyrification(published: Mapping[str, Any], surfaces: Mapping[str, TriangleMesh]) -> tuple[str, ...]:
     """Give the paper's index: pial area over that of one convex hull of both hemispheres, the fissure included."""
-    ratios = {week: area(mesh) / area(convex_hull(mesh)) for week, mesh in surfaces.items()}
-    here = ", ".join(f"{ratio:.2f} at {week:g} GW" for week, ratio in ratios.items())
+    ratios = {brain: area(mesh) / area(convex_hull(mesh)) for brain, mesh in surfaces.items()}
+    here = "; ".join(f"{brain}: {ratio:.2f}" for brain, ratio in ratios.items())
     verdict = NOT_TESTABLE if ratios else NOT_RUN
     return published["finding"], published["place"], published["paper"], here or MISSING, verdict
 
