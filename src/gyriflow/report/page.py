@@ -158,6 +158,8 @@ def study_page(
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
         sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
         sentence = verdict(runs, validation, tables.warnings, sentence)
+        if prediction and validation is not None:
+            sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
         # without observed brains, a prediction has no scores
         scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
     if prediction:

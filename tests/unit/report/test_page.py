@@ -212,6 +212,10 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     assert "results/study/validation.csv" not in text
     assert "<h2>weekly_figure" in text
     assert "results/study/validation.csv" in page(figures, prediction=foretold(7.5))
+    # also beside an observed brain
+    better = foretold(7.5)
+    better["tests"] |= {"advantage": "The atlas was better."}
+    assert "<strong>The atlas was better. At 23 GW" in page(figures, prediction=better)
 
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
