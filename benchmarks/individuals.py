@@ -32,7 +32,7 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import map_coordinates
 
-from gyriflow.compare.distances import aligned_distances
+from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points

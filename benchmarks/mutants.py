@@ -80,16 +80,67 @@ BY_TESTS = {
         ("src/gyriflow/settings/runs.py", "if is_preset else base", "if False else base")
     ],
     # comparisons and metrics
-    "compare/test_placement.py": [("src/gyriflow/compare/placement.py", "interval_of(room)[1] > 0", "room[0] > 0")],
-    "compare/test_prediction.py": [("src/gyriflow/compare/prediction.py", '!= "run"]', '!= "target"]')],
+    "compare/test_placement.py": [
+        ("src/gyriflow/compare/placement.py", "interval_of(headroom)[1] > 0", "headroom[0] > 0"),
+        ("src/gyriflow/compare/placement.py", "r_adjacent - r_start\n", "r_adjacent - r\n"),
+        ("src/gyriflow/compare/placement.py", "max(size - 1, 1)", "size"),
+        ("src/gyriflow/compare/placement.py", "np.sqrt(self.side_areas) * finer", "finer"),
+        ("src/gyriflow/compare/placement.py", "asymmetry_mm < SYMMETRY_TOL_MM", "asymmetry_mm < 0"),
+    ],
+    "compare/test_prediction.py": [
+        ("src/gyriflow/compare/prediction.py", 'if model != "run"]', 'if model != "target"]'),
+        ("src/gyriflow/compare/prediction.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
+        ("src/gyriflow/compare/prediction.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
+        ("src/gyriflow/compare/prediction.py", 'week - labels["start_week"]', "week"),
+    ],
+    "compare/test_comparison.py": [
+        ("src/gyriflow/compare/comparison.py", '"volume_ml"] / observed_sizes["volume_ml"] - 1', '"volume_ml"] / 100'),
+        (
+            "src/gyriflow/compare/comparison.py",
+            "float(crossing_faces(predicted))",
+            "float(crossing_faces(prepared.mesh))",
+        ),
+        (
+            "src/gyriflow/compare/comparison.py",
+            "roughness_mm(prepared.mesh) / roughness_mm(observed.prepared.mesh)",
+            "roughness_mm(observed.prepared.mesh) / roughness_mm(prepared.mesh)",
+        ),
+        (
+            "src/gyriflow/compare/shapes.py",
+            "surface.curvature_rms / observed.curvature_rms",
+            "observed.curvature_rms / surface.curvature_rms",
+        ),
+        ("src/gyriflow/compare/comparison.py", "np.tile(on_left, 2)[", "np.arange(2 * len(on_left))["),
+    ],
+    "compare/test_accuracy.py": [
+        ("src/gyriflow/compare/accuracy.py", "count / (count + 1)", "(count - 1) / count"),
+        ("src/gyriflow/compare/accuracy.py", "np.maximum(shorter, shortest)", "shorter"),
+        ("src/gyriflow/compare/accuracy.py", "(count + 1) * LEVEL", "count * LEVEL"),
+        ("src/gyriflow/compare/accuracy.py", "abs(means.mean()) > error", "True"),
+        ("src/gyriflow/compare/accuracy.py", "max(found.largest for found in smaller)", "last.largest"),
+        ("src/gyriflow/compare/accuracy.py", 'rows["start_week"] + rows["horizon"]', 'rows["horizon"]'),
+        ("src/gyriflow/compare/accuracy.py", "<= ATLAS_MARGIN", "<= 0"),
+        ("src/gyriflow/compare/accuracy.py", 'errors["start"] != start', 'errors["start"] != ""'),
+    ],
+    "compare/test_ensemble.py": [
+        ("src/gyriflow/compare/ensemble.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
+        ("src/gyriflow/compare/ensemble.py", "tested.largest if tested else 0.0", "0.0"),
+        ("src/gyriflow/compare/ensemble.py", "max(widest, half)", "half"),
+        ("src/gyriflow/compare/ensemble.py", "logs.mean() - (", "logs.mean() + ("),
+    ],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),
         ("src/gyriflow/compare/deviation.py", " * expected_mm / start_mm", ""),
     ],
-    "compare/test_validation.py": [
-        ("src/gyriflow/compare/validation.py", 'row[f"real_{name}"] - 1', '-row[f"real_{name}"] + 1'),
+    "compare/test_calibration.py": [
+        ("src/gyriflow/compare/calibration.py", "- finished.min()", "- finished.max()"),
+        (
+            "src/gyriflow/compare/calibration.py",
+            '.abs().groupby("band").mean()',
+            '.groupby("band").mean().abs()',
+        ),
+        ("src/gyriflow/compare/calibration.py", '1 - row["r_shape_index"]', '1 - row["r_mean_curvature"]'),
     ],
-    "compare/test_calibration.py": [("src/gyriflow/compare/calibration.py", "- finished.min()", "- finished.max()")],
     "metrics/test_norms.py": [("src/gyriflow/metrics/tables.py", " / (to_week - from_week)", "")],
     "metrics/test_gyrification.py": [("src/gyriflow/metrics/gyrification.py", "RADIUS_MM = 10.0", "RADIUS_MM = 15.0")],
     "metrics/test_measure.py": [

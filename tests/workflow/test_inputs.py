@@ -54,10 +54,10 @@ def test_a_run_is_validated_by_the_real_brains_of_its_weeks(jobs):
     simulated = [f"results/runs/reference/b21/surfaces/week-{week}.00/pial.surf.gii" for week in weeks]
     assert simulated == [file for file in files if "/surfaces/" in file]
     ready = "results/study/validation/b21/week-{}.00/{}.{}.gii".format
-    kinds = [(name, kind) for name in ("real", "start", "adjacent") for kind in ("surf", "shape")]
+    kinds = [(name, kind) for name in ("observed", "start", "adjacent") for kind in ("surf", "shape")]
     assert {ready(week, *kind) for week in weeks for kind in kinds} <= set(files)
     # the adjacent brain is the latest real one before
-    assert jobs[ready(24, "real", "surf")] == [surface("b24"), surface("b23"), surface("b21")]
+    assert jobs[ready(24, "observed", "surf")] == [surface("b24"), surface("b23"), surface("b21")]
 
 
 def test_regions_are_carried_from_the_brain_that_has_them(jobs):

@@ -7,7 +7,7 @@ from atlas_brains import atlas_labels
 from phantoms import phantom_labels
 from shapes import cerebrum_surface, rigid, save_gifti, save_labels
 
-from gyriflow.compare.distances import aligned_distances
+from gyriflow.compare.comparison import aligned_distances
 from gyriflow.geometry.alignment import angle_deg, rigid_fit
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface
@@ -58,18 +58,18 @@ def test_a_brain_is_foretold_and_compared_with_the_real_ones_of_whatever_week(wo
     for _, of_week in prediction.groupby("week"):
         rows = of_week.set_index("model")
         # the run comes to the shape that it grows towards, which is as large as the real brain, if not the same
-        assert rows.loc["run", "volume_error"] == pytest.approx(rows.loc["target", "volume_error"], abs=0.02)
-        assert abs(rows.loc["run", "volume_error"]) < 0.1
+        assert rows.loc["run", "volume_difference"] == pytest.approx(rows.loc["target", "volume_difference"], abs=0.02)
+        assert abs(rows.loc["run", "volume_difference"]) < 0.1
         assert rows.loc["run", "distance_mm"] == pytest.approx(rows.loc["target", "distance_mm"], abs=0.2)
         # of no week is the atlas' brain that of another one
-        assert rows.loc["atlas", "volume_error"] == pytest.approx(rows.loc["target", "volume_error"])
+        assert rows.loc["atlas", "volume_difference"] == pytest.approx(rows.loc["target", "volume_difference"])
         assert rows.loc["atlas", "distance_mm"] < 1.5
     steps = pd.read_csv(workflow.directory / "results/runs/expected/b21.5/folding/steps.csv")
     assert steps["to_path_mm"].iloc[-1] < 0.3
     # the real brain deviates as it is larger or smaller
     deviation = pd.read_csv(workflow.directory / further[0]).query("hemisphere == 'whole'")
     areas = deviation[deviation["metric"] == "log_area"].set_index("week")["value"]
-    errors = prediction.query("model == 'run'").set_index("week")["area_error"]
+    errors = prediction.query("model == 'run'").set_index("week")["area_difference"]
     for week, value in areas.items():
         assert value == pytest.approx(-np.log1p(errors[week]), abs=0.05)
 

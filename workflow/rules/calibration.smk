@@ -88,7 +88,7 @@ rule calibration_score:
 
 rule calibration_tables:
     input:
-        scores=CALIBRATED.scores_before(len(CALIBRATED.rounds)) if CALIBRATED else [],
+        scores=CALIBRATED.scores_before(max(CALIBRATED.rounds.values()) + 1) if CALIBRATED else [],
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",

@@ -80,6 +80,7 @@ rule replication:
         frames=study.files(FOLDING["frames"])[:1],
         params=study.files(PARAMETERS)[:1],
         rates=GROWTH["rates"] if study.series_with_rates else [],
+        observed=[brain.pial for brain in study.brains.values()],
         sides=[
             PIAL[side].format(brain=simulation.start.id)
             for simulation in study.run_simulations[:1]
@@ -98,6 +99,7 @@ rule replication:
             if name in study.sweeps
         },
         run=next(iter(study.pairs), (None, None)),
+        observed=list(study.brains),
         costs=CONFIG.costs.model_dump(),
     script:
         "../scripts/replication.py"

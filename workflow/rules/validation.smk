@@ -2,7 +2,7 @@
 # is the baseline.
 rule prepared_surfaces:
     input:
-        real=lambda w: study.references[w.brain, float(w.week)][0].pial,
+        observed=lambda w: study.references[w.brain, float(w.week)][0].pial,
         adjacent=lambda w: study.references[w.brain, float(w.week)][1].pial,
         start=PIAL["whole"],
     output:
@@ -37,7 +37,7 @@ rule validation:
         series=lambda w: simulation_of(w).series,
         weeks=lambda w: list(simulation_of(w).observed),
         run=lambda w: w.run,
-        real=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
+        observed=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
         kind=lambda w: simulation_of(w).kind,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -60,6 +60,8 @@ rule prediction:
     params:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: list(simulation_of(w).observed),
+        observed=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
+        kind=lambda w: simulation_of(w).kind,
         atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
         of_atlas=lambda w: simulation_of(w).is_atlas_prediction,
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
@@ -125,7 +127,7 @@ def ceiling_weeks(brain):
     return [week for week in study.chains[brain, "self"].later_weeks if (brain, week) in study.references]
 
 
-# the start brain's mesh carried to later weeks by registration alone: an upper limit of accuracy
+# the start brain's mesh carried to later weeks by registration alone
 rule registration_ceiling:
     input:
         unpack(lambda w: prepared_files(w.brain, ceiling_weeks(w.brain))),
@@ -146,7 +148,7 @@ rule registration_ceiling:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: ceiling_weeks(w.brain),
         run="registration",
-        real=lambda w: [study.references[w.brain, week][0].id for week in ceiling_weeks(w.brain)],
+        observed=lambda w: [study.references[w.brain, week][0].id for week in ceiling_weeks(w.brain)],
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:

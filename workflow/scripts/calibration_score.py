@@ -5,6 +5,7 @@ from itertools import islice
 import pandas as pd
 
 from gyriflow.compare.calibration import run_score
+from gyriflow.compare.comparison import observed_brain
 from gyriflow.folding.start_regions import folded_surfaces
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.frames import read_positions
@@ -33,7 +34,8 @@ with step(snakemake.log[0]):
         for simulation, count in zip(simulations, params.compared, strict=True):
             yield from ((simulation, brain) for brain in islice(observed, count))
 
-    pairs = pair_up((whole for whole, _, _ in simulated), map(read_surface, files.real))
+    brains = (observed_brain(path, read_surface(path), radius_mm) for path in files.real)
+    pairs = pair_up((whole for whole, _, _ in simulated), brains)
     simulated_spectra = (surface_spectra(left, right, radius_mm, modes) for _, left, right in simulated)
     spectra = pair_up(simulated_spectra, map(read_table, files.spectra))
     score = run_score(pairs, params.weights, causes, radius_mm=radius_mm, spectra=spectra)

@@ -1,5 +1,6 @@
 """Write the report of a study and the pages of its brains, each a single HTML file."""
 
+from gyriflow.compare.accuracy import prediction_facts
 from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
@@ -36,7 +37,11 @@ with step(snakemake.log[0]):
         page = brain_page(brains[name], tables, origin, with_content(figures), norm=params.norm)
         write_text(path, report_page(template, parts, {"groups": []}, **page))
     small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
-    prediction = params.prediction and params.prediction | {"accuracy": read_yaml(files.accuracy)}
+    prediction = params.prediction
+    if prediction:
+        accuracy = read_yaml(files.accuracy)
+        tests = prediction_facts(accuracy["rows"], prediction["start_week"], prediction["week"])
+        prediction = prediction | {"accuracy": accuracy, "tests": tests}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
     page = study_page(params.brains, tables, origin, with_content(params.figures), **about)
     runs, observed = params.surfaces["runs"], params.surfaces["observed"]

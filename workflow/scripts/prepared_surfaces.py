@@ -6,8 +6,8 @@ from gyriflow.step import step
 
 files, output = snakemake.input, snakemake.output
 with step(snakemake.log[0]):
-    observed = read_surface(files.real)
-    surfaces = {"real": observed, "start": read_surface(files.start), "adjacent": read_surface(files.adjacent)}
+    observed = read_surface(files.observed)
+    surfaces = {"observed": observed, "start": read_surface(files.start), "adjacent": read_surface(files.adjacent)}
     for name, surface in surfaces.items():
         prepared = prepare_for_comparison(surface, observed, snakemake.params.curvature_radius_mm)
         write_surface(output[name], prepared.mesh)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from gyriflow.compare.comparison import ObservedBrain
+from gyriflow.compare.prediction import comparison_table
 from gyriflow.compare.shapes import PreparedSurface
-from gyriflow.compare.validation import ObservedWeek, validation_table
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed
 from gyriflow.growth.carrying import carry_mesh
@@ -29,9 +30,9 @@ with step(snakemake.log[0]):
     surfaces, observed = {}, {}
     for number, week in enumerate(params.weeks):
         points = carried.positions[carried.index(week)][used]
-        surfaces[week] = transformed(TriangleMesh(points, boundary.faces), pose.world)
-        baselines = (prepared(name, number) for name in ("real", "start", "adjacent"))
-        observed[week] = ObservedWeek(params.real[number], read_surface(files.whole[number]), *baselines)
+        surfaces[week] = {"run": transformed(TriangleMesh(points, boundary.faces), pose.world)}
+        baselines = {name: prepared(name, number) for name in ("start", "adjacent")}
+        surface = read_surface(files.whole[number])
+        observed[week] = ObservedBrain(params.observed[number], surface, prepared("observed", number), baselines)
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {"start": snakemake.wildcards.brain}
-    table = validation_table(labels, surfaces, observed, {}, radius_mm=params.curvature_radius_mm)
-    write_table(output.table, table)
+    write_table(output.table, comparison_table(labels, surfaces, observed, radius_mm=params.curvature_radius_mm))

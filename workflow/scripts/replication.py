@@ -48,11 +48,13 @@ with step(snakemake.log[0]):
         used_rate=read_yaml(files.params[0])["growth_rate_per_s"],
         from_back=from_back,
         mirror_mm=mirror_distance(*sides) if len(sides) == 2 else None,
+        surfaces=dict(zip(params.observed, map(read_surface, files.observed), strict=True)),
     )
     write_table(output.csv, table)
     write_table(output.nearest, published_nearest(published, sweeps))
     lines = [
         f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}.",
+        published["sensitivity"],
         *(comparison_caption(name, sweep.week, sweep.comparison) for name, sweep in sweeps.items()),
     ]
     paragraphs = Markup("").join(Markup("<p>{}</p>\n").format(line) for line in lines)

@@ -1,7 +1,8 @@
 """Validate a run: compare its simulated brains with the observed ones, week by week."""
 
+from gyriflow.compare.comparison import ObservedBrain
+from gyriflow.compare.prediction import add_curves, comparison_table
 from gyriflow.compare.shapes import PreparedSurface
-from gyriflow.compare.validation import ObservedWeek, validation_table
 from gyriflow.growth.following import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
@@ -19,11 +20,12 @@ def prepared(name, number):
 with step(snakemake.log[0]):
     simulated, observed = {}, {}
     for number, week in enumerate(params.weeks):
-        simulated[week] = read_surface(files.simulated[number])
-        baselines = (prepared(name, number) for name in ("real", "start", "adjacent"))
-        observed[week] = ObservedWeek(params.real[number], read_surface(files.whole[number]), *baselines)
+        simulated[week] = {"run": read_surface(files.simulated[number])}
+        baselines = {name: prepared(name, number) for name in ("start", "adjacent")}
+        surface = read_surface(files.whole[number])
+        observed[week] = ObservedBrain(params.observed[number], surface, prepared("observed", number), baselines)
     growth, curves = read_yaml(files.params)["growth"], read_table(files.curves) if files.curves else None
     sizes = sizes_on_curves(growth, curves, params.series, params.weeks)
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {"start": snakemake.wildcards.brain}
-    table = validation_table(labels, simulated, observed, sizes, radius_mm=params.curvature_radius_mm)
-    write_table(snakemake.output.table, table)
+    table = comparison_table(labels, simulated, observed, radius_mm=params.curvature_radius_mm)
+    write_table(snakemake.output.table, add_curves(table, sizes))

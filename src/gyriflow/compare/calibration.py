@@ -15,13 +15,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from ..errors import InputError
-from ..geometry.triangles import Floats, TriangleMesh, area, signed_volume
+from ..geometry.triangles import Floats, TriangleMesh
 from ..metrics.spangy import spectral_distances
-from ..quantities import COMPARED_MAPS
 from ..settings.terms import AMPLITUDE, FOLD_BANDS, MEASURED, PROXIES, SPECTRAL_SCORES, STIFFNESS_RATIO, Score
-from .distances import aligned_distances
-from .placement import correlation, interpolate_measures
-from .shapes import PreparedSurface, curvature_differences, prepare_for_comparison
+from .comparison import Group, ObservedBrain, compare
 
 DIGITS = 6
 """Significant digits of calibrated values."""
@@ -85,32 +82,14 @@ def _scaled(curve: Mapping[Any, Any], factor: float) -> dict[Any, Any]:
     return {week: factor * value for week, value in curve.items()}
 
 
-def size_score(simulated: TriangleMesh, observed: TriangleMesh) -> float:
-    """Return √(a² + v²) with a, v the relative differences in area and volume of two closed surfaces."""
-    relative_volume = signed_volume(simulated) / signed_volume(observed)
-    return float(np.hypot(area(simulated) / area(observed) - 1, relative_volume - 1))
-
-
-SURFACE_SCORES: dict[Score, Callable[[TriangleMesh, TriangleMesh], float]] = {
-    "size": size_score,
-    "surface_distance": lambda simulated, observed: aligned_distances(simulated, observed)["distance_mm"],
+SURFACE_SCORES: dict[Score, tuple[Group, Callable[[Mapping[str, float]], float]]] = {
+    "size": ("size", lambda row: float(np.hypot(row["area_difference"], row["volume_difference"]))),
+    "surface_distance": ("distance", lambda row: row["distance_mm"]),
+    "shape_index": ("folds", lambda row: 1 - row["r_shape_index"]),
+    "mean_curvature": ("folds", lambda row: 1 - row["r_mean_curvature"]),
+    "curvature_distribution": ("folds", lambda row: row["curvature_distance_per_mm"]),
 }
-"""Scores that compare closed surfaces in mm, simulated and observed, without scaling."""
-
-
-def shape_scores(simulated: PreparedSurface, observed: PreparedSurface) -> dict[Score, float]:
-    """Return the scores that compare surfaces prepared for comparison.
-
-    shape_index and mean_curvature are 1 − r with r as in `placement.score_placement`; curvature_distribution is
-    curvature_distance_per_mm of `shapes.curvature_differences`.
-    """
-    values, _ = interpolate_measures(simulated, observed)
-    r = {name: correlation(getattr(observed, name), values[name], observed.areas) for name in COMPARED_MAPS}
-    return {
-        "shape_index": 1 - r["shape_index"],
-        "mean_curvature": 1 - r["mean_curvature"],
-        "curvature_distribution": curvature_differences(simulated, observed)["curvature_distance_per_mm"],
-    }
+"""Scores of a row of `comparison.compare`, 0 for equal brains, and the group of columns that they need."""
 
 
 def require_bands(spectra: pd.DataFrame, names: Collection[str], path: str | None = None) -> None:
@@ -153,21 +132,15 @@ def spectral_scores(simulated: pd.DataFrame, observed: pd.DataFrame) -> dict[str
 
 
 def brain_scores(
-    simulated: TriangleMesh, observed: TriangleMesh, names: Collection[Score], *, radius_mm: float
+    simulated: TriangleMesh, observed: ObservedBrain, names: Collection[Score], *, radius_mm: float
 ) -> dict[Score, float]:
-    """Return the scores of `names` for a simulated brain: 0 if it equals the observed one.
-
-    Both are closed surfaces in mm; `radius_mm` is that of the fitted curvature.
-    """
-    scores = {name: score(simulated, observed) for name, score in SURFACE_SCORES.items() if name in names}
-    if set(names) - set(scores):
-        prepared = (prepare_for_comparison(mesh, observed, radius_mm) for mesh in (simulated, observed))
-        scores |= shape_scores(*prepared)
-    return {name: scores[name] for name in names}
+    """Return the scores of `names` for a simulated closed surface in mm. `radius_mm` is that of fitted curvature."""
+    row, _ = compare(simulated, observed, radius_mm=radius_mm, groups={SURFACE_SCORES[name][0] for name in names})
+    return {name: SURFACE_SCORES[name][1](row) for name in names}
 
 
 def run_score(
-    pairs: Iterable[tuple[TriangleMesh, TriangleMesh]],
+    pairs: Iterable[tuple[TriangleMesh, ObservedBrain]],
     weights: Mapping[Score, float],
     causes: Sequence[str],
     *,
@@ -179,7 +152,7 @@ def run_score(
     Parameters
     ----------
     pairs
-        Simulated and observed surfaces to compare. They are not read if the run has diverged.
+        Simulated surfaces and the observed brains to compare them with. They are not read if the run has diverged.
     weights
         Weight of each score.
     causes
@@ -226,14 +199,21 @@ class Surrogate:
 
 
 def fit_surrogate(runs: pd.DataFrame, bounds: Mapping[str, Sequence[float]], seed: int) -> Surrogate:
-    """Fit the surrogate to the runs of a calibration: columns of the parameters, and score (NaN if diverged).
+    """Fit the surrogate to the runs of a calibration: columns of the parameters, score (NaN if diverged) and cause.
 
-    ValueError if fewer than two runs have a score.
+    InputError if fewer than two runs have a score.
     """
     points, scores = to_unit_box(runs, bounds), np.asarray(runs["score"], dtype=float)
     finished = scores[np.isfinite(scores)]
     if len(finished) < 2:
-        raise ValueError(f"{len(finished)} runs have a score, but a surrogate needs two or more")
+        causes = "; ".join(dict.fromkeys(runs["cause"].dropna().astype(str)))
+        raise InputError(
+            "too few runs of the calibration have finished to choose the next ones",
+            found=f"{len(finished)} of {len(runs)} runs with a score; {causes}",
+            expected="two or more",
+            remedy="Narrow the bounds of calibrate.parameters around values with which calibrate.base finishes, or "
+            "start with more runs (calibrate.rounds).",
+        )
     # a diverged run scores as far above the worst as the worst is above the best: not too steep for the surrogate
     scores = np.where(np.isfinite(scores), scores, 2 * finished.max() - finished.min())
     kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern([0.5] * len(bounds), (0.05, 20.0), nu=2.5)

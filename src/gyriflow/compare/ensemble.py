@@ -5,51 +5,27 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+from .accuracy import LEVEL, QUANTITIES, ErrorInTests, error_in_tests, from_log, log_errors, log_value
 
-QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
-"""The metrics of whole brains that have intervals."""
-LEVEL = 0.9
-"""Coverage of the prediction interval for one further member."""
 SULCUS, GYRUS = -0.375, 0.375
 """Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
 1992."""
 
 
-def prediction_interval(
-    values: Sequence[float] | Floats, level: float = LEVEL, method_sd: float = 0.0
-) -> tuple[float, float]:
-    """Return the two-sided prediction interval for one further value of a normal sample.
+def spread_of_members(values: Floats, level: float) -> float:
+    """Return half the width of the two-sided prediction interval for one further value of a normal sample (n,).
 
-    It is mean ± √(t² s² (1 + 1/n) + z² m²) with Student's t of n − 1 degrees of freedom, the normal quantile z, and the
-    standard deviation m of an error that all values share, `method_sd`; NaN for fewer than two values.
+    It is t s √(1 + 1/n) with Student's t of n − 1 degrees of freedom; NaN for fewer than two values.
     """
     n = len(values)
     if n < 2:
-        return np.nan, np.nan
-    upper = (1 + level) / 2
-    half = np.hypot(t.ppf(upper, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n), norm.ppf(upper) * method_sd)
-    return float(np.mean(values) - half), float(np.mean(values) + half)
-
-
-def method_errors(tests: Sequence[Mapping[str, Any]], horizon_gw: float) -> dict[str, float]:
-    """Return the root mean square error of predictions at a horizon for each metric that was tested, as a fraction.
-
-    `tests` are the rows of `norms/predictions.yaml`. The error is linear between tested horizons, from none at 0, and
-    constant beyond the last.
-    """
-    rows = pd.DataFrame(tests).query("model == 'run'")
-    errors = {}
-    for metric in QUANTITIES:
-        if f"{metric}_error" not in rows:
-            continue
-        squares = (rows[f"{metric}_error"] ** 2).groupby(rows["horizon"]).mean().dropna()
-        errors[metric] = float(np.interp(horizon_gw, [0.0, *squares.index], [0.0, *np.sqrt(squares)]))
-    return errors
+        return np.nan
+    return float(t.ppf((1 + level) / 2, n - 1) * np.std(values, ddof=1) * np.sqrt(1 + 1 / n))
 
 
 def interval_table(
@@ -60,32 +36,45 @@ def interval_table(
 ) -> pd.DataFrame:
     """Return the intervals of whole brains by week and metric.
 
+    The spread of the members and the largest error of the tests are added in logarithms, as √(spread² + error²), about
+    the mean of the members less the bias of the tests if that is corrected. Those of later weeks are never narrower.
+
     Parameters
     ----------
     run, members, observed
         Metrics with columns week, hemisphere, metric, value, unit; of the run, of all its members, and of the observed
         brains of its weeks. `observed` may be empty.
     tests
-        Of a prediction, the tests of `method_errors`.
+        Of a prediction, the rows of `norms/predictions.yaml`; empty if the run is no prediction.
 
     Returns
     -------
     DataFrame
-        Columns week, metric, unit, run (its value), members (number of values), mean, sd, method_sd (of `tests`, NaN if
-        the metric was not tested), low, high, observed (NaN without a brain) and contains_observed. A member that did
-        not reach a week has no value there.
+        Columns week, metric, unit, run (its value), members (number of values), mean, sd (NaN for one), tested_starts,
+        largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without tests), is_corrected, coverage (share
+        of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of further members without tests),
+        low, high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
+        there.
     """
     keys = ["week", "metric"]
     own, varied, brains = (
         table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
     )
     rows, start = [], own["week"].min()
-    errors = {week: method_errors(tests, week - start) if tests else {} for week in own["week"].unique()}
-    for (week, metric), group in varied.groupby(keys)["value"]:
-        method_sd = errors[week].get(str(metric), np.nan) * group.mean()
-        low, high = prediction_interval(group.to_numpy(), method_sd=np.nan_to_num(method_sd))
-        statistics = {"members": len(group), "mean": group.mean(), "sd": group.std(), "method_sd": method_sd}
-        rows.append({"week": week, "metric": metric, **statistics, "low": low, "high": high})
+    for metric, table in varied.groupby("metric"):
+        errors, widest = log_errors(tests, str(metric)), 0.0
+        for at, group in table.groupby("week")["value"]:
+            week = float(str(at))
+            tested = error_in_tests(errors, week, week - start) if week > start else None
+            level = tested.coverage if tested else LEVEL
+            logs = log_value(str(metric), group.to_numpy(dtype=float))
+            half = np.hypot(spread_of_members(logs, level), tested.largest if tested else 0.0)
+            widest = max(widest, half) if np.isfinite(half) else half
+            middle = logs.mean() - (tested.bias if tested and tested.is_corrected else 0.0)
+            row = {"week": week, "metric": metric, "members": len(group), "mean": group.mean(), "sd": group.std()}
+            row |= tested_columns(tested) | {"coverage": level}
+            low, high = (from_log(str(metric), middle + sign * widest) for sign in (-1, 1))
+            rows.append(row | {"low": low, "high": high})
     table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(pd.DataFrame(rows), "left", keys)
     table = table.merge(brains.groupby(keys)["value"].first().rename("observed").reset_index(), "left", keys)
     inside = table["observed"].between(table["low"], table["high"]).astype("boolean")
@@ -93,6 +82,14 @@ def interval_table(
         members=table["members"].fillna(0).astype(int),
         contains_observed=inside.mask(table["observed"].isna() | table["low"].isna()),
     )
+
+
+def tested_columns(tested: ErrorInTests | None) -> dict[str, float | bool]:
+    """Return the columns of `interval_table` that are about tests."""
+    if tested is None:
+        return {"tested_starts": 0, "largest_error": np.nan, "bias": np.nan, "is_corrected": False}
+    errors = {"largest_error": np.expm1(tested.largest), "bias": np.expm1(tested.bias)}
+    return {"tested_starts": tested.starts, **errors, "is_corrected": tested.is_corrected}
 
 
 def ensemble_maps(

@@ -1,34 +1,156 @@
-"""Placement of folds: correlation of curvature with the observed brain, and skill over a brain without new folds."""
+"""Placement of folds: correlation of curvature with the observed brain, and gain over a brain without new folds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import cholesky, solve_triangular
 from scipy.spatial import cKDTree
+from scipy.stats import norm, t
 
 from ..geometry.alignment import MIRROR, align
-from ..geometry.matching import match_surface, nearest_on, values_at
-from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
+from ..geometry.matching import Match, match_points, match_surface, nearest_on, values_at
+from ..geometry.remeshing import remesh
+from ..geometry.triangles import Floats, Ints, TriangleMesh, submesh, transformed, vertex_areas, vertex_normals
+from ..metrics.laplace_beltrami import laplacian, modes_below
 from ..quantities import COMPARED_MAPS
 from .shapes import PreparedSurface
 
-PATCH_EDGE_MM = 20.0
-"""Width of the patches that are resampled in the bootstrap: wider than a gyrus with its sulcus."""
-
 SYMMETRY_TOL_MM = 0.4
 """Mean distance to the mirror image below which both sides count as one observation: half a voxel of atlases."""
+SHORTEST_MODE_MM = 10.0
+"""Shortest wavelength of the modes that are resampled one by one. What is finer is resampled in patches as wide."""
+MODE_EDGE_MM = 2.0
+"""Edges of the surface whose modes are computed, a fifth of the shortest wavelength."""
+MODES_PER_BLOCK = 12
+"""Successive modes that are drawn among each other, so that each sample has the power of all wavelengths."""
+PATCH_EDGE_MM = 20.0
+"""Width of the patches in which distances are resampled: wider than a gyrus with its sulcus."""
 
 N_DRAWS = 2000
 """Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of the bootstrap samples at the ends of a 95 % interval."""
-RESAMPLED = "patches of one brain, not subjects"
+RESAMPLED = "modes and patches of one brain, not subjects"
 """Note in tables with bootstrap intervals, which do not include differences between subjects."""
-NO_ROOM = "no room"
-"""Flag of a skill that is not computed, since its baseline may be no better than the start."""
+NO_HEADROOM = "no headroom"
+"""Flag of a share that is not computed, since the baseline may be no better than the start."""
+
+
+@dataclass(frozen=True, eq=False)
+class Resampling:
+    """A surface's modes, and patches for what is finer: the units that are drawn in a bootstrap of maps over it.
+
+    Folds run across borders of patches, but the modes of a random map are independent. If the brain is its own mirror
+    image, the modes are those of its left half with a free rim, and both sides are drawn together.
+
+    Attributes
+    ----------
+    areas : (n,) float
+        Areas of the surface's vertices in mm².
+    sides
+        m points of the surface; if it is symmetric m points of its left half, and their mirror images on the right.
+    side_areas : (m,) float
+        Areas of these points in mm².
+    basis : (m, v) sparse float and (v, k) float
+        Their product has the k modes at the points, orthonormal by area, in the order of their wavelengths.
+    patch : (m,) int
+        Patch of each point.
+    asymmetry_mm
+        Mean distance of the brain from its mirror image.
+    """
+
+    areas: Floats
+    sides: tuple[Match, ...]
+    side_areas: Floats
+    basis: tuple[sparse.csr_matrix, Floats]
+    patch: Ints
+    asymmetry_mm: float
+
+    @property
+    def is_symmetric(self) -> bool:
+        return len(self.sides) > 1
+
+    @cached_property
+    def units(self) -> Ints:
+        """The unit of each of the coordinates of a map: first modes, then patches."""
+        modes = self.basis[1].shape[1]
+        return np.tile(np.concatenate([np.arange(modes), modes + self.patch]), len(self.sides))
+
+    @cached_property
+    def drawn(self) -> Floats:
+        """How often each unit is in the surface (once) and in each bootstrap sample, (1 + N_DRAWS, units)."""
+        modes, patches = self.basis[1].shape[1], int(self.patch.max()) + 1
+        blocks = np.array_split(np.arange(modes), max(1, round(modes / MODES_PER_BLOCK)))
+        return draw_units([*map(len, blocks), patches])
+
+    def coordinates(self, values: Floats) -> Floats:
+        """Return coordinates of a map (n,) less its mean, whose scalar products are those of maps over the area.
+
+        A map that is constant to rounding has coordinates 0.
+        """
+        centred = values - np.average(values, weights=self.areas)
+        if centred @ (self.areas * centred) <= 1e-12 * (values @ (self.areas * values)):
+            centred = np.zeros_like(values)
+        places, functions = self.basis
+        parts = []
+        for side in self.sides:
+            at_side = values_at(side, centred)
+            modes = functions.T @ (places.T @ (self.side_areas * at_side))
+            finer = at_side - places @ (functions @ modes)
+            parts += [modes, np.sqrt(self.side_areas) * finer]
+        return np.concatenate(parts)
+
+    def correlations(self, truth: Floats, values: Floats) -> Floats:
+        """Return the correlation of two maps (n,), and that in each bootstrap sample; NaN where one is constant.
+
+        Samples are spread as Student's t of as many units as the power of `truth` comes from, Σp²⁻¹ of the shares p.
+        """
+        r = correlation(truth, values, self.areas)
+        x, y = self.coordinates(truth), self.coordinates(values)
+        sums = np.stack([np.bincount(self.units, product) for product in (x * x, y * y, x * y)], axis=1)
+        xx, yy, xy = (self.drawn @ sums).T
+        has_both = (xx > 0) & (yy > 0)
+        drawn = np.where(has_both, xy / np.sqrt(np.where(has_both, xx * yy, 1.0)), np.nan)
+        shares = sums[:, 0] / max(sums[:, 0].sum(), np.finfo(float).tiny)
+        freedom = max(1 / max((shares**2).sum(), np.finfo(float).tiny) - 2, 1.0)
+        spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
+        # about r, since the sides of a symmetric brain are not exactly equal
+        return np.append(r, r + spread * (drawn[1:] - drawn[0]))
+
+
+def make_resampling(surface: PreparedSurface) -> Resampling:
+    """Compute the modes and patches of a surface, or of its left half if it is its own mirror image."""
+    mesh, (image, asymmetry_mm) = surface.mesh, mirror_image(surface)
+    used: Ints = np.arange(len(mesh.vertices))
+    sides = []
+    if asymmetry_mm < SYMMETRY_TOL_MM:
+        left = mesh.vertices[:, 0] < image.vertices[:, 0]
+        mesh, used = submesh(surface.mesh, left[mesh.faces].sum(axis=1) >= 2)
+        sides = [match_points(image.vertices[used], vertex_normals(image)[used], surface.mesh)]
+    itself = Match(np.repeat(used[:, None], 3, axis=1), np.full((len(used), 3), 1 / 3), np.zeros(len(used)), used >= 0)
+    sides.insert(0, itself)
+    coarse, areas = remesh(mesh, MODE_EDGE_MM), vertex_areas(mesh)
+    modes = modes_below(*laplacian(coarse), (2 * np.pi / SHORTEST_MODE_MM) ** 2).functions
+    match, rows = match_surface(mesh, coarse), np.repeat(np.arange(len(areas)), 3)
+    shape = len(areas), len(coarse.vertices)
+    places = sparse.csr_matrix((match.weights.ravel(), (rows, match.corners.ravel())), shape=shape)
+    # orthonormal on the finer surface, in the same order
+    products = modes.T @ (places.T @ places.multiply(areas[:, None]).tocsr() @ modes)
+    modes = solve_triangular(cholesky(products, lower=True), modes.T, lower=True).T
+    patch = number_patches(mesh.vertices, areas, SHORTEST_MODE_MM)
+    return Resampling(surface.areas, tuple(sides), areas, (places, modes), patch, asymmetry_mm)
 
 
 def correlation(x: Floats, y: Floats, weights: Floats) -> float:
-    """Return the weighted Pearson correlation of (n,) values; NaN where one of them is constant."""
-    return float(_correlations(_products(x, y, weights).sum(axis=0)[None])[0])
+    """Return the weighted Pearson correlation of (n,) values; NaN where one of them is constant to rounding."""
+    (xx, xy), (_, yy) = np.cov(x, y, aweights=weights)
+    squares = (np.average(values * values, weights=weights) for values in (x, y))
+    if any(spread <= 1e-12 * square for spread, square in zip((xx, yy), squares, strict=True)):
+        return float("nan")
+    return float(xy / np.sqrt(xx * yy))
 
 
 def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) -> tuple[dict[str, Floats], float]:
@@ -42,59 +164,28 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
     return values, float(np.average(match.agrees, weights=observed.areas))
 
 
-def score_placement(
-    simulated: PreparedSurface, observed: PreparedSurface, start: PreparedSurface, adjacent: PreparedSurface
-) -> dict[str, float | bool | str]:
-    """Score how well the positions of a simulated brain's folds agree with those of the observed brain.
-
-    The result has the `correlation_scores` of each of `COMPARED_MAPS`; matched_share, the share of the observed area
-    with a matching point on the simulated brain; asymmetry_mm and mirrored_patches of `make_patches`; and resampled.
-
-    Parameters
-    ----------
-    simulated, observed
-        Prepared for comparison and aligned, as are the baselines.
-    start
-        The start brain scaled to the observed volume, which has no new folds.
-    adjacent
-        The observed brain of the week before.
-    """
-    (run_maps, matched_share), (start_maps, _), (adjacent_maps, _) = (
-        interpolate_measures(surface, observed) for surface in (simulated, start, adjacent)
-    )
-    patch, symmetry = make_patches(observed)
-    row = {"matched_share": matched_share} | symmetry | {"resampled": RESAMPLED}
-    for name in COMPARED_MAPS:
-        maps = (getattr(observed, name), run_maps[name], start_maps[name], adjacent_maps[name])
-        scores = correlation_scores(*maps, observed.areas, patch)
-        row |= {f"{score}_{name}": value for score, value in scores.items()}
-    return row
-
-
-def correlation_scores(
-    truth: Floats, simulated: Floats, start: Floats, adjacent: Floats, areas: Floats, patch: Ints
-) -> dict[str, float | str]:
-    """Correlate (n,) simulated values with the observed `truth`, and compare r with that of the baselines.
+def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float | str]:
+    """Compare correlations and their bootstrap samples with those of the start brain and of the week before.
 
     Returns
     -------
     dict
-        r, r_start and r_adjacent, weighted by area; gain = r − r_start; room = r_adjacent − r_start, the gain of the
-        baseline; skill = gain/room and skill_flag: "ok", or NaN and `NO_ROOM` unless the interval of room lies above 0.
-        r, gain, room and skill have 95 % intervals …_low, …_high: percentiles of a bootstrap over patches (Efron and
-        Tibshirani 1993).
+        r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed brain
+        of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
+        interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
     """
-    drawn = draw_patches(patch)
-    r, r_start, r_adjacent = (
-        bootstrap_correlations(truth, values, areas, patch, drawn) for values in (simulated, start, adjacent)
-    )
-    gain, room = r - r_start, r_adjacent - r_start
-    has_room = interval_of(room)[1] > 0
-    skill = gain / room if has_room else np.full_like(gain, np.nan)
+    gain, headroom = r - r_start, r_adjacent - r_start
+    has_headroom = interval_of(headroom)[1] > 0
+    share = gain / headroom if has_headroom else np.full_like(gain, np.nan)
     row: dict[str, float | str] = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
-    for name, draws in (("r", r), ("gain", gain), ("room", room), ("skill", skill)):
-        row |= dict(zip((name, f"{name}_low", f"{name}_high"), interval_of(draws), strict=True))
-    return row | {"skill_flag": "ok" if has_room else NO_ROOM}
+    for name, draws in {"r": r, "gain": gain, "headroom": headroom, "gain_share": share}.items():
+        row |= with_interval(name, draws)
+    return row | {"gain_share_flag": "ok" if has_headroom else NO_HEADROOM}
+
+
+def with_interval(name: str, draws: Floats) -> dict[str, float]:
+    """Return a statistic and the ends of its 95 % interval by column: `name`, `name`_low, `name`_high."""
+    return dict(zip((name, f"{name}_low", f"{name}_high"), interval_of(draws), strict=True))
 
 
 def interval_of(draws: Floats) -> tuple[float, float, float]:
@@ -103,39 +194,21 @@ def interval_of(draws: Floats) -> tuple[float, float, float]:
     return float(draws[0]), float(low), float(high)
 
 
-def make_patches(surface: PreparedSurface, *, mirrored: bool = False) -> tuple[Ints, dict[str, float | bool]]:
-    """Return the (n,) patch number of each vertex, and how symmetric the brain is.
+def mirror_image(surface: PreparedSurface) -> tuple[TriangleMesh, float]:
+    """Mirror a surface along x (left to right), align it with itself, and return its mean distance in mm from itself.
 
-    asymmetry_mm is the mean distance of the brain from its mirror image. mirrored_patches is true if a patch and its
-    mirror image count as one patch: if that distance is below `SYMMETRY_TOL_MM`, or on request (`mirrored`).
+    Vertices of the image are those of the surface.
     """
-    image, asymmetry_mm = mirror_image(surface.mesh, surface.areas)
-    together = mirrored or asymmetry_mm < SYMMETRY_TOL_MM
-    patch = number_patches(surface.mesh.vertices, surface.areas, PATCH_EDGE_MM, image if together else None)
-    return patch, {"asymmetry_mm": asymmetry_mm, "mirrored_patches": together}
+    aligned = align(transformed(surface.mesh, MIRROR), surface.mesh)
+    return aligned, float(np.average(nearest_on(aligned.vertices, surface.mesh)[0], weights=surface.areas))
 
 
-def mirror_image(mesh: TriangleMesh, areas: Floats) -> tuple[Floats, float]:
-    """Return the (n, 3) mirror images of the vertices, and the mean distance in mm of the image from the surface.
-
-    The surface is mirrored along x (left to right) and aligned with itself.
-    """
-    image = transformed(mesh, MIRROR)
-    aligned = align(image, mesh)
-    return aligned.vertices, float(np.average(nearest_on(aligned.vertices, mesh)[0], weights=areas))
-
-
-def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floats | None = None) -> Ints:
+def number_patches(points: Floats, areas: Floats, edge_mm: float) -> Ints:
     """Divide (n, 3) points into patches about `edge_mm` wide and return the (n,) number of each point's patch.
 
-    Patches are the Voronoi cells of seeds chosen by farthest-point sampling, which is deterministic. With
-    `mirrored`, the (n, 3) mirror images of the points, a patch and its mirror image have the same number.
+    Patches are the Voronoi cells of seeds chosen by farthest-point sampling, which is deterministic.
     """
-    sides = 1
-    if mirrored is not None:
-        sides, points = 2, np.where((points[:, 0] < mirrored[:, 0])[:, None], points, mirrored)
-    count = max(2, round(float(areas.sum()) / edge_mm**2 / sides))
-    seeds = [0]
+    seeds, count = [0], max(2, round(float(areas.sum()) / edge_mm**2))
     distances = np.linalg.norm(points - points[0], axis=1)
     for _ in range(count - 1):
         seeds.append(int(distances.argmax()))
@@ -143,29 +216,11 @@ def number_patches(points: Floats, areas: Floats, edge_mm: float, mirrored: Floa
     return np.asarray(cKDTree(points[seeds]).query(points)[1], dtype=np.int64)
 
 
-def draw_patches(patch: NDArray[np.integer]) -> Ints:
-    """Return how often each of p patches is in the surface (once) and in each bootstrap sample, (1 + N_DRAWS, p)."""
-    count = int(patch.max()) + 1
-    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=N_DRAWS)
-    return np.concatenate([np.ones((1, count), np.int64), drawn])
+def draw_units(groups: Sequence[int]) -> Floats:
+    """Return how often units of groups of these sizes are drawn: (1 + N_DRAWS, units), each once in the first row.
 
-
-def bootstrap_correlations(
-    truth: Floats, values: Floats, areas: Floats, patch: NDArray[np.integer], drawn: NDArray[np.integer]
-) -> Floats:
-    """Return the (k,) area-weighted correlations of (n,) values in each of k samples of `draw_patches`."""
-    columns = _products(truth, values, areas).T
-    sums: Floats = np.stack([np.bincount(patch, column) for column in columns], axis=1)
-    return _correlations(np.asarray(drawn @ sums, dtype=float))
-
-
-def _products(x: Floats, y: Floats, weights: Floats) -> Floats:
-    return weights[:, None] * np.stack([np.ones_like(x), x, y, x * x, y * y, x * y], axis=1)
-
-
-def _correlations(sums: Floats) -> Floats:
-    """Correlate by the (k, 6) sums of `_products`; NaN where values are constant to rounding."""
-    weight, x, y, xx, yy, xy = sums.T
-    spread_x, spread_y = xx * weight - x * x, yy * weight - y * y
-    valid = (spread_x > 1e-12 * xx * weight) & (spread_y > 1e-12 * yy * weight)
-    return np.where(valid, (xy * weight - x * y) / np.sqrt(np.where(valid, spread_x * spread_y, 1.0)), np.nan)
+    A group of n is drawn n − 1 times, which makes the variance of the samples unbiased (Efron 1982, chapter 6).
+    """
+    generator = np.random.default_rng(0)
+    drawn = [generator.multinomial(max(size - 1, 1), np.full(size, 1 / size), size=N_DRAWS) for size in groups]
+    return np.concatenate([np.ones((1, sum(groups))), np.concatenate(drawn, axis=1)])

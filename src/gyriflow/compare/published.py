@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from ..geometry.alignment import MIRROR
-from ..geometry.triangles import Floats, Ints, TriangleMesh, transformed
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, convex_hull, transformed
 from ..settings.stages import CostSettings
 from ..settings.terms import FOLD_BANDS
-from .distances import aligned_distances
+from .comparison import aligned_distances
 from .sweeps import CROSSING_FACES, WEYL_NUMBER
 
 AGREEMENT_TOL = 0.1
@@ -29,7 +29,7 @@ NOT_RUN, AGREES, NOT_COMPARABLE = "not run", "as in the paper", "another machine
 NO_BANDS = "the bands are cut off or not resolved"
 NOT_TESTABLE, NOT_TESTED = "not testable", "not tested"
 MISSING = "–"
-REAL = "real "
+OBSERVED = "observed "
 """Prefix of observed brains among the brains of a table."""
 
 
@@ -51,14 +51,14 @@ class SweepTables:
 def comparison_caption(sweep: str, week: float, comparison: pd.DataFrame) -> str:
     """Describe the observed brains that a sweep is compared with, and note any of another population.
 
-    The comparison has the columns real, real_population, same_population.
+    The comparison has the columns observed, observed_population, same_population.
     """
-    observed = comparison.drop_duplicates("real")
+    observed = comparison.drop_duplicates("observed")
     if observed.empty:
         return f"No run of the sweep {sweep} has reached {week:g} GW."
-    names = ", ".join(f"{row.real} ({row.real_population})" for row in observed.itertuples())
+    names = ", ".join(f"{row.observed} ({row.observed_population})" for row in observed.itertuples())
     text = f"The sweep {sweep} at {week:g} GW, compared with {names}."
-    populations = sorted(set(observed.loc[~observed["same_population"].astype(bool), "real_population"]))
+    populations = sorted(set(observed.loc[~observed["same_population"].astype(bool), "observed_population"]))
     if populations:
         text += f" Note that {' and '.join(populations)} is another population than that of the start brain."
     return text
@@ -72,10 +72,10 @@ def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTa
     Returns
     -------
     DataFrame
-        study (name of the sweep), subject, real, hemisphere, measure, parameter, nearest (value of the nearest run),
-        run, distance, flag, paper (value that the paper reports), place (in the paper).
+        study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
+        run), run, distance, flag, paper (value that the paper reports), place (in the paper).
     """
-    columns = ["subject", "real", "hemisphere", "measure", "parameter", "nearest", "run", "distance", "flag"]
+    columns = ["subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run", "distance", "flag"]
     tables = [pd.DataFrame(columns=["study", *columns, "paper", "place"])]
     for entry in published["nearest"]:
         for name, sweep in sweeps.items():
@@ -98,6 +98,7 @@ def replication_table(
     used_rate: Any = None,
     from_back: float | None = None,
     mirror_mm: float | None = None,
+    surfaces: Mapping[str, TriangleMesh] | None = None,
 ) -> pd.DataFrame:
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
@@ -119,6 +120,8 @@ def replication_table(
         `place_of_largest` of the displacement from 24 to 25 GW.
     mirror_mm
         `mirror_distance` of the start brain's hemispheres.
+    surfaces
+        Whole pial surfaces of observed brains by id.
 
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.
@@ -129,6 +132,7 @@ def replication_table(
         _largest(published["largest"], from_back),
         _growth_rate(published["growth_rate"], rates, used_rate),
         *_modes(modes, _sweep_of(modes, sweeps)),
+        _gyrification(published["gyrification_index"], surfaces or {}),
     ]
     for entry in published["nearest"]:
         sweep = _sweep_of(entry, sweeps)
@@ -207,12 +211,20 @@ def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: Cost
         yield result, published["place"], paper, f"{value:.3g} ({size})", NOT_COMPARABLE
 
 
+def _gyrification(published: Mapping[str, Any], surfaces: Mapping[str, TriangleMesh]) -> tuple[str, ...]:
+    """Give the paper's index: pial area over that of one convex hull of both hemispheres, the fissure included."""
+    ratios = {brain: area(mesh) / area(convex_hull(mesh)) for brain, mesh in surfaces.items()}
+    here = "; ".join(f"{brain}: {ratio:.2f}" for brain, ratio in ratios.items())
+    verdict = NOT_TESTABLE if ratios else NOT_RUN
+    return published["finding"], published["place"], published["paper"], here or MISSING, verdict
+
+
 def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[tuple[str, ...]]:
     for side in ("right", "left"):
         here, verdict = MISSING, NOT_RUN
         if sweep:
             is_number = (sweep.comparison["measure"] == WEYL_NUMBER) & (sweep.comparison["hemisphere"] == side)
-            numbers = sweep.comparison.loc[is_number, ["value", "real_value"]].to_numpy(dtype=float)
+            numbers = sweep.comparison.loc[is_number, ["value", "observed_value"]].to_numpy(dtype=float)
             if numbers.size:
                 error = numbers.max() / published[side] - 1
                 here = f"{numbers.max():.0f}, the largest of {numbers.min():.0f} to {numbers.max():.0f}"
@@ -263,9 +275,9 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
             difference = pd.concat([left[band] - right[band] for band in ("B5", "B6")])
         holds = difference.dropna() > SHARE_TOL
     else:
-        is_real = shares.index.get_level_values("brain").str.startswith(REAL)
-        smallest_real = shares.loc[is_real, "B5"].groupby("hemisphere").min()
-        margin = (smallest_real - shares.loc[~is_real, "B5"].groupby("hemisphere").max()).dropna()
+        is_observed = shares.index.get_level_values("brain").str.startswith(OBSERVED)
+        smallest = shares.loc[is_observed, "B5"].groupby("hemisphere").min()
+        margin = (smallest - shares.loc[~is_observed, "B5"].groupby("hemisphere").max()).dropna()
         holds = margin > 0
     if holds.empty:
         return NO_BANDS, NOT_TESTABLE
@@ -281,7 +293,7 @@ def _cut_shares(comparison: pd.DataFrame) -> pd.DataFrame:
     """Return the share of each band in the cut spectra, a row per brain (simulated or observed) and hemisphere."""
     bands = {f"shape_index_relative_power_B{band}_weyl": f"B{band}" for band in FOLD_BANDS}
     rows = comparison[comparison["measure"].isin(bands) & (comparison["flag"] == "ok")]
-    observed = rows.assign(brain=REAL + rows["real"], value=rows["real_value"])
+    observed = rows.assign(brain=OBSERVED + rows["observed"], value=rows["observed_value"])
     both = pd.concat([rows.assign(brain=rows["run"]), observed]).replace({"measure": bands})
     table = both.pivot_table("value", ["brain", "hemisphere"], "measure", aggfunc="first")
     return table.reindex(columns=list(bands.values()))

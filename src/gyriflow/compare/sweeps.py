@@ -1,6 +1,6 @@
 """Sweeps: how far each run is from the observed brains of a week, and which run is nearest by each measure."""
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import pandas as pd
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
-from .distances import aligned_distances
+from .comparison import aligned_distances
 
 SIZE_METRICS = ("area", "volume", "gyrification_index")
 """Metrics whose relative difference from the observed brain is a measure of distance."""
@@ -25,14 +25,14 @@ COEFFICIENTS = ["subject", "run", "hemisphere", "mode", "band", "coefficient_sha
 """Columns of the coefficients that spectra are cut with."""
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
-DISTANCE_COLUMNS = ("hemisphere", "measure", "value", "real_value", "distance", "unit", "flag")
-"""Columns of `distances_to`."""
+_VALUES = ("value", "observed_value")
+DISTANCE_COLUMNS = ("hemisphere", "measure", *_VALUES, "distance", "unit", "flag")
 PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
     *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
 )
 """Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim paper."""
-LABELS = ("subject", "run", "real", "real_population", "same_population")
+LABELS = ("subject", "run", "observed", "observed_population", "same_population")
 COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
 
 Parts = Mapping[str, TriangleMesh]
@@ -64,17 +64,42 @@ def comparison_table(
     Returns
     -------
     DataFrame
-        The columns `COMPARISON_COLUMNS`: those of `distances_to`, after subject, run, observed brain and population.
+        The columns `COMPARISON_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
+        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
+        `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `area`, `volume`, `gyrification_index`
+        (distance: absolute relative difference); `weyl_number` and `crossing_faces` (no distance);
+        `spectral_distance_…`; `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of
+        `comparison.compare`).
     """
+    bands = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], ["hemisphere", "proxy", "band"])
+    measure = bands["proxy"].map(SPECTRUM_PREFIXES) + "relative_power_B" + bands["band"].astype(str)
+    complete, resolved = (
+        bands[name].astype(bool) & bands[f"{name}_observed"].astype(bool) for name in ("complete", "resolved")
+    )
+    values = (bands[name].where(complete) for name in ("relative_power", "relative_power_observed"))
+    bands = _with_distance(bands.assign(**dict(zip(_VALUES, values, strict=True)), measure=measure), resolved)
+
+    sizes = _pairs(metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])], ["hemisphere", "metric"])
+    sizes = sizes.rename(columns={"metric": "measure", "value_observed": "observed_value"}).assign(flag="ok")
+    distance = (sizes["value"] / sizes["observed_value"] - 1).abs()
+    sizes["distance"] = distance.where(~sizes["measure"].isin(WITHOUT_DISTANCE))
+
     spectral = spectral_distances(spectra)
-    spectral = spectral[spectral["run"] != MEASURED]
-    tables = []
-    for brain, parts in observed.items():
-        surfaces = {part: aligned_distances(simulated[part], mesh) for part, mesh in parts.items()}
-        same = populations[brain] == populations[subject]
-        labels: dict[str, Any] = dict(zip(LABELS, (subject, run, brain, populations[brain], same), strict=True))
-        tables.append(distances_to(brain, metrics, spectra, spectral, surfaces).assign(**labels)[COMPARISON_COLUMNS])
-    return joined_comparisons(tables)
+    spectral = spectral[(spectral["run"] != MEASURED) & spectral["real"].isin(observed)]
+    spectral = spectral.rename(columns={"real": "observed", "metric": "measure", "value": "distance"}).assign(unit="1")
+
+    surfaces = [
+        {"observed": brain, "hemisphere": part, "measure": f"surface_{name}", "distance": found[f"{name}_mm"]}
+        for brain, parts in observed.items()
+        for part, found in ((part, aligned_distances(simulated[part], mesh)) for part, mesh in parts.items())
+        for name in ("distance", "distance95")
+    ]
+    tables = [bands, sizes, spectral, pd.DataFrame(surfaces).assign(unit="mm", flag="ok")]
+    table = pd.concat([table.reindex(columns=COMPARISON_COLUMNS).dropna(axis=1, how="all") for table in tables])
+    population = table["observed"].map(populations)
+    table = table.assign(subject=subject, run=run, observed_population=population)
+    table["same_population"] = population == populations[subject]
+    return table.reindex(columns=COMPARISON_COLUMNS).sort_values("observed", kind="stable", ignore_index=True)
 
 
 def joined_comparisons(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -83,57 +108,18 @@ def joined_comparisons(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COMPARISON_COLUMNS)
 
 
-def distances_to(
-    observed: str,
-    metrics: pd.DataFrame,
-    spectra: pd.DataFrame,
-    spectral: pd.DataFrame,
-    surfaces: Mapping[str, Mapping[str, float]],
-) -> pd.DataFrame:
-    """Return the distances of one simulated brain from an observed one, a row per hemisphere and measure.
-
-    Parameters
-    ----------
-    observed
-        Id of the observed brain.
-    metrics, spectra
-        Rows of the simulated brain and of the observed one, whose `run` is "real".
-    spectral
-        Rows of `metrics.spangy.spectral_distances` of the simulated brain, with the column `real`.
-    surfaces
-        `distances.aligned_distances` by hemisphere.
-
-    Returns
-    -------
-    DataFrame
-        The columns `DISTANCE_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
-        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
-        `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `spectral_distance_…`;
-        `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of the surfaces); `area`, `volume`,
-        `gyrification_index` (distance: absolute relative difference); `weyl_number` and `crossing_faces` (no distance).
-    """
-    rows = [*_band_rows(observed, spectra), *_size_rows(observed, metrics)]
-    for row in spectral[spectral["real"] == observed].itertuples():
-        rows.append((row.hemisphere, row.metric, np.nan, np.nan, row.value, "1", row.flag))
-    for hemisphere, distances in surfaces.items():
-        for name in ("distance", "distance95"):
-            rows.append((hemisphere, f"surface_{name}", np.nan, np.nan, distances[f"{name}_mm"], "mm", "ok"))
-    return pd.DataFrame(rows, columns=list(DISTANCE_COLUMNS))
+def _pairs(table: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
+    """Join the rows of the simulated brain with those of each observed one (`observed`), whose columns end so."""
+    is_observed = table["run"] == MEASURED
+    pairs = table[~is_observed].merge(table[is_observed], on=keys, suffixes=("", "_observed"))
+    return pairs.assign(observed=pairs["subject_observed"])
 
 
-def _band_rows(observed: str, spectra: pd.DataFrame) -> Iterator[tuple]:
-    pairs = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], observed, ["hemisphere", "proxy", "band"])
-    for pair in pairs.sort_values("band", kind="stable").to_dict("records"):
-        values = pair["relative_power"], pair["relative_power_real"]
-        if not (pair["complete"] and pair["complete_real"]):
-            values = np.nan, np.nan
-        measure = f"{SPECTRUM_PREFIXES[pair['proxy']]}relative_power_B{pair['band']}"
-        yield _band_row(pair["hemisphere"], measure, *values, resolved=pair["resolved"] and pair["resolved_real"])
-
-
-def _band_row(hemisphere: str, measure: str, value: float, real_value: float, *, resolved: bool) -> tuple:
-    flag = NOT_RESOLVED if not resolved else "cut off" if np.isnan(value + real_value) else "ok"
-    return hemisphere, measure, value, real_value, abs(value - real_value) if flag == "ok" else np.nan, "1", flag
+def _with_distance(bands: pd.DataFrame, resolved: pd.Series) -> pd.DataFrame:
+    """Add the distance of shares of bands, the unit, and the flag: "ok", "cut off" (NaN) or `NOT_RESOLVED`."""
+    distance = (bands["value"] - bands["observed_value"]).abs()
+    flag = np.select([~resolved, distance.isna()], [NOT_RESOLVED, "cut off"], "ok")
+    return bands.assign(distance=distance.where(resolved), unit="1", flag=flag)
 
 
 def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.DataFrame:
@@ -152,38 +138,24 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
         simulated and observed brains in the comparison.
     """
     numbers = comparison[comparison["measure"] == WEYL_NUMBER]
-    cuts = numbers.groupby("hemisphere")[["value", "real_value"]].max().max(axis=1).to_dict()
+    cuts = numbers.groupby("hemisphere")[list(_VALUES)].max().max(axis=1).to_dict()
     shares = {}
     for (run, subject, side), modes in coefficients.groupby(["run", "subject", "hemisphere"]):
         cut = cuts.get(side, np.inf)
         powers = modes[modes["mode"] < cut].set_index("band")["coefficient_shape_index"] ** 2
         power = powers.groupby("band").sum().reindex(range(1, max(FOLD_BANDS) + 1))
         shares[run, subject, side] = power / power.sum() if len(modes) >= cut else power * np.nan
-    rows = []
-    flags = comparison.set_index(["run", "subject", "real", "hemisphere", "measure"])["flag"]
+    flags = comparison.set_index(["run", "subject", "observed", "hemisphere", "measure"])["flag"]
+    rows, resolved = [], []
     for row in numbers.to_dict("records"):
-        labels, side = [row[name] for name in LABELS], row["hemisphere"]
-        simulated, observed = shares[row["run"], row["subject"], side], shares[MEASURED, row["real"], side]
+        run, subject, brain, side = (row[name] for name in ("run", "subject", "observed", "hemisphere"))
         for band in FOLD_BANDS:
             name = f"shape_index_relative_power_B{band}"
-            resolved = flags[row["run"], row["subject"], row["real"], side, name] != NOT_RESOLVED
-            values = simulated[band], observed[band]
-            rows.append([*labels, *_band_row(side, f"{name}_weyl", *values, resolved=resolved)])
-    return joined_comparisons([comparison, pd.DataFrame(rows, columns=COMPARISON_COLUMNS)])
-
-
-def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
-    rows = metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])]
-    for pair in _pairs(rows, observed, ["hemisphere", "metric"]).to_dict("records"):
-        has_distance = pair["metric"] not in WITHOUT_DISTANCE
-        distance = abs(pair["value"] / pair["value_real"] - 1) if has_distance else np.nan
-        yield pair["hemisphere"], pair["metric"], pair["value"], pair["value_real"], distance, str(pair["unit"]), "ok"
-
-
-def _pairs(table: pd.DataFrame, observed: str, keys: list[str]) -> pd.DataFrame:
-    is_real = table["run"] == MEASURED
-    observed_rows = table[is_real & (table["subject"] == observed)]
-    return table[~is_real].merge(observed_rows, on=keys, suffixes=("", "_real"))
+            resolved.append(flags[run, subject, brain, side, name] != NOT_RESOLVED)
+            values = {"value": shares[run, subject, side][band], "observed_value": shares[MEASURED, brain, side][band]}
+            rows.append(row | values | {"measure": f"{name}_weyl"})
+    cut_bands = _with_distance(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.Series(resolved, dtype=bool))
+    return joined_comparisons([comparison, cut_bands])
 
 
 def member_row(
@@ -217,7 +189,7 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     Parameters
     ----------
     comparison
-        The columns subject, run, real and `DISTANCE_COLUMNS`.
+        The columns subject, run, observed and `DISTANCE_COLUMNS`.
     members
         Rows of `member_row`.
     varied
@@ -226,11 +198,11 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
     Returns
     -------
     DataFrame
-        subject, real, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
+        subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
         distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
         of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
     """
-    keys, varied = ["subject", "real", "hemisphere", "measure"], list(varied)
+    keys, varied = ["subject", "observed", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]
     table = comparison[comparison["distance"].notna() | (comparison["flag"] == NOT_RESOLVED)].merge(
         members[["subject", "run", *varied, "resolution"]], on=["subject", "run"]

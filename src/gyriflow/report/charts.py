@@ -162,7 +162,7 @@ def intervals_chart(ensemble: pd.DataFrame) -> Figure:
         week_axis(axes, ensemble["week"])
     extra: list[Artist] = [
         Line2D([], [], color=RUN_COLOURS[0], marker="o", markersize=2.5, label="run"),
-        Patch(color=NEUTRAL_COLOUR, label="90 % interval"),
+        Patch(color=NEUTRAL_COLOUR, label="interval"),
     ]
     extra += [star(OBSERVED_BRAIN)] if ensemble["observed"].notna().any() else []
     run_legend(figure, {}, extra=extra)

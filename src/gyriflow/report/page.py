@@ -149,7 +149,8 @@ def study_page(
     brains, pictures : as for `brains_table`
     figures : the output of `page_figures`
     norm : name of the norm's brains
-    prediction : the output of `Study.prediction_facts`, and `accuracy`, the content of `norms/predictions.yaml`
+    prediction : the output of `Study.prediction_facts`; `accuracy`, the content of `norms/predictions.yaml`; and
+        `tests`, the output of `compare.accuracy.prediction_facts`
     """
     runs, validation = tables.runs, tables.validation
     title, sentence, scores = "Measured cortical folding", quality_verdict(tables.quality), ""
@@ -157,6 +158,8 @@ def study_page(
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
         sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
         sentence = verdict(runs, validation, tables.warnings, sentence)
+        if prediction and validation is not None:
+            sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
         # without observed brains, a prediction has no scores
         scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
     if prediction:
@@ -346,7 +349,10 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
 
 
 def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
-    """Describe how accurate predictions over as many weeks were for brains with a later scan."""
+    """Describe how accurate predictions over as many weeks were for brains with a later scan.
+
+    Where the atlas' own brain was better, that comes first.
+    """
     rows, weeks_ahead = pd.DataFrame(prediction["accuracy"]["rows"]), prediction["week"] - prediction["start_week"]
     # the next longer horizon that was tested, or the longest
     horizon = min((tested for tested in rows["horizon"] if tested >= weeks_ahead - 1e-6), default=rows["horizon"].max())
@@ -368,11 +374,12 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
     simpler = f" On average the atlas' own brain was {words}; it is given beside the prediction." if better else ""
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
-        f"This is a prediction, not a scan. In tests over {horizon:g} weeks, the mean distance from the observed brain "
+        f"{prediction['tests']['advantage']} This is a prediction, not a scan. "
+        f"In tests over {horizon:g} weeks, the mean distance from the observed brain "
         f"and the correlation of shape index with it were {run} for predictions, {atlas} for the atlas' own brain and "
         f"{scaled} for the scaled start.{simpler}{beyond} The test brains were averages of many normal fetuses; the "
         "accuracy for a single fetus is unknown."
-    )
+    ).lstrip()
 
 
 def quality_verdict(quality: pd.DataFrame) -> str:
@@ -450,15 +457,15 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
         ends = " to ".join(text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high"))
         return f"{text(f'{name}_shape_index', pattern)} ({ends})" if len(validation) else "–"
 
-    has_skill = validation.get("skill_flag_shape_index", "ok") == "ok"
+    has_share = validation.get("gain_share_flag_shape_index", "ok") == "ok"
     return {
         "observed brain": f"{week_label(validation['week'])}, {validation['kind']}" if len(validation) else "none",
         "distance (mm)": text("distance_mm", ".2f"),
         "r": spread("r", ".2f"),
         "r of the scaled start": text("r_start_shape_index", ".2f"),
         "gain": spread("gain", "+.2f"),
-        "room": spread("room", "+.2f"),
-        "skill": spread("skill", ".2f") if has_skill else validation["skill_flag_shape_index"],
+        "headroom": spread("headroom", "+.2f"),
+        "gain / headroom": spread("gain_share", ".2f") if has_share else validation["gain_share_flag_shape_index"],
         "area (%)": text("area_difference", "+.1f", 100),
         "volume (%)": text("volume_difference", "+.1f", 100),
     }

@@ -47,13 +47,14 @@ def validation_chart(
 ) -> Figure:
     """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
 
-    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Stars are the room,
-    the gain of the observed brain of the week before; a dotted line is the start carried by registration alone.
+    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Stars are the
+    headroom, the gain of the observed brain of the week before; a dotted line is the start carried by registration
+    alone.
 
     Parameters
     ----------
     validation
-        Columns run, start_week, week, kind, and gain and room (gain_…, gain_low_…, gain_high_…) of each of
+        Columns run, start_week, week, kind, and gain and headroom (gain_…, gain_low_…, gain_high_…) of each of
         `COMPARED_MAPS`.
     ceiling : the same of the start carried by registration
     """
@@ -66,8 +67,9 @@ def validation_chart(
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
         for _, rows in validation.groupby("start_week"):
             weeks = rows.drop_duplicates("week")
-            room, bars = weeks[f"room_{measure}"], _bars(weeks, "room", measure)
-            axes.errorbar(weeks["week"], room, yerr=bars, fmt="*", color=OBSERVED_COLOUR, markersize=6, elinewidth=0.7)
+            headroom, bars = weeks[f"headroom_{measure}"], _bars(weeks, "headroom", measure)
+            style: dict[str, Any] = {"color": OBSERVED_COLOUR, "markersize": 6, "elinewidth": 0.7}
+            axes.errorbar(weeks["week"], headroom, yerr=bars, fmt="*", **style)
         for _, rows in [] if ceiling is None else ceiling.groupby("start_week"):
             gain = rows[f"gain_{measure}"]
             axes.plot(rows["week"], gain, ":", color=MUTED_COLOUR)
@@ -78,7 +80,7 @@ def validation_chart(
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
-    extra: list[Artist] = [star("room: observed brain of the week before", markersize=6)]
+    extra: list[Artist] = [star("headroom: observed brain of the week before", markersize=6)]
     if ceiling is not None and len(ceiling):
         extra.append(Line2D([], [], color=MUTED_COLOUR, linestyle=":", label="registration alone"))
     run_legend(figure, colours, extra=extra)
@@ -197,7 +199,7 @@ def nearest_chart(
     Parameters
     ----------
     comparison
-        Columns subject, real, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
+        Columns subject, observed, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
         parameter. If the flag or the resolution is not "ok", a distance is not reliable and its mark is open.
     varied : name of the column with the parameter's values
     subject, observed : the start brain, and the observed brains that it is compared with
@@ -210,7 +212,9 @@ def nearest_chart(
     InputError
         If there is no distance.
     """
-    rows = comparison[(comparison["subject"] == subject) & comparison["real"].isin(observed)].dropna(subset="distance")
+    rows = comparison[(comparison["subject"] == subject) & comparison["observed"].isin(observed)].dropna(
+        subset="distance"
+    )
     if rows.empty:
         raise InputError("no distance to an observed brain", found=f"{len(comparison)} rows")
     rows = rows.assign(at=rows[varied], trusted=(rows["resolution"] == "ok") & (rows["flag"] == "ok"))

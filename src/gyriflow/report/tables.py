@@ -228,8 +228,9 @@ def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     table = prediction.assign(model=models.where(prediction["model"] != "run", prediction["run"]))
     # simpler predictions are the same for all runs
     table = table.drop_duplicates(["start", "week", "model"]).set_index(["start", "week", "model"])
-    columns = ["r_shape_index", "distance_mm", "distance95_mm", "area_error", "volume_error", "crossing_faces"]
-    return table[[*columns, "roughness_ratio", "skill", "skill_low", "skill_high"]].rename(columns=plain)
+    columns = ["r_shape_index", "distance_mm", "distance95_mm", "area_difference", "volume_difference"]
+    columns += ["crossing_faces", "roughness_ratio", "skill", "skill_low", "skill_high"]
+    return table[[*columns, "r_less_atlas", "r_less_atlas_low", "r_less_atlas_high"]].rename(columns=plain)
 
 
 def predicted_table(
@@ -242,7 +243,7 @@ def predicted_table(
     Parameters
     ----------
     metrics : as for `metrics_table`
-    prediction : the output of `Study.prediction_facts`
+    prediction : the output of `Study.prediction_facts`, and `tests`, the output of `compare.accuracy.prediction_facts`
     centiles : of the study, as for `brain_table`
     intervals : the output of `compare.ensemble.interval_table`
     """
@@ -269,23 +270,27 @@ def predicted_table(
         if intervals is not None and key[1] == prediction["run"]:
             last = intervals[intervals["week"] == prediction["week"]].assign(name=_named).set_index("name")
             ends = zip(last["low"], last["high"], strict=True)
-            columns["90 % interval of the ensemble"] = pd.Series([f"{a:.4g} to {b:.4g}" for a, b in ends], last.index)
+            columns["interval of ensemble and tests"] = pd.Series([f"{a:.4g} to {b:.4g}" for a, b in ends], last.index)
     predicted, atlas_brain = (columns[head] for head in list(brains)[1:])
     columns["predicted less the atlas' (%)"] = (100 * (predicted / atlas_brain - 1)).map(_signed)
+    errors = {metric_title(metric): text for metric, text in prediction["tests"]["errors"].items()}
+    columns["error of such predictions"] = predicted.index.to_series().map(errors)
     return pd.DataFrame(columns).reindex(predicted.index).rename_axis("metric")
 
 
 def accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
     """Return the accuracy of predictions and simpler predictions: a row per horizon, with the range over the starts.
 
-    `accuracy` has rows (start, horizon in GW, model, distance_mm, r_shape_index, and area_error and volume_error as
-    fractions of the observed brain's), of models `run` and of `SIMPLER_PREDICTIONS`.
+    `accuracy` has rows (start, horizon in GW, model, distance_mm, r_shape_index, and area_difference and
+    volume_difference as fractions of the observed brain's), of models `run` and of `SIMPLER_PREDICTIONS`.
     """
     table: dict[Any, dict[str, str]] = {}
     for (horizon, model), rows in pd.DataFrame(accuracy["rows"]).groupby(["horizon", "model"]):
         distance, r = range_text(rows["distance_mm"]), range_text(rows["r_shape_index"])
         if model == "run":
-            errors = {f"{size} (%)": range_text(100 * rows[f"{size}_error"], "+.1f") for size in ("area", "volume")}
+            errors = {
+                f"{size} (%)": range_text(100 * rows[f"{size}_difference"], "+.1f") for size in ("area", "volume")
+            }
             table[horizon] = {"prediction: distance (mm)": distance, "r": r} | errors | table.get(horizon, {})
         else:
             table.setdefault(horizon, {})[SIMPLER_PREDICTIONS[str(model)]] = f"{distance} mm, r {r}"

@@ -66,10 +66,10 @@ VALIDATION = Kind(
     caption=(
         "Gain: the correlation r of the shape index (a) and of the mean curvature (b) with those of the observed "
         "brain, less the r of the scaled start brain. Above 0, the simulation places folds better than the scaled "
-        "start. Stars: room, the gain of the observed brain of the week before; there is no room for skill where its "
-        "interval reaches 0. Bars: 95 % intervals of a bootstrap over patches of this one brain, not over subjects. "
-        "Filled marks: explained weeks, whose observed brains gave the growth; open marks: predicted weeks. Dotted: "
-        "the start carried to the observed brain by registration."
+        "start. Stars: headroom, the gain of the observed brain of the week before. Bars: 95 % intervals of a "
+        "bootstrap over the modes of this one brain's surface, not over subjects. Filled marks: explained weeks, whose "
+        "observed brains gave the growth; open marks: predicted weeks. Dotted: the start carried to the observed brain "
+        "by registration."
     ),
     target="validate",
     job="validation_charts",

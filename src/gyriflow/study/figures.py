@@ -393,9 +393,10 @@ INTERVALS = Kind(
     section="Folding",
     title="Intervals of the ensemble",
     caption=(
-        "Run *{run}* (line) and the 90 % prediction interval for one further member of its ensemble (band). Members "
+        "Run *{run}* (line) and the interval for one further member of its ensemble, of 90 % (band). Members "
         "differ in registrations, in labels and, for predictions, in age, atlas and persistence of individual "
-        "differences. Stars: observed brains. Bands of predictions include the errors of such predictions in tests."
+        "differences. Stars: observed brains. Bands of predictions include the largest error of such predictions in "
+        "tests, and contain as many brains as `ensemble.csv` says (`coverage`), at most."
     ),
 )
 POSITION_SPREAD = Kind(

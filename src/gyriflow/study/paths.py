@@ -114,7 +114,7 @@ FOLDING = {
 
 PREPARED = {
     f"{name}{suffix}": f"{STUDY}/validation/{{brain}}/{WEEK}/{name}{ending}.gii"
-    for name in ("real", "start", "adjacent")
+    for name in ("observed", "start", "adjacent")
     for suffix, ending in (("", ".surf"), ("_maps", ".shape"))
 }
 """Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""

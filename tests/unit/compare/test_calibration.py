@@ -13,20 +13,19 @@ from gyriflow.compare.calibration import (
     propose_runs,
     require_bands,
     run_score,
-    shape_scores,
-    size_score,
     sobol_design,
     spectral_scores,
     to_unit_box,
 )
+from gyriflow.compare.comparison import ObservedBrain, compare, observed_brain
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
 
-from .bumpy import PREPARED, RADIUS, REAL, bumpy, shaped
+from .bumpy import PREPARED, RADIUS, REAL, bumpy
 
 BOUNDS = {"thickness_mm": (1.0, 3.0), "growth_rate_per_s": (1e-7, 5e-7)}
 TRUTH = {"thickness_mm": 1.7, "growth_rate_per_s": 3.2e-7}
-SCORES = ("shape_index", "mean_curvature", "curvature_distribution")
+OBSERVED = ObservedBrain("b", REAL, PREPARED)
 
 
 def scored(design):
@@ -73,7 +72,9 @@ def test_the_thickness_of_a_brain_is_recovered_from_its_spectrum(name):
 
     def runs(design):
         pairs = [[(folded(thickness), truth)] for thickness in design["thickness_mm"]]
-        scores = [run_score([(REAL, REAL)], {name: 1.0}, [], radius_mm=3.0, spectra=pair)["score"] for pair in pairs]
+        scores = [
+            run_score([(REAL, OBSERVED)], {name: 1.0}, [], radius_mm=3.0, spectra=pair)["score"] for pair in pairs
+        ]
         return design.assign(score=scores)
 
     found = runs(sobol_design(bounds, 6, seed=0))
@@ -88,6 +89,17 @@ def test_spectral_scores_are_of_mean_curvature_and_0_for_the_same_spectrum():
     assert spectral_scores(both[0], both[0]) == pytest.approx(dict.fromkeys(spectral_scores(*both), 0.0))
     share = [folded(thickness)["relative_power"][4] for thickness in (1.7, 2.4)]
     assert spectral_scores(*both)["relative_power_b5"] == pytest.approx(abs(share[0] - share[1]))
+
+
+def test_sides_that_differ_in_opposite_directions_do_not_cancel():
+    def brain(left, right):
+        sides = [
+            folded(1.7).assign(hemisphere=side, relative_power=x) for side, x in (("left", left), ("right", right))
+        ]
+        return pd.concat(sides)
+
+    # the share is 0.1 larger on the left and 0.05 smaller on the right
+    assert spectral_scores(brain(0.4, 0.25), brain(0.3, 0.3))["relative_power_b4"] == pytest.approx(0.075)
 
 
 @pytest.mark.fault(86)
@@ -114,8 +126,13 @@ def test_a_diverged_run_keeps_others_away():
     assert surrogate.scores[thick] == pytest.approx(worst + (worst - best))
     assert surrogate.scores[~thick] == pytest.approx(runs["score"][~thick])
     assert (propose_runs(surrogate, 3)["thickness_mm"] < 2.4).all()
-    with pytest.raises(ValueError, match=r"\b0 "):
-        fit_surrogate(runs.assign(score=np.nan), BOUNDS, seed=0)
+    diverged = runs.assign(score=np.nan, cause="det F of an element is 0")
+    diverged.loc[0, "score"] = 0.3
+    message = Facts(
+        "1 of 12 runs", "det F of an element is 0", "two or more", "calibrate.parameters", "calibrate.rounds"
+    )
+    with pytest.raises(InputError, check=message):
+        fit_surrogate(diverged, BOUNDS, seed=0)
 
 
 def test_values_take_their_places_in_the_parameters():
@@ -138,44 +155,39 @@ def test_values_take_their_places_in_the_parameters():
     assert base["contact"]["gap_mm"] == 2.5
 
 
-def test_the_same_brain_has_the_score_0():
-    shape = PREPARED
-    assert shape_scores(shape, shape) == pytest.approx(dict.fromkeys(SCORES, 0.0), abs=1e-9)
-    assert size_score(shape.mesh, shape.mesh) == 0
+def scores(surface, *names):
+    return brain_scores(surface, OBSERVED, names, radius_mm=3.0)
 
 
 def test_other_folds_of_the_same_height_differ_in_place_and_not_in_distribution():
-    one, same, other = PREPARED, shaped(bumpy(1, height=1.05)), shaped(bumpy(2))
-    near, far = shape_scores(same, one), shape_scores(other, one)
+    near, far = (scores(mesh, "shape_index", "mean_curvature") for mesh in (bumpy(1, height=1.05), bumpy(2)))
+    row, _ = compare(bumpy(2), OBSERVED, radius_mm=3.0, groups=["folds"])
+    assert far == pytest.approx({name: 1 - row[f"r_{name}"] for name in far})
+    assert abs(far["shape_index"] - far["mean_curvature"]) > 0.001
     assert near["shape_index"] < 0.1 < far["shape_index"]
     assert near["mean_curvature"] < 0.1 < far["mean_curvature"]
-    flat = shape_scores(shaped(bumpy(1, height=0.05)), one)
-    assert flat["curvature_distribution"] > 3 * far["curvature_distribution"]
-
-
-def test_a_brain_scaled_by_a_tenth_differs_in_area_and_volume():
-    larger = TriangleMesh(1.1 * REAL.vertices, REAL.faces)
-    assert size_score(larger, REAL) == pytest.approx(np.hypot(1.1**2 - 1, 1.1**3 - 1))
+    flat, other = (scores(mesh, "curvature_distribution") for mesh in (bumpy(1, height=0.05), bumpy(2)))
+    assert flat["curvature_distribution"] > 3 * other["curvature_distribution"]
 
 
 def test_a_brain_has_the_scores_that_are_asked_for():
     larger = TriangleMesh(1.05 * REAL.vertices, REAL.faces)
-    assert brain_scores(larger, REAL, ["size"], radius_mm=3.0) == {"size": size_score(larger, REAL)}
-    found = brain_scores(larger, REAL, ["surface_distance", "shape_index", "curvature_distribution"], radius_mm=3.0)
+    assert scores(larger, "size") == {"size": pytest.approx(np.hypot(1.05**2 - 1, 1.05**3 - 1))}
+    found = scores(larger, "surface_distance", "shape_index", "curvature_distribution")
     assert list(found) == ["surface_distance", "shape_index", "curvature_distribution"]
     assert found["surface_distance"] == pytest.approx(0.05 * RADIUS, rel=0.05)
     # folds are compared after scaling
     assert found["shape_index"] == pytest.approx(0, abs=0.05)
     assert found["curvature_distribution"] == pytest.approx(0, abs=0.002)
-    other = brain_scores(bumpy(2), REAL, ["shape_index"], radius_mm=3.0)
-    assert other["shape_index"] > 0.5
+    observed = observed_brain("b", REAL, 3.0)
+    assert brain_scores(bumpy(2), observed, ["shape_index"], radius_mm=3.0)["shape_index"] > 0.5
 
 
 def test_a_run_has_the_weighted_sum_of_the_means_over_its_pairs():
     first, second = (TriangleMesh(factor * REAL.vertices, REAL.faces) for factor in (1.05, 1.15))
     weights = {"size": 2.0, "surface_distance": 0.5}
-    found = run_score([(first, REAL), (second, REAL)], weights, [], radius_mm=3.0)
-    size = (size_score(first, REAL) + size_score(second, REAL)) / 2
+    found = run_score([(first, OBSERVED), (second, OBSERVED)], weights, [], radius_mm=3.0)
+    size = np.mean([np.hypot(factor**2 - 1, factor**3 - 1) for factor in (1.05, 1.15)])
     assert found["size"] == pytest.approx(size)
     assert found["surface_distance"] == pytest.approx(0.1 * RADIUS, rel=0.05)
     assert found["score"] == pytest.approx(2 * size + 0.5 * found["surface_distance"])
@@ -183,6 +195,6 @@ def test_a_run_has_the_weighted_sum_of_the_means_over_its_pairs():
 
 
 def test_a_run_that_has_diverged_has_no_score_whatever_its_other_brains_are():
-    found = run_score([(REAL, REAL)], {"size": 1.0}, ["det F", "no step"], radius_mm=3.0)
+    found = run_score([(REAL, OBSERVED)], {"size": 1.0}, ["det F", "no step"], radius_mm=3.0)
     assert np.isnan([found["score"], found["size"]]).all()
     assert (found["outcome"], found["cause"]) == ("diverged", "det F; no step")

@@ -45,7 +45,11 @@ def test_displacement_is_compared_over_the_weeks_that_both_have(tmp_path):
 
 def test_a_carried_mesh_is_compared_with_the_observed_brain_of_each_week(tmp_path):
     """The carried mesh is the observed brain of each week; the start has the opposite folds, the brain before equal."""
-    weeks, axes, folds = (22.0, 24.0), ((20.0, 24.0, 22.0), (26.0, 26.0, 26.0)), {"real": 1, "start": -1, "adjacent": 1}
+    weeks, axes, folds = (
+        (22.0, 24.0),
+        ((20.0, 24.0, 22.0), (26.0, 26.0, 26.0)),
+        {"observed": 1, "start": -1, "adjacent": 1},
+    )
     pose, observed = Pose(rigid(0, 0, 90, shift=(3, 0, 0))), [ellipsoid(half) for half in axes]
     boundary, _ = boundary_surface(MESH)
     shapes = [np.divide(half, 20.0) * boundary.vertices for half in ([20.0] * 3, [10.0] * 3, *axes)]
@@ -63,15 +67,21 @@ def test_a_carried_mesh_is_compared_with_the_observed_brain_of_each_week(tmp_pat
             pattern = sign * np.random.default_rng(0).normal(size=len(surface.vertices))
             maps = {"mean_curvature": 0.1 * pattern, "shape_index": np.tanh(pattern)}
             write_vertex_maps(tmp_path / f"{name}-{week}.gii", maps)
-    params = {"run": "registration", "kind": "explained", "start_week": 21.0, "weeks": weeks, "real": ["b22", "b24"]}
+    params = {
+        "run": "registration",
+        "kind": "explained",
+        "start_week": 21.0,
+        "weeks": weeks,
+        "observed": ["b22", "b24"],
+    }
     params |= {"carried_weeks": [21.0, 21.5, *weeks], "curvature_radius_mm": 3.0}
     job = {"params": params, "wildcards": SimpleNamespace(brain="b21")}
     run_script("registration_ceiling.py", tmp_path, inputs, {"table": "ceiling.csv", "carried": "carried.h5"}, **job)
     table = read_table(tmp_path / "ceiling.csv")
-    assert table[["run", "kind", "start", "real", "week", "horizon"]].to_numpy().tolist() == [
+    assert table[["run", "kind", "start", "observed", "week", "horizon"]].to_numpy().tolist() == [
         ["registration", "explained", "b21", f"b{week:g}", week, week - 21] for week in weeks
     ]
-    assert table["real_area_cm2"].tolist() == pytest.approx([area(surface) / 100 for surface in observed])
+    assert table["observed_area_cm2"].tolist() == pytest.approx([area(surface) / 100 for surface in observed])
     assert (table["distance_mm"].max() < 0.4, table["volume_difference"].abs().max() < 0.1) == (True, True)
     assert table["r_start_shape_index"].tolist() == pytest.approx([-1, -1])
     assert table["r_adjacent_mean_curvature"].tolist() == pytest.approx([1, 1])

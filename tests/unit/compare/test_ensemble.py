@@ -6,7 +6,7 @@ import pytest
 from scripts import run_script
 from shapes import rigid, sphere
 
-from gyriflow.compare.ensemble import ensemble_maps, interval_table, method_errors, prediction_interval
+from gyriflow.compare.ensemble import ensemble_maps, interval_table, spread_of_members
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_table, write_table
@@ -15,13 +15,14 @@ from gyriflow.io.surfaces import read_vertex_maps, write_surface, write_vertex_m
 
 def test_an_interval_contains_a_further_value_as_often_as_it_says():
     values = np.random.default_rng(0).normal(5, 2, size=(20_000, 7))
-    ends = np.array([prediction_interval(row[:6]) for row in values])
-    assert np.mean((ends[:, 0] <= values[:, 6]) & (values[:, 6] <= ends[:, 1])) == pytest.approx(0.9, abs=0.01)
+    for level in (2 / 3, 0.9):
+        half = np.array([spread_of_members(row[:6], level) for row in values])
+        inside = np.abs(values[:, 6] - values[:, :6].mean(axis=1)) <= half
+        assert np.mean(inside) == pytest.approx(level, abs=0.01)
     # t of 5 degrees of freedom
-    assert prediction_interval([0.0, 0, 0, 1, 1, 1])[1] == pytest.approx(
-        0.5 + 2.0150 * np.sqrt(0.3) * np.sqrt(7 / 6), rel=1e-4
-    )
-    assert np.isnan(prediction_interval([1.0])).all()
+    values = np.array([0.0, 0, 0, 1, 1, 1])
+    assert spread_of_members(values, 0.9) == pytest.approx(2.0150 * np.sqrt(0.3) * np.sqrt(7 / 6), rel=1e-4)
+    assert np.isnan(spread_of_members(np.ones(1), 0.9))
 
 
 def metrics(week, area, hemisphere="whole"):
@@ -47,26 +48,57 @@ def test_intervals_are_of_the_members_that_reached_a_week_and_say_whether_they_c
     assert area["contains_observed"].tolist()[:2] == [True, False]
     assert area[["contains_observed", "low"]].loc[28].isna().all()
     # equal members have an interval of one value
-    assert found.loc[("volume", 24.0), ["low", "high"]].tolist() == [10, 10]
+    assert found.loc[("volume", 24.0), ["low", "high"]].tolist() == pytest.approx([10, 10])
+    assert set(found["coverage"].dropna()) == {0.9}
 
 
-def test_tested_errors_of_predictions_widen_intervals_with_the_horizon():
-    rows = [("run", 2.0, 0.03), ("run", 2.0, -0.04), ("run", 4.0, 0.1), ("scaled", 2.0, 9.0)]
-    tests = [{"model": model, "horizon": h, "area_error": e, "volume_error": 0.0} for model, h, e in rows]
-    found = {horizon: method_errors(tests, horizon)["area"] for horizon in (0.0, 1.0, 2.0, 4.0, 9.0)}
-    two = np.sqrt((0.03**2 + 0.04**2) / 2)
-    assert found == pytest.approx({0.0: 0, 1.0: two / 2, 2.0: two, 4.0: 0.1, 9.0: 0.1})
-    # a metric that was tested in some of the brains only
-    tests[0] |= {"gyrification_index_error": 0.02}
-    assert method_errors(tests, 2.0) == pytest.approx({"area": two, "volume": 0.0, "gyrification_index": 0.02})
-    run = pd.concat([metrics(24.0, 100), metrics(28.0, 140)])
-    members = pd.concat([metrics(28.0, area) for area in (139, 140, 141)])
+def test_members_spread_and_tested_error_are_added_in_logarithms():
+    tests = [
+        {"start": start, "start_week": 22, "horizon": h, "model": "run", "protocol": "default", "area_difference": e}
+        for start, errors in (("a", (0.02, 0.10)), ("b", (-0.03, -0.08)))
+        for h, e in zip((2.0, 4.0), errors, strict=True)
+    ]
+    run = pd.concat([metrics(24.0, 100), metrics(26.0, 120), metrics(28.0, 140)])
+    members = pd.concat([metrics(week, area) for week in (26.0, 28.0) for area in (139, 140, 142)])
     wide, narrow = (interval_table(run, members, run[:0], given).set_index(["metric", "week"]) for given in (tests, []))
-    # t of two degrees of freedom, and the normal distribution
-    half = np.hypot(2.9200 * np.sqrt(4 / 3), 1.6449 * 14.0)
-    assert wide.loc[("area", 28.0), ["low", "high"]].tolist() == pytest.approx([140 - half, 140 + half], rel=1e-4)
-    assert wide.loc[("volume", 28.0), "high"] == narrow.loc[("volume", 28.0), "high"] == 10
-    assert np.isnan(narrow.loc[("area", 28.0), "method_sd"])
+    logs = np.log([139, 140, 142])
+    row = wide.loc[("area", 28.0)]
+    assert row[["tested_starts", "coverage"]].tolist() == [2, pytest.approx(2 / 3)]
+    assert row["largest_error"] == pytest.approx(0.10)
+    # t of two degrees of freedom at 2/3
+    half = np.hypot(1.3207 * logs.std(ddof=1) * np.sqrt(4 / 3), np.log(1.10))
+    assert row[["low", "high"]].tolist() == pytest.approx(list(np.exp(logs.mean() + np.array([-half, half]))), rel=1e-3)
+    assert narrow.loc[("area", 28.0), "largest_error":"bias"].isna().all()
+    # t of two degrees of freedom at 0.9
+    half = 2.9200 * logs.std(ddof=1) * np.sqrt(4 / 3)
+    assert narrow.loc[("area", 28.0), "high"] == pytest.approx(np.exp(logs.mean() + half), rel=1e-4)
+    # a metric that was not tested
+    assert wide.loc[("volume", 28.0), "high"] == pytest.approx(10)
+
+
+def test_a_later_interval_is_not_narrower_and_the_index_is_that_of_the_folding():
+    def brain(week, index):
+        return metrics(week, 1.0).replace("thickness_sd", "gyrification_index").assign(value=index)
+
+    run = pd.concat([brain(24.0, 1.08), brain(26.0, 1.18)])
+    members = pd.concat([*(brain(24.0, x) for x in (1.06, 1.10)), *(brain(26.0, x) for x in (1.18, 1.1801))])
+    found = interval_table(run, members, run[:0]).set_index(["metric", "week"]).loc["gyrification_index"]
+    halves = [np.log((row["high"] - 0.98) / (row["low"] - 0.98)) / 2 for _, row in found.iterrows()]
+    assert halves[0] == pytest.approx(6.3138 * np.log(0.12 / 0.08) / np.sqrt(2) * np.sqrt(3 / 2), rel=1e-3)
+    assert halves[1] == pytest.approx(halves[0])
+
+
+def test_a_corrected_bias_moves_the_interval():
+    tests = [
+        {"start": start, "start_week": 22, "horizon": 2.0, "model": "run", "protocol": "default", "area_difference": e}
+        for start, e in (("a", 0.25), ("b", 0.24), ("c", 0.26))
+    ]
+    run = pd.concat([metrics(22.0, 80), metrics(24.0, 100)])
+    members = pd.concat([metrics(24.0, 100), metrics(24.0, 100)])
+    row = interval_table(run, members, run[:0], tests).set_index(["metric", "week"]).loc[("area", 24.0)]
+    assert (row["is_corrected"], row["bias"]) == (True, pytest.approx(0.25, abs=1e-3))
+    assert np.sqrt(row["low"] * row["high"]) == pytest.approx(80, rel=1e-3)
+    assert row["high"] < 83
 
 
 def test_spread_is_that_of_places_after_rigid_alignment():

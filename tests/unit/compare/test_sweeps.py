@@ -26,12 +26,13 @@ from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     NO_NEAREST,
     comparison_table,
-    distances_to,
     joined_comparisons,
     member_row,
     nearest_runs,
     with_common_cut,
 )
+from gyriflow.geometry.alignment import motion
+from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.settings.stages import CostSettings
 
@@ -55,33 +56,44 @@ METRICS = pd.DataFrame(
     ],
     columns=["run", "subject", "hemisphere", "metric", "value", "unit"],
 )
-SPECTRAL = pd.DataFrame(
-    {"real": ["b"], "hemisphere": "left", "metric": "spectral_distance_B4", "value": 0.2, "flag": "ok"}
-)
-SURFACES = {"whole": {"distance_mm": 1.5, "distance95_mm": 2.5}}
+
+
+def parts(radius):
+    return {"whole": sphere(radius, 3), "left": sphere(radius / 2, 3)}
 
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
-    table = distances_to("b", METRICS, both, SPECTRAL, SURFACES).set_index(["hemisphere", "measure"])
+    both = both.assign(week=28.0, power=both["relative_power"])
+    surfaces = [{"whole": sphere(radius, 3)} for radius in (10.0, 11.5)]
+    table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surfaces[0], {"b": surfaces[1]})
+    table = table.set_index(["hemisphere", "measure"])
     assert table["distance"].dropna().to_dict() == {
         ("left", "relative_power_B4"): pytest.approx(0.1),
         ("left", "relative_power_B5"): pytest.approx(0.1),
         ("left", "shape_index_relative_power_B4"): pytest.approx(0.2),
         ("left", "shape_index_relative_power_B5"): pytest.approx(0.2),
         ("whole", "area"): pytest.approx(0.1),
-        ("left", "spectral_distance_B4"): 0.2,
-        ("whole", "surface_distance"): 1.5,
-        ("whole", "surface_distance95"): 2.5,
+        ("whole", "surface_distance"): pytest.approx(1.5, abs=0.05),
+        ("whole", "surface_distance95"): pytest.approx(1.5, abs=0.05),
     }
     assert table.loc[("left", "relative_power_B6"), "flag"] == "not resolved"
-    assert table.loc[("left", "relative_power_B4"), "real_value"] == 0.4
+    assert table.loc[("left", "relative_power_B4"), "observed_value"] == 0.4
     # the number of modes has no distance
-    assert tuple(table.loc[("left", "weyl_number"), ["value", "real_value"]]) == (600, 700)
+    assert tuple(table.loc[("left", "weyl_number"), ["value", "observed_value"]]) == (600, 700)
+    assert (table.loc[("whole", "area"), "unit"], table.loc[("left", "weyl_number"), "unit"]) == ("cm2", "1")
 
 
-def parts(radius):
-    return {"whole": sphere(radius, 3), "left": sphere(radius / 2, 3)}
+def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
+    both = pd.concat(
+        [spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1)).assign(complete=False)]
+    )
+    both = both.assign(week=28.0, power=both["relative_power"])
+    surface = {"whole": sphere(10.0, 2)}
+    table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surface, {"b": surface})
+    (row,) = table[table["measure"] == "relative_power_B4"].to_dict("records")
+    assert row["flag"] == "cut off"
+    assert np.isnan([row["value"], row["observed_value"], row["distance"]]).all()
 
 
 def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named():
@@ -100,12 +112,12 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
     table = comparison_table("sim", "a", populations, metrics, both, parts(10.0), observed)
     assert list(table) == COMPARISON_COLUMNS
     assert set(table["subject"] + table["run"]) == {"asim"}
-    named = table.groupby("real")[["real_population", "same_population"]].first()
+    named = table.groupby("observed")[["observed_population", "same_population"]].first()
     assert named.to_dict("index") == {
-        "b": {"real_population": "normal", "same_population": True},
-        "c": {"real_population": "operated", "same_population": False},
+        "b": {"observed_population": "normal", "same_population": True},
+        "c": {"observed_population": "operated", "same_population": False},
     }
-    distances = table.set_index(["real", "hemisphere", "measure"])["distance"]
+    distances = table.set_index(["observed", "hemisphere", "measure"])["distance"]
     assert distances["b", "whole", "area"] == pytest.approx(0.1)
     assert distances["c", "whole", "area"] == pytest.approx(0.5)
     assert distances["b", "whole", "surface_distance"] == pytest.approx(2.0, abs=0.1)
@@ -137,9 +149,9 @@ MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 
 
 def compared(**distances):
     rows = [
-        {"subject": "a", "run": run, "real": "b", "real_population": "other", "same_population": False,
+        {"subject": "a", "run": run, "observed": "b", "observed_population": "other", "same_population": False,
          "hemisphere": "left", "measure": "shape_index_relative_power_B4",
-         "value": 0.1, "real_value": 0.3, "distance": distance, "unit": "1", "flag": "ok"}
+         "value": 0.1, "observed_value": 0.3, "distance": distance, "unit": "1", "flag": "ok"}
         for run, distance in distances.items()
     ]  # fmt: skip
     return pd.DataFrame(rows)
@@ -169,10 +181,10 @@ def coefficients(run, subject, *bands):
 
 
 def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared():
-    number = {"measure": "weyl_number", "value": 5.0, "real_value": 6.0, "unit": "1", "flag": "ok"}
+    number = {"measure": "weyl_number", "value": 5.0, "observed_value": 6.0, "unit": "1", "flag": "ok"}
     known = {"measure": "shape_index_relative_power_B5", "flag": "not resolved"}
     bands = [{"measure": f"shape_index_relative_power_B{band}", "flag": "ok"} for band in (4, 6)]
-    labels = {"subject": "a", "real": "b", "real_population": "", "same_population": True, "hemisphere": "left"}
+    labels = {"subject": "a", "observed": "b", "observed_population": "", "same_population": True, "hemisphere": "left"}
     rows = [{**labels, "run": run, **row} for run in ("thin", "few") for row in (number, known, *bands)]
     modes = [
         coefficients("thin", "a", 4, 4, 5, 5, 6, 6),
@@ -180,7 +192,7 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
         coefficients("real", "b", 4, 5, 5, 5, 5, 6),
     ]
     table = with_common_cut(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.concat(modes))
-    table = table.set_index(["run", "measure"])[["value", "real_value", "distance", "flag"]]
+    table = table.set_index(["run", "measure"])[["value", "observed_value", "distance", "flag"]]
     cut = {band: tuple(table.loc["thin", f"shape_index_relative_power_B{band}_weyl"]) for band in (4, 5, 6)}
     nan = pytest.approx(float("nan"), nan_ok=True)
     # modes 1 to 5: two of B4, two of B5, one of B6 against one and four; its own number, 5, would leave B6 out
@@ -209,8 +221,8 @@ def sweep(shares: dict[tuple[str, str], tuple[float, ...]], real: tuple[float, .
         rows += [(run, side, f"shape_index_relative_power_B{band}_weyl", value, true) for band, value, true in cut]
         rows.append((run, "whole", "crossing_faces", crossing, 0))
         rows.append((run, side, "weyl_number", 1800.0 if side == "left" else 700.0, 600.0))
-    comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "real_value"]).assign(
-        real="r28", flag="ok"
+    comparison = pd.DataFrame(rows, columns=["run", "hemisphere", "measure", "value", "observed_value"]).assign(
+        observed="r28", flag="ok"
     )
     members = pd.DataFrame({"run": ["thin", "thick"], "outcome": ["finished", "diverged"]})
     nearest = pd.DataFrame(
@@ -350,9 +362,19 @@ def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
     assert list(none) == list(table)
 
 
+def test_the_papers_gyrification_index_has_one_hull_for_both_hemispheres():
+    # a ball of 10 mm on either side, 30 mm apart: two spheres over a capsule
+    halves = [transformed(sphere(10.0, 4), motion(shift=(x, 0, 0))) for x in (-15, 15)]
+    found = verdicts(moves(), surfaces={"half": halves[0], "both": merged(*halves)})
+    ratio = 2 * 4 * np.pi * 100 / (4 * np.pi * 100 + 2 * np.pi * 10 * 30)
+    name = PUBLISHED["gyrification_index"]["finding"]
+    assert found[name] == (f"half: 1.00; both: {ratio:.2f}", NOT_TESTABLE)
+    assert verdicts(moves())[name] == (MISSING, NOT_RUN)
+
+
 def test_a_caption_names_the_observed_brains_and_another_population():
     table = compared(t1=0.3)
-    both = pd.concat([table, table.assign(real="c")])
+    both = pd.concat([table, table.assign(observed="c")])
     mixed, same = (
         comparison_caption("thickness", 28.0, both.assign(same_population=known)) for known in ([False, True], True)
     )

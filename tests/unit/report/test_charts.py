@@ -324,7 +324,7 @@ def gains(runs, weeks=(22, 23, 24)):
             row = {"run": run, "start_week": 21, "week": week, "kind": "predicted" if week > 23 else "explained"}
             for measure in ("shape_index", "mean_curvature"):
                 gain = 0.01 * (number + week - 21)
-                for name, value in (("gain", gain), ("room", 0.2)):
+                for name, value in (("gain", gain), ("headroom", 0.2)):
                     ends = {f"{name}_low_{measure}": value - 0.02, f"{name}_high_{measure}": value + 0.02}
                     row |= {f"{name}_{measure}": value} | ends
             rows.append(row)
@@ -388,7 +388,7 @@ def test_each_sulcus_has_a_row_with_its_weeks():
 
 def distances(values: dict[float, float], flag: str = "ok", **labels: str) -> pd.DataFrame:
     table = pd.DataFrame({"thickness_mm": list(values), "distance": list(values.values())})
-    table = table.assign(subject="s", real="r", unit="mm", flag=flag, resolution="ok")
+    table = table.assign(subject="s", observed="r", unit="mm", flag=flag, resolution="ok")
     return table.assign(**({"hemisphere": "whole", "measure": "hausdorff95"} | labels))
 
 

@@ -56,8 +56,9 @@ VALIDATION = pd.DataFrame(
         "volume_difference": [0.0, 0.02], "r_shape_index": [0.1, 0.566], "r_start_shape_index": [0.1, 0.568],
         "r_low_shape_index": [0.0, 0.51], "r_high_shape_index": [0.2, 0.61], "distance_mm": [0.1, 0.42],
         "gain_shape_index": [0.0, -0.002], "gain_low_shape_index": [0.0, -0.044], "gain_high_shape_index": [0.0, 0.045],
-        "room_shape_index": [0.0, 0.03], "room_low_shape_index": [0.0, -0.05], "room_high_shape_index": [0.0, 0.08],
-        "skill_shape_index": [np.nan, np.nan], "skill_flag_shape_index": "no room",
+        "headroom_shape_index": [0.0, 0.03],
+        "headroom_low_shape_index": [0.0, -0.05], "headroom_high_shape_index": [0.0, 0.08],
+        "gain_share_shape_index": [np.nan, np.nan], "gain_share_flag_shape_index": "no headroom",
     }
 )  # fmt: skip
 
@@ -186,6 +187,8 @@ def foretold(weeks: float) -> dict:
     return {
         "run": "thin", "brain": "young", "start_week": 22.0, "week": 22 + weeks,
         "atlas_brain": "crl-30", "atlas_week": 30, "population": "well", "atlas": atlas, "accuracy": ACCURACY,
+        "tests": {"errors": {"area": "largest error of 2 tests"}, "held": {"area": "10 of 12"}, "starts": ["crl 22 GW"],
+                  "advantage": ""},
         "surfaces": ["results/a.surf.gii"], "atlas_surface": "results/atlas.surf.gii",
         "labels": "results/a_dseg.nii.gz",
     }  # fmt: skip
@@ -199,7 +202,8 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     assert Facts("young", "22 GW", "29.5 GW", 7.5, "An atlas") in elements(text, "p")
     parts = (
         *("</h1>", str(escape(accuracy_sentence(foretold(7.5)))), "210.5"),
-        *("norms/predictions.yaml", "results/a.surf.gii", "results/atlas.surf.gii"),
+        *("largest error of 2 tests", "crl 22 GW", "10 of 12 (area)", "norms/predictions.yaml"),
+        *("results/a.surf.gii", "results/atlas.surf.gii"),
         *("results/a_dseg.nii.gz", "A. et al., doi 10.1/x.", "CRL licence", "Research only.", '<section id="brains"'),
     )
     order = [text.index(part) for part in parts]
@@ -208,6 +212,10 @@ def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_w
     assert "results/study/validation.csv" not in text
     assert "<h2>weekly_figure" in text
     assert "results/study/validation.csv" in page(figures, prediction=foretold(7.5))
+    # also beside an observed brain
+    better = foretold(7.5)
+    better["tests"] |= {"advantage": "The atlas was better."}
+    assert "<strong>The atlas was better. At 23 GW" in page(figures, prediction=better)
 
 
 def test_a_prediction_beyond_those_that_were_tried_says_so():
@@ -220,13 +228,18 @@ def test_a_prediction_beyond_those_that_were_tried_says_so():
     told = [accuracy_sentence(foretold(2.0) | {"accuracy": {"rows": accuracy}}) for accuracy in (rows, worse)]
     assert ["shape index; it is given beside" in sentence for sentence in told] == [False, True]
     assert accuracy_sentence(foretold(last + 1)) == Facts(f"{last:g} weeks", f"{last + 1:g} weeks")
+    # where the atlas' own brain was better, that comes first
+    brain = foretold(2.0)
+    assert accuracy_sentence(brain).startswith("This is a prediction")
+    brain["tests"] |= {"advantage": "The atlas was better."}
+    assert accuracy_sentence(brain).startswith("The atlas was better. This is a prediction")
 
 
 def test_the_shipped_worth_of_predictions_is_of_two_starts_or_more_at_each_horizon_beside_simpler_ways():
     rows = pd.DataFrame(ACCURACY["rows"])
     assert (rows.groupby("horizon")["start"].nunique() >= 2).all()
-    assert not rows.duplicated(["start", "horizon", "model"]).any()
-    by_way = rows.pivot_table("distance_mm", ["start", "horizon"], "model")
+    assert not rows.duplicated(["start", "start_week", "horizon", "model"]).any()
+    by_way = rows.pivot_table("distance_mm", ["start", "start_week", "horizon"], "model")
     assert set(by_way) == {"run", "target", "atlas", "atlas_deformed", "scaled"}
     assert by_way.notna().all(axis=None)
     # a prediction that is worth less than no folding would not be shipped
@@ -282,13 +295,13 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["observed brain"] == Facts("23 GW", "predicted")
     assert row["area (%)"] == "−7.9"
     assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
-    assert (row["room"], row["skill"]) == ("+0.03 (−0.05 to +0.08)", "no room")
+    assert (row["headroom"], row["gain / headroom"]) == ("+0.03 (−0.05 to +0.08)", "no headroom")
     assert row["distance (mm)"] == "0.42"
     (alone,) = scores_table(RUNS).to_dict("records")
-    assert [alone[name] for name in ("gain", "room", "skill")] == ["–", "–", "–"]
-    roomy = {"skill_shape_index": 0.4, "skill_low_shape_index": -0.1, "skill_high_shape_index": 0.8}
-    (row,) = scores_table(RUNS, VALIDATION.assign(skill_flag_shape_index="ok", **roomy)).to_dict("records")
-    assert row["skill"] == "0.40 (−0.10 to 0.80)"
+    assert [alone[name] for name in ("gain", "headroom", "gain / headroom")] == ["–", "–", "–"]
+    share = {f"gain_share{end}_shape_index": value for end, value in (("", 0.4), ("_low", -0.1), ("_high", 0.8))}
+    (row,) = scores_table(RUNS, VALIDATION.assign(gain_share_flag_shape_index="ok", **share)).to_dict("records")
+    assert row["gain / headroom"] == "0.40 (−0.10 to 0.80)"
     assert "GW" not in alone["observed brain"]
 
 

@@ -66,25 +66,26 @@ def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nea
     units = {"area": "cm2", "volume": "mL"}
     table = [(brain, run, week, "whole", name, value, units.get(name, "1")) for brain, run, week, name, value in rows]
     of = {"run": "a", "brain": "s", "start_week": 22.4, "week": 29.9, "atlas_brain": "atlas30", "atlas_week": 30}
+    of["tests"] = {"errors": {"area": "largest error of 2 tests, ± 8 %"}}
     metrics = pd.DataFrame(table, columns=COLUMNS)
     centiles = metrics.assign(expected=np.nan, z=np.nan, centile=np.nan, centile_low=0.0, centile_high=0.0)
     found = predicted_table(metrics, of, centiles)
-    assert list(found) == [Facts("22.4 GW"), Facts("29.9 GW"), Facts("30 GW"), Facts("%")]
-    assert found.loc["pial area (cm²)"].tolist() == [100.0, 210.0, 200.0, "+5.0"]
+    assert list(found) == [Facts("22.4 GW"), Facts("29.9 GW"), Facts("30 GW"), Facts("%"), "error of such predictions"]
+    assert found.loc["pial area (cm²)"].tolist() == [100.0, 210.0, 200.0, "+5.0", "largest error of 2 tests, ± 8 %"]
     # what a brain has not is a dash
     assert found.index.tolist() == ["pial area (cm²)", "volume (mL)"]
-    assert found.loc["volume (mL)"].isna().tolist() == [True, False, True, False]
+    assert found.loc["volume (mL)"].isna().tolist() == [True, False, True, False, True]
     # with a norm of individuals, and an ensemble
     is_scored = centiles["metric"] == "area"
     centiles.loc[is_scored, ["z", "centile", "centile_low", "centile_high"]] = [0.5, 69.0, 60.0, 80.0]
     last = {"week": [22.4, 29.9], "metric": "area", "unit": "cm2", "low": [100.0, 190.0], "high": [100.0, 240.0]}
     found = predicted_table(metrics, of, centiles, pd.DataFrame(last)).loc["pial area (cm²)"]
     assert found.filter(like="centile").tolist() == [Facts(69, 60, 80, "+0.5")] * 3
-    assert found.filter(like="interval of the ensemble").tolist() == ["190 to 240"]
+    assert found.filter(like="interval of ensemble").tolist() == ["190 to 240"]
 
 
 def test_what_predictions_were_worth_stands_by_horizon_with_what_the_starts_span():
-    names = ["start", "horizon", "model", "distance_mm", "r_shape_index", "area_error", "volume_error"]
+    names = ["start", "horizon", "model", "distance_mm", "r_shape_index", "area_difference", "volume_difference"]
     rows = [
         ("crl", 2.0, "run", 0.2, 0.8, -0.02, np.nan), ("wu", 2.0, "run", 0.3, 0.9, 0.01, np.nan),
         ("crl", 2.0, "atlas", 0.5, 0.4, 0, 0), ("wu", 2.0, "atlas", 0.7, 0.4, 0, 0),

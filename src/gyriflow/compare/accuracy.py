@@ -1,0 +1,214 @@
+"""Errors of predictions in tests, and the intervals that follow from them. The unit is the start brain."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t
+
+from ..geometry.triangles import Floats
+
+QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
+"""The metrics of whole brains that have intervals."""
+FOLDING, SMOOTH = "gyrification_index", 0.02
+"""The metric whose logarithm is that of the folding, its value − 1 + `SMOOTH`: a smooth brain has about 1."""
+LEVEL, MIN_STARTS = 0.9, 9
+"""Coverage of intervals where enough starts were tested, and that number: the errors of fewer cannot tell it."""
+DEFAULT_PROTOCOL = "default"
+"""The protocol of tests that count: the default settings."""
+ATLAS_MARGIN = 0.02
+"""Difference of the mean r of the shape index from which on the atlas' own brain is said to be better."""
+
+
+@dataclass(frozen=True)
+class ErrorInTests:
+    """The error of a prediction by tests, as logarithm of predicted over observed.
+
+    Attributes
+    ----------
+    starts
+        Number of start brains with a test.
+    largest
+        Half the width of the interval: the largest error of these starts, about `bias` if it is corrected.
+    bias
+        Mean error of the starts.
+    is_corrected
+        Whether the bias is larger than its error, so that the interval is centred at the value less the bias.
+    coverage
+        Share of starts that such an interval contains at most, by counting: k/(k + 1) for the largest error of k
+        starts, `LEVEL` from `MIN_STARTS` on.
+    is_beyond
+        Whether no test went as far, in weeks predicted or in horizon.
+    """
+
+    starts: int
+    largest: float
+    bias: float
+    is_corrected: bool
+    coverage: float
+    is_beyond: bool
+
+
+def log_value(metric: str, value: Any) -> Any:
+    """Return the logarithm in which errors of a metric are counted; for `FOLDING` that of the folding."""
+    return np.log(value - 1 + SMOOTH if metric == FOLDING else value)
+
+
+def from_log(metric: str, value: Any) -> Any:
+    """Return the metric of a logarithm of `log_value`."""
+    return np.exp(value) + (1 - SMOOTH if metric == FOLDING else 0)
+
+
+def log_errors(tests: Sequence[Mapping[str, Any]], metric: str) -> pd.DataFrame:
+    """Return the errors of runs in tests with the default protocol: columns start, week, horizon, error.
+
+    `tests` are the rows of `norms/predictions.yaml`: start, start_week, horizon, model, protocol, and of runs the
+    differences of area, volume, folding and mean_sulcal_depth, as fractions of the observed brain's. Rows of another
+    protocol, or without this difference, are left out. Errors are logarithms of predicted over observed.
+    """
+    difference = f"{'folding' if metric == FOLDING else metric}_difference"
+    rows = pd.DataFrame(tests).reindex(columns=["start", "start_week", "horizon", "model", "protocol", difference])
+    rows = rows[(rows["model"] == "run") & (rows["protocol"] == DEFAULT_PROTOCOL)].dropna(subset=difference)
+    week, error = rows["start_week"] + rows["horizon"], np.log1p(rows[difference].astype(float))
+    return pd.DataFrame({"start": rows["start"], "week": week, "horizon": rows["horizon"], "error": error})
+
+
+def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorInTests | None:
+    """Return the tested error of a prediction of a week over a horizon, from `log_errors`; None without tests.
+
+    The tests that count are those of this week and of earlier ones, over this horizon and shorter ones, or over the
+    shortest horizon that a week was tested with; weeks between tested ones are rounded up. The interval is never
+    narrower for a later week or a longer horizon.
+    """
+    if errors.empty:
+        return None
+    weeks, horizons = (np.unique(errors[name]) for name in ("week", "horizon"))
+    week_limit, horizon_limit = (
+        float(min((step for step in steps if step >= value - 1e-6), default=steps[-1]))
+        for steps, value in ((weeks, week), (horizons, horizon))
+    )
+    shortest = errors.groupby("week")["horizon"].transform("min")
+    smaller = [
+        _counted(
+            errors[(errors["week"] <= earlier) & (errors["horizon"] <= np.maximum(shorter, shortest))], earlier, shorter
+        )
+        for earlier in weeks[weeks <= week_limit]
+        for shorter in horizons[horizons <= horizon_limit]
+    ]
+    last = smaller[-1]
+    half = max(found.largest for found in smaller)
+    is_beyond = bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6)
+    return ErrorInTests(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
+
+
+def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
+    starts, number_of = np.unique(counted["start"].to_numpy(dtype=str), return_inverse=True)
+    errors = [counted["error"].to_numpy()[number_of == number] for number in range(len(starts))]
+    means = np.array([values.mean() for values in errors])
+    bias, is_corrected = _bias(means)
+    # a start that was not tested as far does not count for the coverage
+    is_as_far = (counted["week"] >= week) | (counted["horizon"] >= horizon)
+    count = len(np.unique(number_of[is_as_far.to_numpy()]))
+    # the largest error of each start, about the bias of the others if that is to be corrected
+    largest = []
+    for number, values in enumerate(errors):
+        others, others_corrected = _bias(np.delete(means, number))
+        largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
+    if count >= MIN_STARTS:
+        rank = int(np.ceil(round((count + 1) * LEVEL, 6)))
+        return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
+    return ErrorInTests(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
+
+
+def _bias(means: Floats) -> tuple[float, bool]:
+    """Return the mean of the starts' errors, and whether it is larger than its standard error, of Student's t."""
+    if len(means) < 2:
+        return float(means.mean()) if len(means) else 0.0, False
+    error = t.ppf(0.84, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means))
+    return float(means.mean()), bool(abs(means.mean()) > error)
+
+
+def error_words(metric: str, tested: ErrorInTests) -> str:
+    """Describe a tested error, such as "largest error of 2 tests, −10 to +11 %: 2 in 3 brains at most"."""
+    low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
+    ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
+    starts = f"{tested.starts} test{'s' if tested.starts > 1 else ''}"
+    if tested.starts < MIN_STARTS:
+        words = f"largest error of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
+        words += f": {tested.starts} in {tested.starts + 1} brains at most"
+    else:
+        words = f"{100 * LEVEL:.0f} % of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
+    if tested.is_corrected:
+        words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
+    return words + ("; no test went as far" if tested.is_beyond else "")
+
+
+def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Leave out each start in turn, and count how often intervals by the other starts contain its errors.
+
+    Columns metric, start, tests (weeks with an observed brain), held (those within), at_most (share expected at most,
+    by counting).
+    """
+    rows = []
+    for metric in QUANTITIES:
+        errors = log_errors(tests, metric)
+        for start, own in errors.groupby("start"):
+            others = errors[errors["start"] != start]
+            places = own[["week", "horizon"]].to_numpy(dtype=float)
+            found = [error_in_tests(others, week, horizon) for week, horizon in places]
+            inside = [
+                abs(error - interval.bias * interval.is_corrected) <= interval.largest
+                for error, interval in zip(own["error"], found, strict=True)
+                if interval
+            ]
+            if inside:
+                at_most = max(interval.coverage for interval in found if interval)
+                rows.append((metric, start, len(inside), sum(inside), at_most))
+    return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
+
+
+def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple[float, float, float] | None:
+    """Return by how much the atlas' own brain was nearer in tests than runs: mean r of the shape index of either.
+
+    The tests are those of the default protocol over the horizon tested next, or the longest. Returns that horizon, r of
+    runs and r of the atlas' own brain, or None unless the latter is larger by more than `ATLAS_MARGIN`.
+    """
+    rows = pd.DataFrame(tests)
+    rows = rows[(rows["protocol"] == DEFAULT_PROTOCOL) & rows["model"].isin(["run", "atlas"])]
+    tested = min((step for step in rows["horizon"] if step >= horizon - 1e-6), default=rows["horizon"].max())
+    # the mean of each start counts once
+    means = rows[rows["horizon"] == tested].groupby(["model", "start"])["r_shape_index"].mean().groupby("model").mean()
+    if not {"run", "atlas"} <= set(means.index) or means["atlas"] - means["run"] <= ATLAS_MARGIN:
+        return None
+    return float(tested), float(means["run"]), float(means["atlas"])
+
+
+def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week: float) -> dict[str, Any]:
+    """Describe the errors of tests for the report of a prediction of a week.
+
+    Returns
+    -------
+    dict
+        errors: by metric, the words of its tested error; held: by metric, how often intervals held when each start was
+        left out; advantage: a sentence where the atlas' own brain was better, or ""; starts: the tested brains.
+    """
+    horizon, errors = week - start_week, {}
+    for metric in QUANTITIES:
+        found = error_in_tests(log_errors(tests, metric), week, horizon)
+        errors[metric] = "not tested" if found is None else error_words(metric, found)
+    held = held_intervals(tests).groupby("metric").agg(tests=("tests", "sum"), held=("held", "sum"))
+    advantage = ""
+    if better := atlas_advantage(tests, horizon):
+        tested, run, atlas = better
+        advantage = (
+            f"In tests over {tested:g} weeks the atlas' own brain was more like the observed brain than the prediction "
+            f"(mean r of the shape index {atlas:.2f} and {run:.2f}): the start's individual differences had faded or "
+            "changed by then, or the start was an average with few of them. For the places of folds, use the atlas' "
+            "own brain, which is given beside the prediction."
+        )
+    held_words = {str(row.Index).replace("_", " "): f"{row.held} of {row.tests}" for row in held.itertuples()}
+    tested_brains = pd.DataFrame(tests)[["start", "start_week"]].drop_duplicates().itertuples(index=False)
+    starts = [f"{brain} {at:g} GW" for brain, at in tested_brains]
+    return {"errors": errors, "held": held_words, "advantage": advantage, "starts": starts}

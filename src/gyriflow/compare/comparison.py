@@ -1,0 +1,256 @@
+"""Comparison of a predicted surface with an observed brain: one row with all columns, from which tables choose."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..geometry.alignment import align
+from ..geometry.matching import crossing_faces, nearest_on, surface_distance, values_at
+from ..geometry.triangles import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    area,
+    area_cm2,
+    edges,
+    signed_volume,
+    vertex_areas,
+    vertex_normals,
+    volume_ml,
+)
+from ..quantities import COMPARED_MAPS
+from ..settings.terms import CURVATURE_RADIUS_MM
+from .placement import (
+    PATCH_EDGE_MM,
+    RESAMPLED,
+    Resampling,
+    correlation,
+    draw_units,
+    gain_columns,
+    interpolate_measures,
+    make_resampling,
+    number_patches,
+    with_interval,
+)
+from .shapes import PreparedSurface, cortex_dice, curvature_differences, prepare_for_comparison
+
+type VertexDistances = tuple[TriangleMesh, Floats]
+"""A surface, and the (n,) distances of its vertices from another one in mm."""
+type Group = Literal["size", "distance", "folds", "quality", "intervals"]
+GROUPS: tuple[Group, ...] = ("size", "distance", "folds", "quality", "intervals")
+"""Groups of columns of `compare`. Columns of the others are computed alike if some are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedBrain:
+    """An observed brain that predicted surfaces are compared with.
+
+    Attributes
+    ----------
+    id
+        Its id, or another name of it.
+    surface
+        Its closed pial surface in mm, as it is.
+    prepared
+        The same, prepared for comparison.
+    baselines
+        Brains prepared for comparison with it: `start`, the start brain scaled to its volume, which has no new folds,
+        and `adjacent`, the observed brain of the week before; needed for the intervals.
+    """
+
+    id: str
+    surface: TriangleMesh
+    prepared: PreparedSurface
+    baselines: Mapping[str, PreparedSurface] = field(default_factory=dict)
+
+    @cached_property
+    def resampling(self) -> Resampling:
+        """The modes and patches of the surface that are drawn in bootstraps."""
+        return make_resampling(self.prepared)
+
+    @cached_property
+    def patch(self) -> tuple[Ints, Floats]:
+        """The (n,) patch of each vertex for bootstraps of distances, and how often each patch is drawn.
+
+        If the brain is symmetric, a patch and its mirror image have the same number.
+        """
+        points = self.prepared.mesh.vertices
+        if self.resampling.is_symmetric:
+            left, right = (values_at(side, points) for side in self.resampling.sides)
+            on_left = number_patches(left, self.resampling.side_areas, PATCH_EDGE_MM)
+            numbers = np.tile(on_left, 2)[cKDTree(np.concatenate([left, right])).query(points)[1]]
+        else:
+            numbers = number_patches(points, self.prepared.areas, PATCH_EDGE_MM)
+        return numbers, draw_units([int(numbers.max()) + 1])
+
+    @cached_property
+    def baseline_correlations(self) -> dict[tuple[str, str], Floats]:
+        """The correlation of each baseline and map, and that in each bootstrap sample."""
+        return {
+            (name, measure): self.resampling.correlations(getattr(self.prepared, measure), values)
+            for name, surface in self.baselines.items()
+            for measure, values in interpolate_measures(surface, self.prepared)[0].items()
+        }
+
+
+def observed_brain(name: str, surface: TriangleMesh, radius_mm: float) -> ObservedBrain:
+    """Prepare a closed surface in mm as an observed brain without baselines."""
+    return ObservedBrain(name, surface, prepare_for_comparison(surface, surface, radius_mm))
+
+
+def compare(
+    predicted: TriangleMesh,
+    observed: ObservedBrain,
+    *,
+    radius_mm: float = CURVATURE_RADIUS_MM,
+    groups: Collection[Group] = GROUPS,
+) -> tuple[dict[str, Any], dict[str, Floats]]:
+    """Compare a predicted closed surface in mm with the observed brain.
+
+    `radius_mm` is that of the fitted curvature. Sizes and distances are of the surfaces as they are, aligned rigidly;
+    folds are compared after scaling to the observed volume.
+
+    Returns
+    -------
+    row
+        Columns by group:
+
+        - size: area_cm2, volume_ml, relative_area (A/V^⅔), the same of the observed brain (observed_…), and
+          area_difference and volume_difference from it, as fractions of its own;
+        - distance: `surface_distances` and cortex_dice;
+        - folds: r_… of each of `COMPARED_MAPS`, matched_share (share of the observed area with a matching point) and
+          `shapes.curvature_differences`;
+        - quality: crossing_faces, and roughness_ratio to the observed surface;
+        - intervals: distance_mm_low and …_high, and with baselines `placement.gain_columns` of each map (gain_…,
+          gain_low_…); asymmetry_mm of the observed brain, is_symmetric and resampled.
+    samples
+        With intervals, the bootstrap samples of distance_mm and r_… after their values, (1 + N_DRAWS,) each, drawn
+        alike for all surfaces that are compared with this observed brain.
+    """
+    row: dict[str, Any] = {}
+    samples: dict[str, Floats] = {}
+    if "size" in groups:
+        row |= size_columns(predicted, observed.surface)
+    if {"distance", "intervals"} & set(groups):
+        aligned = align(predicted, observed.surface)
+        pair = pairwise_distances(aligned, observed.surface, observed.prepared.mesh)
+        if "distance" in groups:
+            row |= surface_distances(pair) | {"cortex_dice": cortex_dice(aligned, observed.surface)}
+        if "intervals" in groups:
+            samples["distance_mm"] = bootstrap_distances(pair, observed.prepared.mesh.vertices, *observed.patch)
+            row |= with_interval("distance_mm", samples["distance_mm"])
+    if set(groups) <= {"size", "distance"}:
+        return row, samples
+    prepared = prepare_for_comparison(predicted, observed.surface, radius_mm)
+    if "quality" in groups:
+        row["crossing_faces"] = float(crossing_faces(predicted))
+        row["roughness_ratio"] = roughness_mm(prepared.mesh) / roughness_mm(observed.prepared.mesh)
+    return row | fold_columns(prepared, observed, samples, groups), samples
+
+
+def fold_columns(
+    prepared: PreparedSurface, observed: ObservedBrain, samples: dict[str, Floats], groups: Collection[Group]
+) -> dict[str, Any]:
+    """Return the columns of folds and of their intervals of a surface that is prepared for comparison."""
+    values, matched_share = interpolate_measures(prepared, observed.prepared)
+    row: dict[str, Any] = {}
+    if "folds" in groups:
+        row = {"matched_share": matched_share} | curvature_differences(prepared, observed.prepared)
+        for name in COMPARED_MAPS:
+            truth = getattr(observed.prepared, name)
+            row[f"r_{name}"] = correlation(truth, values[name], observed.prepared.areas)
+    if "intervals" in groups:
+        sampling, known = observed.resampling, observed.baseline_correlations
+        row |= {"asymmetry_mm": sampling.asymmetry_mm, "is_symmetric": sampling.is_symmetric, "resampled": RESAMPLED}
+        for name in COMPARED_MAPS:
+            samples[f"r_{name}"] = sampling.correlations(getattr(observed.prepared, name), values[name])
+            if known:
+                scores = gain_columns(samples[f"r_{name}"], known["start", name], known["adjacent", name])
+                row |= {f"{score}_{name}": value for score, value in scores.items()}
+    return row
+
+
+def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, float]:
+    """Return the sizes of two closed surfaces in mm and their differences, the columns of the group size."""
+    sizes, observed_sizes = (
+        {
+            "area_cm2": area_cm2(mesh),
+            "volume_ml": volume_ml(mesh),
+            "relative_area": area(mesh) / signed_volume(mesh) ** (2 / 3),
+        }
+        for mesh in (predicted, observed)
+    )
+    return {
+        **sizes,
+        **{f"observed_{name}": size for name, size in observed_sizes.items()},
+        "area_difference": sizes["area_cm2"] / observed_sizes["area_cm2"] - 1,
+        "volume_difference": sizes["volume_ml"] / observed_sizes["volume_ml"] - 1,
+    }
+
+
+def pairwise_distances(
+    surface: TriangleMesh, observed: TriangleMesh, even: TriangleMesh | None = None
+) -> list[VertexDistances]:
+    """Measure how far the vertices of each of two aligned surfaces are from the other one, in mm.
+
+    `even` is the observed surface with even triangles. If given, distances are measured at its vertices instead of
+    those of `observed`.
+    """
+    pairs = (surface, observed), (observed if even is None else even, surface)
+    return [(mesh, nearest_on(mesh.vertices, target)[0]) for mesh, target in pairs]
+
+
+def surface_distances(pair: list[VertexDistances]) -> dict[str, float]:
+    """Summarise the distances of `pairwise_distances` in mm.
+
+    distance_mm is the mean of the two area-weighted means, distance95_mm the larger of the two 95 % quantiles (a robust
+    Hausdorff distance); distance_left_mm and distance_right_mm are distance_mm of the parts left and right of x = 0,
+    NaN where a surface has none there.
+    """
+    mean, quantile = surface_distance((distances, vertex_areas(mesh)) for mesh, distances in pair)
+    by_side = []
+    for on_side in (np.less, np.greater_equal):
+        parts = [(distances, vertex_areas(mesh) * on_side(mesh.vertices[:, 0], 0)) for mesh, distances in pair]
+        has_both = all(areas.any() for _, areas in parts)
+        by_side.append(surface_distance(parts)[0] if has_both else float("nan"))
+    left, right = by_side
+    return {"distance_mm": mean, "distance_left_mm": left, "distance_right_mm": right, "distance95_mm": quantile}
+
+
+def aligned_distances(surface: TriangleMesh, observed: TriangleMesh) -> dict[str, float]:
+    """Align a surface rigidly with the observed one, and return their `surface_distances`."""
+    return surface_distances(pairwise_distances(align(surface, observed), observed))
+
+
+def bootstrap_distances(pair: list[VertexDistances], points: Floats, patch: Ints, drawn: Floats) -> Floats:
+    """Return the (k,) mean distances in mm in k bootstrap samples of patches.
+
+    `drawn` (k, p) counts how often each of p patches is in a sample; `patch` (n,) is the patch of each of `points`
+    (n, 3). Every vertex belongs to the patch of the nearest point.
+    """
+    tree, means = cKDTree(points), []
+    for mesh, distances in pair:
+        vertex_patch, areas = patch[tree.query(mesh.vertices)[1]], vertex_areas(mesh)
+        sums, total = (
+            np.bincount(vertex_patch, weights, minlength=drawn.shape[1]) for weights in (areas * distances, areas)
+        )
+        means.append((drawn @ sums) / (drawn @ total))
+    return np.asarray(np.mean(means, axis=0))
+
+
+def roughness_mm(mesh: TriangleMesh) -> float:
+    """Return the distance of the vertices from the mean of their neighbours along the normals, RMS by area, in mm.
+
+    On surfaces with the same even triangles it measures wrinkles as small as a triangle.
+    """
+    first, second = edges(mesh)[0].T
+    sums = np.zeros_like(mesh.vertices)
+    np.add.at(sums, first, mesh.vertices[second])
+    np.add.at(sums, second, mesh.vertices[first])
+    count = np.bincount(np.concatenate([first, second]), minlength=len(sums))
+    offsets: Floats = ((sums / count[:, None] - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
+    return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))
