@@ -99,8 +99,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         print_line(f"  elements through the cortex: {through:.1f}")
         locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
         if parameters.targets and {"stress", "strain"} & {*parameters.fields}:
-            print_line("growth towards shapes leaves no stress but in contact: there are no fields of stress and elastic
-            strain")
+            print_line("growth towards shapes has no stress but in contact: no fields of stress and elastic strain")
         for warning in filter(None, (*zone_warnings(report), locking)):
             warn(warning)
         refuse_impossible(mesh, zones)

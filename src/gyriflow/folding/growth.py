@@ -90,8 +90,8 @@ class StepGrowth(ABC):
         """Return G⁻¹ (c, q, 3, 3) at the integration points of a rank's elements."""
 
     def deformation(self, elements: Elements) -> Floats | None:
-        """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of a rank's elements; None if by
-        rates.""" return None
+        """Return R·G (c, q, 3, 3), the deformation of free tissue at the points of elements, None if it is by rates."""
+        return None
 
     def mean_deformation(self, elements: Elements) -> Floats | None:
         """Return the mean (c, 3, 3) of `deformation` over each element, None if growth is by rates."""

@@ -136,8 +136,9 @@ class Folding:
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:
-        """Return the deformation (m, 3, 3) of all elements by growth before a step and in it, None if it is by
-        rates.""" mean = growth.mean_deformation(self.elements) if mean is None:
+        """Return the deformation (m, 3, 3) of all elements by growth before and in a step, None if it is by rates."""
+        mean = growth.mean_deformation(self.elements)
+        if mean is None:
             return None
         grown = self.domain.gather_cells(mean)
         return grown if state.growth is None else grown @ state.growth

@@ -81,8 +81,8 @@ class WeeklyShapes:
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
-    """Write the data sets weeks, stops, between, positions, tets, sizes/{area_cm2, volume_ml}, surfaces/{name} and
-    ages/{column}.""" with new_hdf5(path) as file:
+    """Write the data sets weeks, stops, between, positions, tets, sizes/{name}, surfaces/{name} and ages/{column}."""
+    with new_hdf5(path) as file:
         for name, weeks in {"weeks": shapes.weeks, "stops": shapes.stops, "between": shapes.between}.items():
             file[name] = np.asarray(weeks, dtype=np.float64)
         places = {"positions": shapes.positions} | {f"surfaces/{name}": at for name, at in shapes.surfaces.items()}

@@ -54,11 +54,16 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
 def _best_move(
     vertices: Floats, tets: Ints, element: int, vertex: int, on_surface: Floats
 ) -> tuple[float, int, Floats] | None:
-    """Return the gain in the least ratio around a vertex by its best move, the vertex and its place; None without
-    gain.""" star = tets[(tets == vertex).any(axis=1)] others = vertices[tets[element][tets[element] != vertex]] normal
-    = np.cross(others[1] - others[0], others[2] - others[0]) across = vertices[vertex] - others.mean(axis=0) edge =
-    float(np.linalg.norm(others - vertices[vertex], axis=1).max()) directions = [normal, across, *(vertices[vertex] -
-    other for other in others)] least = _ratios(vertices, star).min() best = None for direction in directions:
+    """Return the gain of the least ratio around a vertex by its best move, the vertex and its place, None without."""
+    star = tets[(tets == vertex).any(axis=1)]
+    others = vertices[tets[element][tets[element] != vertex]]
+    normal = np.cross(others[1] - others[0], others[2] - others[0])
+    across = vertices[vertex] - others.mean(axis=0)
+    edge = float(np.linalg.norm(others - vertices[vertex], axis=1).max())
+    directions = [normal, across, *(vertices[vertex] - other for other in others)]
+    least = _ratios(vertices, star).min()
+    best = None
+    for direction in directions:
         length = np.linalg.norm(direction)
         for step in STEPS if length > 0 else ():
             size = min(step, MAX_SURFACE_STEP) if on_surface[vertex] else step
