@@ -96,15 +96,15 @@ def hemisphere_spectra(
 def surface_spectra(
     left: TriangleMesh | None,
     right: TriangleMesh | None,
-    radius_mm: float,
+    curvature_radius_mm: float,
     spangy_modes: SpangyModes,
-    mass: MassMatrix = "mean",
+    spangy_mass: MassMatrix = "mean",
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     return _band_table(
         {
-            name: hemisphere_spectra(mesh, curvature(mesh, radius_mm=radius_mm), spangy_modes, mass)
+            name: hemisphere_spectra(mesh, curvature(mesh, radius_mm=curvature_radius_mm), spangy_modes, spangy_mass)
             for name, mesh in meshes.items()
         }
     )
