@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.matching import Match, match_surface, values_at
-from ..geometry.remeshing import decimate
+from ..geometry.matching import match_surface
+from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges
 from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
 from .curvature import kept_curvature
@@ -40,6 +40,8 @@ VERTICES_PER_WAVELENGTH = 7.0
 """Edges per shortest wave on the surface that modes are computed on: see `benchmarks/spectra.py` for the choice."""
 LONGEST_EDGE_MM = 1.8
 """Edges of that surface at most: longer ones do not follow the banks of sulci, whatever the waves."""
+ROUNDS = 3
+"""Rounds of remeshing. Even triangles matter more than creases, which a quadric decimation would keep."""
 WORTHWHILE = 0.8
 """A coarser surface is made if it has at most this share of the vertices."""
 
@@ -85,20 +87,19 @@ def band_limits(first: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """The modes that spectra of a surface are made of, on the surface or on a coarser copy of it.
+    """The k modes that spectra of a surface with n vertices are made of, on the surface or on a copy with m vertices.
 
-    `first` is λ1 of the surface, `reach` the λ in mm⁻² below which no mode is missing. `mass` is the mass matrix of the
-    modes, `energy` the one that powers are measured with. `matches` lead from surface to copy and back; None without a
-    copy.
+    `first` is λ1 of the surface, `reach` the λ in mm⁻² below which no mode is missing. `places` (n, m) takes values
+    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm²; `norms` (k,) are those of the modes there.
     """
 
     modes: Modes
-    mass: sparse.csc_matrix
+    places: sparse.csr_matrix
     energy: sparse.csc_matrix
+    norms: Floats
     first: float
     reach: float
     is_open: bool
-    matches: tuple[Match, Match] | None = None
 
     @property
     def band(self) -> Ints:
@@ -117,19 +118,24 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
 
     The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
     mode of the next band is needed to show it. They are at most half as many as there are vertices. A number is taken
-    as it is. With the `mean` mass matrix they are computed on a surface with only as many vertices as the shortest wave
-    needs, and powers are sums over vertices, which have no error of order (kh)² for waves. `consistent` is as in LaPy:
-    on the surface as it is, with powers by the same matrix. MeshError where the surface is not in one piece.
+    as it is. With the `mean` mass matrix they are computed on a copy with only as many vertices as the shortest wave
+    needs, and powers are sums over the surface's vertices; neither has an error of order (kh)². `consistent` is as in
+    LaPy: on the surface as it is, with powers by the same matrix. MeshError where the surface is not in one piece.
     """
     stiffness, matrix = laplacian(mesh, mass)
-    first, matches = first_eigenvalue(stiffness, matrix), None
+    first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
+    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
     by_name = isinstance(choice, str)
     end = float(band_limits(first)[int(choice[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
     needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
-        copy = decimate(mesh, needed)
-        matches = match_surface(copy, mesh), match_surface(mesh, copy)
+        copy = remesh(mesh, edge_mm, ROUNDS, sharp_deg=180.0)
+        match, columns = match_surface(mesh, copy), len(copy.vertices)
+        rows = np.repeat(np.arange(len(mesh.vertices)), 3)
+        places = sparse.csr_matrix(
+            (match.weights.ravel(), (rows, match.corners.ravel())), (len(mesh.vertices), columns)
+        )
         stiffness, matrix = laplacian(copy, mass)
     number = stiffness.shape[0] // 2
     if by_name and (count := count_below(stiffness, matrix, end)) <= number:
@@ -137,9 +143,9 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
         reach = float(modes.eigenvalues[-1])
-    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
+    squares = np.einsum("ij,ij->j", modes.functions, (places.T @ energy @ places) @ modes.functions)
     is_open = bool((edges(mesh)[1] == 1).any())
-    return Basis(modes, matrix, energy, first, reach, is_open, matches)
+    return Basis(modes, places, energy, np.sqrt(squares), first, reach, is_open)
 
 
 def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
@@ -150,16 +156,15 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
     one with the smallest, with a minus sign.
     """
     functions, band = basis.modes.functions, basis.band
-    values = values_at(basis.matches[0], proxy) if basis.matches else proxy
-    amplitudes = functions.T @ (basis.mass @ values)
-    coefficients = amplitudes * np.sqrt(np.einsum("ij,ij->j", functions, basis.energy @ functions))
+    coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy)) / basis.norms
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
+        amplitudes = coefficients / basis.norms
         parts = np.stack([functions[:, band == k] @ amplitudes[band == k] for k in whole], axis=1)
-        parts = values_at(basis.matches[1], parts) if basis.matches else parts
+        parts = basis.places @ parts
         dominant = np.where(proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)])
-    captured = float(np.sum(coefficients**2) / (values @ (basis.energy @ values))) if values.any() else 1.0
+    captured = float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy))) if proxy.any() else 1.0
     return Spectrum(basis.modes.eigenvalues, coefficients, band, bands, dominant, captured)
 
 

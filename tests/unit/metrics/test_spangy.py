@@ -6,11 +6,13 @@ import pytest
 from facts import Facts
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
-from shapes import ellipsoid, sheet, sphere
+from shapes import ellipsoid, octasphere, rigid, sheet, sphere
 
 from gyriflow.errors import MeshError, SolverError
-from gyriflow.geometry.triangles import TriangleMesh, area, merged, transformed
-from gyriflow.metrics import laplace_beltrami
+from gyriflow.geometry.remeshing import remesh
+from gyriflow.geometry.triangles import TriangleMesh, area, merged, submesh, transformed, vertex_areas
+from gyriflow.metrics import laplace_beltrami, spangy
+from gyriflow.metrics.curvature import kept_curvature
 from gyriflow.metrics.laplace_beltrami import Modes, first_eigenvalue, laplacian, lowest_modes
 from gyriflow.metrics.spangy import (
     OPEN_AND_CLOSED,
@@ -38,7 +40,8 @@ def test_bands_are_half_open() -> None:
     # the second is λ1, as solved a second time
     values = np.array([0.0, 2.0 - 4e-9, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
     nothing = sparse.csc_matrix((1, 1))
-    band = Basis(Modes(values, np.empty((1, 9))), nothing, nothing, 2.0, 2.0 * 4**6, is_open=False).band
+    modes = Modes(values, np.empty((1, 9)))
+    band = Basis(modes, nothing, nothing, np.ones(9), first=2.0, reach=2.0 * 4**6, is_open=False).band
     np.testing.assert_array_equal(band, [0, 1, 1, 2, 2, 3, 6, 6, -1])
 
 
@@ -182,6 +185,87 @@ def test_who_is_compared_with_whom() -> None:
     pairs = table["subject"] + " " + table["run"] + " " + table["hemisphere"] + ", " + table["real"]
     assert sorted(set(pairs)) == ["a real left, b", "a sim left, a", "a sim left, b", "b real left, a"]
     assert len(table) == 3 * 4
+
+
+@pytest.mark.parametrize(("mass", "error"), [("mean", 0.002), ("consistent", 0.06)])
+def test_the_mean_of_both_mass_matrices_makes_eigenvalues_exact(mass, error) -> None:
+    # degree 12 on a sphere with seven edges per wave
+    stiffness, matrix = laplacian(sphere(20.0), mass)
+    values = lowest_modes(stiffness, matrix, 13**2).eigenvalues
+    ratio = values[12**2 :].mean() / (12 * 13 / 20.0**2)
+    assert ratio == pytest.approx(1.0, abs=error)
+    assert mass == "mean" or ratio > 1.02
+
+
+def waves(mesh: TriangleMesh, degree: int) -> np.ndarray:
+    """Return a harmonic of a degree, in no direction of the mesh, at the vertices of a sphere round 0."""
+    x, y, z = (rigid(20, -50, 35)[:3, :3] @ mesh.vertices.T) / np.linalg.norm(mesh.vertices, axis=1)
+    return np.real((x + 1j * y) ** degree) + z * np.imag((x + 1j * y) ** (degree - 1))
+
+
+def uneven(subdivisions: int) -> TriangleMesh:
+    """Return a sphere of 20 mm whose vertices are twice as dense on one side, and moved at random."""
+    points = sphere(1.0, subdivisions).vertices
+    points = (
+        points + [0.4, 0.1, 0.0] + 0.1 * 2.0**-subdivisions * np.random.default_rng(2).standard_normal(points.shape)
+    )
+    points *= 20.0 / np.linalg.norm(points, axis=1)[:, None]
+    return TriangleMesh(points, sphere(1.0, subdivisions).faces)
+
+
+@pytest.mark.parametrize("subdivisions", [4, 5])
+def test_power_of_a_wave_is_its_square_over_the_surface_on_uneven_vertices_and_on_a_copy(subdivisions) -> None:
+    mesh = uneven(subdivisions)
+    # degree 8 is in the middle of B3; ∫ of the square of both parts by a fine sphere
+    fine = sphere(20.0, 6)
+    exact = np.average(waves(fine, 8) ** 2, weights=vertex_areas(fine)) * 4 * np.pi * 20.0**2
+    basis = spectral_basis(mesh, "B3")
+    assert (basis.places.shape[1] < 0.8 * len(mesh.vertices)) == (subdivisions == 5)
+    found = spectrum(waves(mesh, 8), basis, radius_mm=1.0)
+    assert found.bands["power"][3] == pytest.approx(exact, rel=0.01)
+    assert found.bands["relative_power"][3] > 0.995
+    assert found.bands["modes"].tolist() == [1, 8, 27, 85, 0, 0, 0]
+    assert found.captured == pytest.approx(1.0, abs=0.01)
+    # all of it where the wave is, by parts of an octave: λ8/λ1 = 36, half of log2 of that is 2.58
+    parts = found.bands.loc[1:, PART_POWERS].to_numpy(dtype=float).ravel()
+    assert parts[int(16 * 0.5 * np.log2(36)) + np.arange(-1, 2)].sum() == pytest.approx(exact, rel=0.015)
+
+
+def test_a_copy_gives_the_same_dominant_bands(monkeypatch) -> None:
+    mesh = uneven(5)
+    proxy = waves(mesh, 8) + 0.7 * waves(mesh, 3) + 0.3
+    copied = spectrum(proxy, spectral_basis(mesh, "B3"), radius_mm=1.0)
+    monkeypatch.setattr(spangy, "WORTHWHILE", 0.0)
+    full = spectrum(proxy, spectral_basis(mesh, "B3"), radius_mm=1.0)
+    same = np.average(copied.dominant_band == full.dominant_band, weights=vertex_areas(mesh))
+    assert same > 0.97
+    assert set(np.abs(full.dominant_band)) >= {2, 3}
+    np.testing.assert_allclose(copied.bands["power"], full.bands["power"], rtol=0.01, atol=1e-3 * proxy @ proxy)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "times"),
+    [(2562, 5), *(pytest.param(number, 20, marks=pytest.mark.slow) for number in (14_000, 30_000))],
+)
+def test_rounding_never_cuts_a_band_off(vertices: int, times: int) -> None:
+    mesh = ellipsoid(AXES) if vertices == 2562 else remesh(ellipsoid(AXES, 5), np.sqrt(9000 / (0.87 * vertices)))
+    for number in range(times):
+        moved = mesh.vertices + 1e-3 * np.random.default_rng(number).standard_normal(mesh.vertices.shape)
+        basis = spectral_basis(TriangleMesh(moved, mesh.faces), "B3")
+        bands = spectrum(mesh.vertices[:, 0] ** 2, basis, radius_mm=1.0).bands
+        assert bands["complete"].tolist() == [True] * 4 + [False] * 3
+        assert bands["denominator_complete"].all()
+        assert np.isfinite(bands.loc[1:3, "relative_power"]).all()
+
+
+def test_a_surface_says_whether_it_is_open_and_how_much_curvature_it_keeps() -> None:
+    closed, cut = ellipsoid((30.0, 20.0, 16.0), 3), octasphere(20.0)
+    cut = submesh(cut, cut.vertices[cut.faces].mean(axis=1)[:, 0] > 0)[0]
+    for mesh, is_open in ((closed, False), (cut, True)):
+        bands = spectrum(mesh.vertices[:, 1], spectral_basis(mesh, 40), radius_mm=2.5).bands
+        assert bands["is_open"].tolist() == [is_open] * 7
+        middle = np.sqrt(bands["wavelength_min_mm"] * bands["wavelength_max_mm"])[1:]
+        np.testing.assert_allclose(bands["kept_curvature"][1:], kept_curvature(middle.to_numpy(), 2.5))
 
 
 def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
