@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.thickness import thickness_from_labels
+from gyriflow.compare.calibration import brain_scores, spectral_scores
 from gyriflow.compare.distances import aligned_distances
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.poses import pose_from
@@ -27,8 +28,10 @@ from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, write_yaml
 from gyriflow.metrics.measure import measure_brain
 from gyriflow.metrics.spangy import spectral_distances
+from gyriflow.settings.terms import CURVATURE_RADIUS_MM, SCORES, SPECTRAL_SCORES
 from gyriflow.shipped import SHIPPED
 
+SURFACE_SCORES = [name for name in SCORES if name not in SPECTRAL_SCORES]
 BRAIN = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA29_operated" / "parcellation.nii.gz"
 
 
@@ -62,6 +65,11 @@ def main() -> None:
     pairs = [aligned_distances(*pair) for pair in combinations(wholes, 2)]
     for key in ("distance", "distance95"):
         distances[f"surface_{key}"] = np.mean([pair[f"{key}_mm"] for pair in pairs])
+    scores = [
+        brain_scores(wholes[i], wholes[i + 1], SURFACE_SCORES, radius_mm=CURVATURE_RADIUS_MM)
+        | spectral_scores(spectra[i], spectra[i + 1])
+        for i in range(len(wholes) - 1)
+    ]
     record = {
         "source": "benchmarks/repeatability.py",
         "brain": arguments.labels.parent.name,
@@ -69,6 +77,7 @@ def main() -> None:
         "voxel_mm": float(np.linalg.norm(volume.affine[:3, 0])),
         "metrics": variation(table),
         "distances": {name: rounded(value) for name, value in distances.items()},
+        "scores": {name: rounded(value) for name, value in pd.DataFrame(scores).mean().dropna().items()},
     }
     # bands beyond those that are analysed are empty by design
     empty = int((table.groupby(["hemisphere", "metric"])["value"].count().between(1, arguments.times - 1)).sum())

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 
 from ..geometry.matching import match_surface
 from ..geometry.remeshing import remesh
@@ -90,13 +90,13 @@ class Basis:
     """The k modes that spectra of a surface with n vertices are made of, on the surface or on a copy with m vertices.
 
     `first` is λ1 of the surface, `reach` the λ in mm⁻² below which no mode is missing. `places` (n, m) takes values
-    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm²; `norms` (k,) are those of the modes there.
+    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm²; `products` (k, k) are ∫φᵢφⱼ there.
     """
 
     modes: Modes
     places: sparse.csr_matrix
     energy: sparse.csc_matrix
-    norms: Floats
+    products: Floats
     first: float
     reach: float
     is_open: bool
@@ -143,9 +143,9 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
         reach = float(modes.eigenvalues[-1])
-    squares = np.einsum("ij,ij->j", modes.functions, (places.T @ energy @ places) @ modes.functions)
+    products = modes.functions.T @ ((places.T @ energy @ places) @ modes.functions)
     is_open = bool((edges(mesh)[1] == 1).any())
-    return Basis(modes, places, energy, np.sqrt(squares), first, reach, is_open)
+    return Basis(modes, places, energy, products, first, reach, is_open)
 
 
 def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
@@ -156,11 +156,13 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
     one with the smallest, with a minus sign.
     """
     functions, band = basis.modes.functions, basis.band
-    coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy)) / basis.norms
+    # least squares: modes are not quite orthogonal on the surface, and strong bands would leak into weak ones
+    right = functions.T @ (basis.places.T @ (basis.energy @ proxy))
+    amplitudes = linalg.solve(basis.products, right, assume_a="pos")
+    coefficients = amplitudes * np.sqrt(basis.products.diagonal())
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
-        amplitudes = coefficients / basis.norms
         parts = np.stack([functions[:, band == k] @ amplitudes[band == k] for k in whole], axis=1)
         parts = basis.places @ parts
         dominant = np.where(proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)])

@@ -25,6 +25,7 @@ from gyriflow.compare.published import (
 from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     NO_NEAREST,
+    WITHIN_NOISE,
     comparison_table,
     distances_to,
     joined_comparisons,
@@ -156,6 +157,9 @@ def test_the_nearest_run_has_the_second_nearest_and_flags():
     assert row["flag"] == "ok"
     (row,) = nearest_runs(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
+    for noise, flag in ((0.09, "ok"), (0.11, WITHIN_NOISE)):
+        noisy = compared(t1=0.3, t2=0.1, t3=0.2).assign(noise=noise)
+        assert nearest_runs(noisy, MEMBERS, ["thickness_mm"])["flag"].tolist() == [flag]
 
 
 @pytest.mark.fault(86)

@@ -41,7 +41,7 @@ def test_bands_are_half_open() -> None:
     values = np.array([0.0, 2.0 - 4e-9, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
     nothing = sparse.csc_matrix((1, 1))
     modes = Modes(values, np.empty((1, 9)))
-    band = Basis(modes, nothing, nothing, np.ones(9), first=2.0, reach=2.0 * 4**6, is_open=False).band
+    band = Basis(modes, nothing, nothing, np.eye(9), first=2.0, reach=2.0 * 4**6, is_open=False).band
     np.testing.assert_array_equal(band, [0, 1, 1, 2, 2, 3, 6, 6, -1])
 
 
