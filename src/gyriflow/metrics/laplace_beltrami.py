@@ -21,9 +21,8 @@ MODES_PER_SLICE = 100
 
 SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
 
-DENSE_VERTICES = 600
-DENSE_VERTICES_MANY_MODES = 3000
-"""Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are needed."""
+DENSE_VERTICES = 1000
+"""Up to this size LAPACK solves the problem as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +77,10 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     SolverError for a count that the surface does not have, and where a mode is missed.
     """
     size = stiffness.shape[0]
-    largest = size if size <= DENSE_VERTICES_MANY_MODES else size // 2
+    largest = size if size <= DENSE_VERTICES else size // 2
     if not 1 <= count <= largest:
         raise SolverError("impossible number of modes", found=count, expected=f"1 to {largest} for {size} vertices")
-    if size <= DENSE_VERTICES or (size <= DENSE_VERTICES_MANY_MODES and count > size // 3):
+    if size <= DENSE_VERTICES:
         return Modes(*linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1)))
     needed, top = count + 2, (count + 6) * _spacing(mass)
     while (most := count_below(stiffness, mass, top)) < count:

@@ -30,9 +30,8 @@ def with_change_noise(change: pd.DataFrame, record: Repeatability) -> pd.DataFra
 
     It is NaN for regions, which are noisier than what they are parts of.
     """
-    noise = [
-        np.nan if row.region else difference_noise(row.metric, row.from_value, record) for row in change.itertuples()
-    ]
+    rows = zip(change["metric"], change["from_value"], change["region"], strict=True)
+    noise = [np.nan if region else difference_noise(metric, value, record) for metric, value, region in rows]
     return change.assign(noise=np.array(noise, dtype=float))
 
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from ..geometry.matching import match_surface
-from ..geometry.remeshing import remesh
+from ..geometry.remeshing import decimate
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges
 from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
 from .curvature import kept_curvature
-from .laplace_beltrami import Modes, count_below, first_eigenvalue, laplacian, lowest_modes, lumped, modes_below
+from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, lumped, modes_below
 
 type SpangyModes = int | LastBand
 
@@ -40,8 +40,6 @@ VERTICES_PER_WAVELENGTH = 7.0
 """Edges per shortest wave on the surface that modes are computed on: see `benchmarks/spectra.py` for the choice."""
 LONGEST_EDGE_MM = 1.8
 """Edges of that surface at most: longer ones do not follow the banks of sulci, whatever the waves."""
-ROUNDS = 3
-"""Rounds of remeshing. Even triangles matter more than creases, which a quadric decimation would keep."""
 WORTHWHILE = 0.8
 """A coarser surface is made if it has at most this share of the vertices."""
 
@@ -89,14 +87,15 @@ def band_limits(first: float) -> Floats:
 class Basis:
     """The k modes that spectra of a surface with n vertices are made of, on the surface or on a copy with m vertices.
 
-    `first` is λ1 of the surface, `reach` the λ in mm⁻² below which no mode is missing. `places` (n, m) takes values
-    from the copy to the surface, where `energy` (n, n) gives ∫f² in mm²; `products` (k, k) are ∫φᵢφⱼ there.
+    `eigenvalues` λ (k,) are in mm⁻², `functions` (m, k) in mm⁻¹; `first` is λ1 of the surface, `reach` the λ below
+    which no mode is missing. `places` (n, m) takes values from the copy to the surface, where `energy` (n, n) gives ∫f²
+    in mm², and the functions are orthonormal.
     """
 
-    modes: Modes
+    eigenvalues: Floats
+    functions: Floats
     places: sparse.csr_matrix
     energy: sparse.csc_matrix
-    products: Floats
     first: float
     reach: float
     is_open: bool
@@ -105,11 +104,11 @@ class Basis:
     def band(self) -> Ints:
         """The (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
         limits = band_limits(self.first)
-        band = np.searchsorted(limits, self.modes.eigenvalues, side="right")
+        band = np.searchsorted(limits, self.eigenvalues, side="right")
         # λ1 of the copy may be below that of the surface by rounding
         band[1:] = np.maximum(band[1:], 1)
         band[0] = 0
-        band[self.modes.eigenvalues >= limits[-1]] = -1
+        band[self.eigenvalues >= limits[-1]] = -1
         return band
 
 
@@ -126,11 +125,11 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
     energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
     by_name = isinstance(choice, str)
-    end = float(band_limits(first)[int(choice[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
+    end = float(band_limits(first)[int(str(choice)[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
     needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
-        copy = remesh(mesh, edge_mm, ROUNDS, sharp_deg=180.0)
+        copy = decimate(mesh, needed)
         match, columns = match_surface(mesh, copy), len(copy.vertices)
         rows = np.repeat(np.arange(len(mesh.vertices)), 3)
         places = sparse.csr_matrix(
@@ -143,9 +142,11 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     else:
         modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
         reach = float(modes.eigenvalues[-1])
-    products = modes.functions.T @ ((places.T @ energy @ places) @ modes.functions)
+    # interpolated modes are not quite orthonormal on the surface: the nearest that are (Löwdin 1950)
+    values, vectors = linalg.eigh(modes.functions.T @ ((places.T @ energy @ places) @ modes.functions))
+    functions = modes.functions @ ((vectors / np.sqrt(values)) @ vectors.T)
     is_open = bool((edges(mesh)[1] == 1).any())
-    return Basis(modes, places, energy, products, first, reach, is_open)
+    return Basis(modes.eigenvalues, functions, places, energy, first, reach, is_open)
 
 
 def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
@@ -155,19 +156,16 @@ def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
     the proxy in each of B1 to B6: at a vertex where the proxy is positive the band with the largest part, elsewhere the
     one with the smallest, with a minus sign.
     """
-    functions, band = basis.modes.functions, basis.band
-    # least squares: modes are not quite orthogonal on the surface, and strong bands would leak into weak ones
-    right = functions.T @ (basis.places.T @ (basis.energy @ proxy))
-    amplitudes = linalg.solve(basis.products, right, assume_a="pos")
-    coefficients = amplitudes * np.sqrt(basis.products.diagonal())
+    functions, band = basis.functions, basis.band
+    coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy))
     bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
-        parts = np.stack([functions[:, band == k] @ amplitudes[band == k] for k in whole], axis=1)
+        parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in whole], axis=1)
         parts = basis.places @ parts
         dominant = np.where(proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)])
     captured = float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy))) if proxy.any() else 1.0
-    return Spectrum(basis.modes.eigenvalues, coefficients, band, bands, dominant, captured)
+    return Spectrum(basis.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
 def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
@@ -180,7 +178,7 @@ def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.Data
     is_mean = np.arange(BANDS + 1) == 0
     share = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
     inside = basis.band > 0
-    octaves = np.maximum(np.log2(basis.modes.eigenvalues[inside] / basis.first) / 2, 0.0)
+    octaves = np.maximum(np.log2(basis.eigenvalues[inside] / basis.first) / 2, 0.0)
     parts = np.bincount((PARTS * octaves).astype(int), powers[inside], PARTS * BANDS).reshape(BANDS, PARTS)
     table = pd.DataFrame(
         {

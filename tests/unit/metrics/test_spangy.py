@@ -13,7 +13,7 @@ from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.triangles import TriangleMesh, area, merged, submesh, transformed, vertex_areas
 from gyriflow.metrics import laplace_beltrami, spangy
 from gyriflow.metrics.curvature import kept_curvature
-from gyriflow.metrics.laplace_beltrami import Modes, first_eigenvalue, laplacian, lowest_modes
+from gyriflow.metrics.laplace_beltrami import first_eigenvalue, laplacian, lowest_modes
 from gyriflow.metrics.spangy import (
     OPEN_AND_CLOSED,
     PART_POWERS,
@@ -40,8 +40,7 @@ def test_bands_are_half_open() -> None:
     # the second is λ1, as solved a second time
     values = np.array([0.0, 2.0 - 4e-9, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
     nothing = sparse.csc_matrix((1, 1))
-    modes = Modes(values, np.empty((1, 9)))
-    band = Basis(modes, nothing, nothing, np.eye(9), first=2.0, reach=2.0 * 4**6, is_open=False).band
+    band = Basis(values, np.empty((1, 9)), nothing, nothing, first=2.0, reach=2.0 * 4**6, is_open=False).band
     np.testing.assert_array_equal(band, [0, 1, 1, 2, 2, 3, 6, 6, -1])
 
 
@@ -105,7 +104,7 @@ def test_two_pieces_are_refused(shape) -> None:
     ],
 )
 def test_how_many_modes_of_a_sphere_are_taken(choice, subdivisions: int, number: int) -> None:
-    assert len(spectral_basis(sphere(20.0, subdivisions), choice).modes.eigenvalues) == number
+    assert len(spectral_basis(sphere(20.0, subdivisions), choice).eigenvalues) == number
 
 
 @pytest.mark.parametrize("last", [4, 5, 6])
@@ -269,7 +268,7 @@ def test_a_surface_says_whether_it_is_open_and_how_much_curvature_it_keeps() -> 
 
 
 def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
-    slow, fast = (solved.modes.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (1, 3))
+    slow, fast = (solved.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (1, 3))
     proxy = 10.0 * slow + fast
     found = spectrum(proxy, solved, radius_mm=1.0).dominant_band
     expected = np.where(proxy > 0, np.where(10 * slow > fast, 1, 3), np.where(10 * slow < fast, -1, -3))
@@ -278,7 +277,7 @@ def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
 
 
 def test_a_band_that_is_cut_off_dominates_nowhere(shape, solved) -> None:
-    slow, cut = (solved.modes.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (2, 4))
+    slow, cut = (solved.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (2, 4))
     found = spectrum(slow + 10.0 * cut, solved, radius_mm=1.0)
     assert not found.bands["complete"][4]
     assert set(np.abs(found.dominant_band)) <= {1, 2, 3}
