@@ -10,7 +10,10 @@ what tables of changes and distances read. The last line is one JSON object.
 
 import argparse
 import json
-from itertools import combinations
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +27,10 @@ from gyriflow.compare.calibration import brain_scores, spectral_scores
 from gyriflow.compare.distances import aligned_distances
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.poses import pose_from
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, write_yaml
-from gyriflow.metrics.measure import measure_brain
+from gyriflow.metrics.measure import BrainMetrics, measure_brain
 from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM, SCORES, SPECTRAL_SCORES
 from gyriflow.shipped import SHIPPED
@@ -40,53 +44,60 @@ def main() -> None:
     parser.add_argument("--labels", type=Path, default=BRAIN)
     parser.add_argument("--scheme", default="spina-bifida-atlas")
     parser.add_argument("--week", type=float, default=29.0)
+    parser.add_argument("--last", choices=["B4", "B5", "B6"], default="B4", help="last band of the spectra")
     parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--record", type=Path, help="YAML file to write")
     arguments = parser.parse_args()
-    volume = read_label_volume(arguments.labels, cropped=True)
-    wholes, tables, spectra = [], [], []
-    for number in range(arguments.times):
-        labels, affine = turned(volume.labels, volume.affine, number)
-        scheme = SCHEMES[arguments.scheme]
-        surface = from_labels(labels, affine, scheme, week=arguments.week)
-        pose, fissure = pose_from(surface.report["pose"]), surface.report["fissure_x_mm"]
-        thickness = thickness_from_labels(labels, affine, scheme, surface.whole, pose, fissure)
-        found = measure_brain(
-            *(surface.whole, surface.left, surface.right),
-            thickness_mm=thickness.measured_mm,
-            label_volumes_ml=surface.report.get("label_volumes_mL", {}),
-        )
-        wholes.append(surface.whole)
-        tables.append(found.table.assign(repeat=number))
-        spectra.append(found.spectra.assign(subject=str(number), run="real", week=arguments.week))
-        print(f"measured {number + 1} of {arguments.times}", flush=True)
-    table = pd.concat(tables, ignore_index=True)
-    distances = spectral_distances(pd.concat(spectra, ignore_index=True)).groupby("metric")["value"].mean().dropna()
-    pairs = [aligned_distances(*pair) for pair in combinations(wholes, 2)]
-    for key in ("distance", "distance95"):
-        distances[f"surface_{key}"] = np.mean([pair[f"{key}_mm"] for pair in pairs])
-    scores = [
-        brain_scores(wholes[i], wholes[i + 1], SURFACE_SCORES, radius_mm=CURVATURE_RADIUS_MM)
-        | spectral_scores(spectra[i], spectra[i + 1])
-        for i in range(len(wholes) - 1)
-    ]
+    with ProcessPoolExecutor(arguments.processes, get_context("spawn")) as pool:
+        measured = list(pool.map(partial(measure_turned, arguments), range(arguments.times)))
+        compared = list(pool.map(compare_pair, pairwise(measured)))
+    table = pd.concat([found.table for _, found in measured], ignore_index=True)
+    spectra = [found.spectra.assign(subject=str(i), run="real", week=0.0) for i, (_, found) in enumerate(measured)]
+    spectral = spectral_distances(pd.concat(spectra, ignore_index=True)).groupby("metric")["value"].mean().dropna()
+    distances, scores = (pd.DataFrame(rows).mean().dropna() for rows in zip(*compared, strict=True))
     record = {
         "source": "benchmarks/repeatability.py",
         "brain": arguments.labels.parent.name,
         "repeats": arguments.times,
-        "voxel_mm": float(np.linalg.norm(volume.affine[:3, 0])),
         "metrics": variation(table),
-        "distances": {name: rounded(value) for name, value in distances.items()},
-        "scores": {name: rounded(value) for name, value in pd.DataFrame(scores).mean().dropna().items()},
+        "distances": {name: rounded(value) for name, value in (*distances.items(), *spectral.items())},
+        "scores": {name: rounded(value) for name, value in scores.items()},
     }
-    # bands beyond those that are analysed are empty by design
-    empty = int((table.groupby(["hemisphere", "metric"])["value"].count().between(1, arguments.times - 1)).sum())
+    # bands beyond those that are analysed are missing in all repeats
+    missing = table.groupby(["hemisphere", "metric"])["value"].count().between(1, arguments.times - 1).sum()
     print("| metric | coefficient of variation | standard deviation |\n| --- | ---: | ---: |")
     for name, row in record["metrics"].items():
         print(f"| `{name}` | {100 * row['cv']:.2f} % | {row['sd']:.3g} |")
     if arguments.record:
         write_yaml(arguments.record, record)
-    print(json.dumps(record | {"numbers_missing_in_some_repeats": empty}))
+    print(json.dumps(record | {"numbers_missing_in_some_repeats": int(missing)}))
+
+
+def measure_turned(arguments: argparse.Namespace, number: int) -> tuple[TriangleMesh, BrainMetrics]:
+    """Return the surface and the metrics of the brain, turned for the nth time."""
+    volume, scheme = read_label_volume(arguments.labels, cropped=True), SCHEMES[arguments.scheme]
+    labels, affine = turned(volume.labels, volume.affine, number)
+    surface = from_labels(labels, affine, scheme, week=arguments.week)
+    pose, fissure = pose_from(surface.report["pose"]), surface.report["fissure_x_mm"]
+    thickness = thickness_from_labels(labels, affine, scheme, surface.whole, pose, fissure)
+    found = measure_brain(
+        *(surface.whole, surface.left, surface.right),
+        thickness_mm=thickness.measured_mm,
+        label_volumes_ml=surface.report.get("label_volumes_mL", {}),
+        spangy_modes=arguments.last,
+    )
+    print(f"measured {number + 1}", flush=True)
+    return surface.whole, found
+
+
+def compare_pair(pair: tuple) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the distances between two surfaces of the brain, and the scores of one against the other."""
+    (first, found), (second, other) = pair
+    distances = aligned_distances(first, second)
+    scores = brain_scores(first, second, SURFACE_SCORES, radius_mm=CURVATURE_RADIUS_MM)
+    scores |= spectral_scores(found.spectra, other.spectra)
+    return {f"surface_{name}": distances[f"{name}_mm"] for name in ("distance", "distance95")}, scores
 
 
 def turned(labels: np.ndarray, affine: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray]:
