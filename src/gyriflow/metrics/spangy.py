@@ -36,8 +36,8 @@ OPEN_AND_CLOSED = "open and closed hemispheres"
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
 
-VERTICES_PER_WAVELENGTH = 7.0
-"""Edges per shortest wave on the surface that modes are computed on: see `benchmarks/spectra.py` for the choice."""
+VERTICES_PER_WAVELENGTH = 8.0
+"""Edges per shortest wave on the surface that modes are computed on; `benchmarks/spectra.py` compares other numbers."""
 LONGEST_EDGE_MM = 1.8
 """Edges of that surface at most: longer ones do not follow the banks of sulci, whatever the waves."""
 WORTHWHILE = 0.8
@@ -260,7 +260,7 @@ def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
         )
         flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else ""
         end, longest = max(a.longest, b.longest) - last, max(a.longest, b.longest)
-        octaves = np.linspace(end, longest, 4 * PARTS * last + 1)
+        octaves = np.linspace(end, longest, 4 * PARTS * last + 1, dtype=np.float64)
         between = np.abs(a.cumulative(octaves, end) - b.cumulative(octaves, end))
         value = np.nan if flag else float(np.trapezoid(between, octaves))
         name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
