@@ -45,7 +45,7 @@ from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
-from gyriflow.metrics.measure import folding_metrics, measure_hemisphere, size_metrics
+from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -161,8 +161,8 @@ def carry_surface(frames: Path, week: float) -> CarriedSurface:
     mesh = measured_surface()
     match = match_points(mesh.vertices, vertex_normals(mesh), TriangleMesh(before, faces))
     surface = TriangleMesh(mesh.vertices + values_at(match, after - before), mesh.faces)
-    side = measure_hemisphere("left", surface, None, CURVATURE_RADIUS_MM, 2)
-    metrics = size_metrics(surface, side.crossing) | folding_metrics([side])
+    side = measure_folds(surface, CURVATURE_RADIUS_MM)
+    metrics = size_metrics(surface) | folding_metrics([side])
     return CarriedSurface(surface, side.curvature_maps.shape_index, metrics)
 
 

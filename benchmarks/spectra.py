@@ -1,9 +1,21 @@
 """Print spectra of folds of one wavelength for both proxies, and the share of its curvature that a wave keeps.
 
+    ./run python benchmarks/spectra.py [--surface NAME.surf.gii ...] [--per-wavelength 8 7 6 5] [--last B5]
+
 The folds are radial waves of degree 8 on a sphere of 25 mm radius: 18.5 mm long, in the middle of B3; the power in B4
 is of harmonics. `isotropic` waves run in all directions, `parallel` folds from pole to pole. The shallow waves of the
 second table are on a plane; `closed form` is `gyriflow.metrics.curvature.kept_curvature`.
+
+With surfaces, these are compared instead: spectra of a hemisphere on copies with fewer vertices, against those on all
+of its own vertices, which should have at least ten for the shortest wave. Of both proxies, the errors of the powers of
+B1 to the last band and the share of the area with the same dominant band; and, against the consistent mass matrix, the
+numbers of modes.
 """
+
+import argparse
+import time
+from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -11,8 +23,11 @@ from scipy.special import sph_harm_y
 from trimesh.creation import icosphere
 
 from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
+from gyriflow.io.surfaces import read_surface
+from gyriflow.metrics import spangy
 from gyriflow.metrics.curvature import curvature, kept_curvature
 from gyriflow.metrics.measure import hemisphere_spectra
+from gyriflow.settings.terms import PROXIES
 
 DEGREE, RADIUS_MM, FITTED_MM = 8, 25.0, 2.6
 MODES = 23**2
@@ -46,7 +61,39 @@ def kept_share(wavelength_radii: float, edges_per_radius: float) -> tuple[float,
     return float(found.mean[inside] @ true[inside] / np.sum(true[inside] ** 2)), float(found.radius_mm.mean())
 
 
-if __name__ == "__main__":
+def compare_copies(path: Path, per_wavelength: list[float], last: str) -> None:
+    """Print a row for the surface as it is, with both mass matrices, and for each copy."""
+    mesh = read_surface(path)
+    bend, areas = curvature(mesh), vertex_areas(mesh)
+    reference: dict = {}
+
+    def row(name: str, mass: str = "mean", **settings: float) -> None:
+        start = time.process_time()
+        with patch.multiple(spangy, **settings):
+            basis = spangy.spectral_basis(mesh, last, mass)
+            found = [
+                spangy.spectrum(values, basis, radius_mm=float(bend.radius_mm.mean()))
+                for values in (bend.mean, bend.shape_index)
+            ]
+        seconds, cells = time.process_time() - start, []
+        for proxy, part in zip(PROXIES, found, strict=True):
+            exact = reference.setdefault(proxy, part)
+            errors = 100 * (part.bands["power"] / exact.bands["power"] - 1)[1 : int(last[1]) + 1]
+            same = 100 * np.average(part.dominant_band == exact.dominant_band, weights=areas)
+            cells += [" ".join(f"{error:+.1f}" for error in errors), f"{same:.1f} %"]
+        modes = " ".join(map(str, found[0].bands["modes"][1 : int(last[1]) + 1]))
+        print(f"| {name} | {basis.places.shape[1]} | {seconds:.1f} | {modes} | {' | '.join(cells)} |", flush=True)
+
+    print(f"\n{path}\n\n| edges per wave | vertices | CPU s | modes | H, % | same | shape index, % | same |")
+    print("| --- | ---: | ---: | --- | --- | ---: | --- | ---: |")
+    row("as it is", WORTHWHILE=0.0)
+    for edges in per_wavelength:
+        row(f"{edges:g}", VERTICES_PER_WAVELENGTH=edges, WORTHWHILE=np.inf)
+    row("as it is, consistent", "consistent")
+
+
+def print_waves() -> None:
+    """Print the tables of waves of known length."""
     print("| folds | rms, mm | proxy | B2 | B3 | B4 |\n| --- | --- | --- | --- | --- | --- |")
     for kind in ("isotropic", "parallel"):
         for rms_mm in (0.4, 1.0):
@@ -60,3 +107,19 @@ if __name__ == "__main__":
             share, radius = kept_share(wavelength, edges_per_radius)
             closed = float(kept_curvature(np.array(wavelength), radius))
             print(f"| {wavelength / radius:.2f} | {radius * edges_per_radius:.1f} | {share:.2f} | {closed:.2f} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--surface", type=Path, nargs="+", default=[], help="surfaces of hemispheres")
+    parser.add_argument("--per-wavelength", type=float, nargs="+", default=[10.0, 8.0, 7.0, 6.0, 5.0])
+    parser.add_argument("--last", choices=["B4", "B5", "B6"], default="B5")
+    arguments = parser.parse_args()
+    for path in arguments.surface:
+        compare_copies(path, arguments.per_wavelength, arguments.last)
+    if not arguments.surface:
+        print_waves()
+
+
+if __name__ == "__main__":
+    main()

@@ -89,6 +89,7 @@ rule calibration_score:
 rule calibration_tables:
     input:
         scores=CALIBRATED.scores_before(max(CALIBRATED.rounds.values()) + 1) if CALIBRATED else [],
+        noise=f"{workflow.basedir}/norms/repeatability.yaml",
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
@@ -97,6 +98,7 @@ rule calibration_tables:
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,
+        weights=lambda w: CONFIG.calibrate.score,
     script:
         "../scripts/calibration_tables.py"
 

@@ -1,5 +1,5 @@
 # Metrics of observed and simulated brains, by the same script with the same settings.
-MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes"})
+MEASURED_WITH = CONFIG.metrics.model_dump(include={"curvature_radius_mm", "spangy_modes", "spangy_mass"})
 
 
 def labels_or_white(wildcards):

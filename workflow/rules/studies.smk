@@ -51,6 +51,7 @@ rule study_tables:
         params=from_members(PARAMETERS),
         summaries=from_members(FOLDING["summary"]),
         zones=from_members(FOLDING["zones"]),
+        noise=f"{workflow.basedir}/norms/repeatability.yaml",
     output:
         members=f"{SWEEP}/members.csv",
         comparison=f"{SWEEP}/comparison.csv",

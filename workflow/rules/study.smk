@@ -21,6 +21,7 @@ rule metrics_tables:
         # they contain the volumes of labels
         labelled=[brain.report for brain in LABELLED],
         norms=f"{workflow.basedir}/norms/svrtk-volumes.yaml",
+        noise=f"{workflow.basedir}/norms/repeatability.yaml",
         # norms of another study
         cohort=[CONFIG.metrics.norms] if CONFIG.metrics.norms else [],
     output:

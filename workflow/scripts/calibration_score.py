@@ -25,7 +25,7 @@ def surfaces_at_week(regions, frames):
 with step(snakemake.log[0]):
     values = read_table(files.design).set_index("run").loc[run].to_dict()
     causes = [summary["diverged"] for summary in map(read_json, files.summaries) if summary["diverged"]]
-    radius_mm, modes = params.settings["curvature_radius_mm"], params.settings["spangy_modes"]
+    radius_mm = params.settings["curvature_radius_mm"]
     # a diverged run has not reached the week
     simulated = [] if causes else list(map(surfaces_at_week, files.regions, files.frames))
 
@@ -36,7 +36,7 @@ with step(snakemake.log[0]):
 
     brains = (observed_brain(path, read_surface(path), radius_mm) for path in files.real)
     pairs = pair_up((whole for whole, _, _ in simulated), brains)
-    simulated_spectra = (surface_spectra(left, right, radius_mm, modes) for _, left, right in simulated)
+    simulated_spectra = (surface_spectra(left, right, **params.settings) for _, left, right in simulated)
     spectra = pair_up(simulated_spectra, map(read_table, files.spectra))
     score = run_score(pairs, params.weights, causes, radius_mm=radius_mm, spectra=spectra)
     write_table(snakemake.output[0], pd.DataFrame([{"run": run, "round": params.round, **values, **score}]))

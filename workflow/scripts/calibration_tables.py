@@ -4,10 +4,14 @@ import pandas as pd
 
 from gyriflow.compare.calibration import find_optimum, fit_surrogate
 from gyriflow.io.files import read_table, write_table
+from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.repeatability import score_noise
 from gyriflow.step import step
 
 params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
     runs = pd.concat(map(read_table, snakemake.input.scores), ignore_index=True)
     write_table(output.runs, runs)
-    write_table(output.optimum, find_optimum(fit_surrogate(runs, params.bounds, params.seed)))
+    optimum = find_optimum(fit_surrogate(runs, params.bounds, params.seed))
+    noise = score_noise(params.weights, read_yaml(snakemake.input.noise))
+    write_table(output.optimum, optimum.assign(score_noise=noise))

@@ -13,6 +13,7 @@ from gyriflow.metrics.norms import (
     published_norms,
     volume_tables,
 )
+from gyriflow.metrics.repeatability import with_change_noise, with_distance_noise
 from gyriflow.metrics.spangy import spectral_distances
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, wide_table
 from gyriflow.step import step
@@ -23,7 +24,7 @@ with step(snakemake.log[0]):
     metrics, regions = tables["metrics"], [tables["regions"]] if files.regions else []
     people = metrics.assign(person=metrics["subject"].map(params.subjects))
     reference = [] if files.cohort else params.reference
-    population = params.population
+    population, noise = params.population, read_yaml(files.noise)
     if files.cohort:
         content = read_json(files.cohort[0])
         cohort, population = cohort_from_plain(content), content.get("population")
@@ -33,11 +34,11 @@ with step(snakemake.log[0]):
     tables |= {
         "metrics_long": (long := long_table([metrics, *regions])),
         "metrics_wide": wide_table(long, params.covariates),
-        "change": change_between_scans(long, params.scans),
+        "change": with_change_noise(change_between_scans(long, params.scans), noise),
         "asymmetry": pd.concat(parts, ignore_index=True),
         "norm_curves": norm_curves(cohort),
         "centiles": measured_scores(people, reference, cohort),
-        "spectral_distance": spectral_distances(tables["spectra"]),
+        "spectral_distance": with_distance_noise(spectral_distances(tables["spectra"]), noise, "metric"),
     }
     if files.labelled:
         reports = [read_json(path)["volumes_of_labels_mL"] for path in files.labelled]

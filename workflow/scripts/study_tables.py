@@ -5,6 +5,7 @@ import pandas as pd
 from gyriflow.compare.sweeps import joined_comparisons, member_row, nearest_runs, with_common_cut
 from gyriflow.io.files import read_json, read_table, read_tables, write_table
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.repeatability import with_distance_noise
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -22,6 +23,7 @@ with step(snakemake.log[0]):
     coefficients = read_tables(files.coefficients).drop_duplicates()
     if len(coefficients):
         found = with_common_cut(found, coefficients)
+    found = with_distance_noise(found, read_yaml(files.noise), "measure")
     comparison = members[["subject", "run", *varied, "resolution"]].merge(found, on=["subject", "run"])
     write_table(output.members, members)
     write_table(output.comparison, comparison)

@@ -23,6 +23,8 @@ NO_NEAREST = "no nearest run: the band is not resolved; use shorter edges and a 
 """Flag of a measure that no run resolves."""
 COEFFICIENTS = ["subject", "run", "hemisphere", "mode", "band", "coefficient_shape_index"]
 """Columns of the coefficients that spectra are cut with."""
+WITHIN_NOISE = "within noise of the next"
+"""Flag of a nearest run that is nearer than the next one by less than a brain is from itself, measured again."""
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 _VALUES = ("value", "observed_value")
@@ -217,7 +219,10 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
         row = {name: best[name] for name in (*keys, *varied, "run", "distance")}
         if further:
             row |= {f"next_{name}": further[0][name] for name in (*varied, "distance")}
-        rows.append(row | {"flag": _flags(best, members[members["subject"] == best["subject"]], varied)})
+        flags = _flags(best, members[members["subject"] == best["subject"]], varied)
+        if further and further[0]["distance"] - best["distance"] < best.get("noise", 0.0):
+            flags = f"{WITHIN_NOISE}; {flags}".removesuffix("; ok")
+        rows.append(row | {"flag": flags})
     return pd.DataFrame(rows).reindex(columns=columns)
 
 

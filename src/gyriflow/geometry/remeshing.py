@@ -44,6 +44,20 @@ def remesh(
     return from_meshlab(document)
 
 
+def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
+    """Return the surface with about so many vertices, by quadric edge collapse; its topology and boundary are kept."""
+    document = in_meshlab(mesh)
+    document.meshing_decimation_quadric_edge_collapse(
+        targetfacenum=2 * vertices,
+        qualitythr=1.0,
+        planarquadric=True,
+        preservenormal=True,
+        preserveboundary=True,
+        preservetopology=True,
+    )
+    return from_meshlab(document)
+
+
 def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
     """Remove self-intersections by Laplacian smoothing of the faces concerned.
 

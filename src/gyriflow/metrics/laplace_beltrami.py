@@ -6,11 +6,12 @@ from typing import Any
 import igl
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import MeshError, SolverError
 from ..geometry.diffusion import stiffness_matrix
 from ..geometry.triangles import Floats, TriangleMesh
+from ..settings.terms import MassMatrix
 
 TOLERANCE = 1e-11
 """Of the residual of a mode, relative to its eigenvalue."""
@@ -20,9 +21,8 @@ MODES_PER_SLICE = 100
 
 SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
 
-DENSE_VERTICES = 600
-DENSE_VERTICES_MANY_MODES = 3000
-"""Up to these sizes LAPACK solves the problem as a whole; the second where over a third of all modes are needed."""
+DENSE_VERTICES = 1000
+"""Up to this size LAPACK solves the problem as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +36,39 @@ class Modes:
     functions: Floats
 
 
-def laplacian(mesh: TriangleMesh) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
+def laplacian(mesh: TriangleMesh, mass: MassMatrix = "mean") -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
     """Return the (n, n) stiffness K (no unit) and mass M (mm²) of linear finite elements.
 
-    The boundary of an open surface is free (Neumann). MeshError where a vertex has no face.
+    With the consistent mass matrix eigenvalues are too large by about (kh)²/12, for waves of number k on edges h; with
+    the lumped one too small by as much. Their `mean` cancels this (Ainsworth and Wajid 2010, SIAM J. Numer. Anal. 48,
+    346-371). `consistent` is as in LaPy. The boundary of an open surface is free (Neumann). MeshError where a vertex
+    has no face.
     """
     unused = len(mesh.vertices) - len(np.unique(mesh.faces))
     if unused:
         raise MeshError("vertices without a face have no Laplacian", found=unused, expected=0)
     stiffness = stiffness_matrix(mesh.vertices, mesh.faces)
-    mass = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
-    return sparse.csc_matrix(stiffness), sparse.csc_matrix(mass)
+    matrix = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
+    if mass == "mean":
+        matrix = 0.5 * (matrix + sparse.diags(lumped(matrix)))
+    return sparse.csc_matrix(stiffness), sparse.csc_matrix(matrix)
+
+
+def lumped(mass: sparse.csc_matrix) -> Floats:
+    """Return the (n,) area of each vertex in mm², the sums of a mass matrix' rows."""
+    return np.asarray(mass.sum(axis=1)).ravel()
+
+
+def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
+    """Return λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is not in one piece."""
+    shift, size = -_spacing(mass), stiffness.shape[0]
+    inverse = LinearOperator((size, size), _factorised(stiffness, mass, shift).solve, dtype=np.float64)
+    start = np.random.default_rng(1).standard_normal(size)
+    values = eigsh(stiffness, 2, mass, sigma=shift, OPinv=inverse, v0=start, return_eigenvectors=False)
+    # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives the scale
+    if values.max() < -1e-6 * shift:
+        raise MeshError("the surface is not in one piece", remedy="Remove all but its largest piece.")
+    return float(values.max())
 
 
 def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: int) -> Modes:
@@ -55,31 +77,29 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
     SolverError for a count that the surface does not have, and where a mode is missed.
     """
     size = stiffness.shape[0]
-    largest = size if size <= DENSE_VERTICES_MANY_MODES else size // 2
+    largest = size if size <= DENSE_VERTICES else size // 2
     if not 1 <= count <= largest:
         raise SolverError("impossible number of modes", found=count, expected=f"1 to {largest} for {size} vertices")
-    if size <= DENSE_VERTICES or (size <= DENSE_VERTICES_MANY_MODES and count > size // 3):
-        values, functions = linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1))
-        return Modes(values, functions)
+    if size <= DENSE_VERTICES:
+        return Modes(*linalg.eigh(stiffness.toarray(), mass.toarray(), subset_by_index=(0, count - 1)))
     needed, top = count + 2, (count + 6) * _spacing(mass)
     while (most := count_below(stiffness, mass, top)) < count:
         top *= 1.01 * needed / max(most, needed // 4)
-    modes = modes_below(stiffness, mass, top)
+    modes = modes_below(stiffness, mass, top, most)
     return Modes(modes.eigenvalues[:count], modes.functions[:, :count])
 
 
-def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> Modes:
+def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float, count: int | None = None) -> Modes:
     """Return all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
     SLEPc's spectrum slicing with shift-and-invert Krylov-Schur (Campos and Roman 2012, Numer. Algorithms 60, 279-295):
     the inertia of K − σM at each shift gives the number of eigenvalues between shifts, so that none can be missed.
-    SolverError where a mode is missed.
+    `count` is that of `count_below`, if known. SolverError where a mode is missed.
     """
     size = stiffness.shape[0]
+    count = count_below(stiffness, mass, value) if count is None else count
     if size <= DENSE_VERTICES:
-        values, functions = linalg.eigh(stiffness.toarray(), mass.toarray())
-        number = int(np.searchsorted(values, value))
-        return Modes(values[:number], functions[:, :number])
+        return lowest_modes(stiffness, mass, count)
     # starts MPI, which must not happen before hemispheres are measured in processes of their own
     from petsc4py import PETSc
     from slepc4py import SLEPc
@@ -104,7 +124,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
         factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
         factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         solver.solve()
-        return _converged_modes(solver, operators[0], count_below(stiffness, mass, value))
+        return _converged_modes(solver, operators[0], count)
     except PETSc.Error as error:
         problem = f"the modes up to λ = {value:g} mm⁻² could not be found"
         raise SolverError(problem, found=f"SLEPc's error {error.ierr}", remedy=SLIVERS) from error
@@ -117,17 +137,26 @@ def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
     if (converged := solver.getConverged()) != number:
         raise SolverError("the number of modes is wrong", found=converged, expected=number, remedy=SLIVERS)
     vector, _ = operator.createVecs()
-    values, functions = np.empty(number), np.empty((vector.getSize(), number), order="F")
-    for i in range(number):
-        values[i] = solver.getEigenpair(i, vector).real
-        functions[:, i] = vector.getArray()
+    values = np.array([solver.getEigenvalue(i).real for i in range(number)])
+    functions, order = np.empty((vector.getSize(), number), order="F"), np.argsort(values)
+    for column, i in enumerate(order):
+        solver.getEigenvector(int(i), vector)
+        functions[:, column] = vector.getArray()
     vector.destroy()
-    order = np.argsort(values)
-    return Modes(values[order], functions[:, order])
+    return Modes(values[order], functions)
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:
     return float(4.0 * np.pi / mass.sum())
+
+
+def _factorised(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float) -> SuperLU:
+    return splu(
+        sparse.csc_matrix(stiffness - shift * mass),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
 
 
 def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float) -> int:
@@ -135,12 +164,7 @@ def count_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
 
     With pivots on the diagonal, P(K − value·M)Pᵀ = L U with U = D Lᵀ, so D has the signs of the eigenvalues.
     """
-    factors = splu(
-        sparse.csc_matrix(stiffness - value * mass),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    factors = _factorised(stiffness, mass, value)
     if not np.array_equal(factors.perm_r, factors.perm_c):
         raise SolverError("no inertia: a pivot off the diagonal was taken", found=f"shift {value:g} mm⁻²")
     return int(np.count_nonzero(factors.U.diagonal() < 0))

@@ -1,7 +1,7 @@
 """Measure a brain: the metrics of its surfaces and the maps over them.
 
 A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hemisphere or both), `thickness_metrics` or
-`spectrum_metrics` (one hemisphere); a map is an entry of `Folds.maps` or `Hemisphere.maps`. Each has a record in
+`spectrum_metrics` (one hemisphere); a map is an entry of `Folds.maps` or added by `measure_brain`. Each has a record in
 `gyriflow.quantities`.
 """
 
@@ -26,12 +26,11 @@ from ..geometry.triangles import (
     volume_ml,
 )
 from ..quantities import METRICS, WHITE_METRICS
-from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES
+from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES, MassMatrix
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
 from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth
-from .laplace_beltrami import laplacian
-from .spangy import SpangyModes, Spectrum, first_eigenvalue, modes_of, spectrum, weyl_number
+from .spangy import SpangyModes, Spectrum, spectral_basis, spectrum, weyl_number
 from .thickness import at_part
 
 type Metrics = dict[str, float]
@@ -68,27 +67,6 @@ class Folds:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Hemisphere(Folds):
-    """A hemisphere of n vertices, "left" or "right", with its measures other than folds.
-
-    Thickness is (n,), in mm, NaN where it is not known; `crossing` is the number of faces that cut others, `spectra`
-    has a spectrum for each of the `PROXIES`, `weyl` is Weyl's number of modes.
-    """
-
-    name: str
-    thickness: Floats
-    crossing: int
-    spectra: Mapping[str, Spectrum]
-    weyl: int
-
-    def maps(self) -> dict[str, NDArray]:
-        """Return the arrays per vertex by name, as in `BrainMetrics.maps`."""
-        thickness = {} if np.isnan(self.thickness).all() else {"thickness_mm": self.thickness}
-        bands = {f"spangy_{SPECTRUM_PREFIXES[name]}dominant_band": x.dominant_band for name, x in self.spectra.items()}
-        return {**super().maps(), **thickness, **bands}
-
-
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     """Return the folds of a hemisphere's surface; see `curvature.curvature` for the radius."""
     hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
@@ -102,66 +80,58 @@ def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     )
 
 
-def measure_hemisphere(
-    name: str, mesh: TriangleMesh, thickness: Floats | None, curvature_radius_mm: float, spangy_modes: SpangyModes
-) -> Hemisphere:
-    """Measure a hemisphere, "left" or "right"; `thickness` in mm at its vertices, if known."""
-    folds = measure_folds(mesh, curvature_radius_mm)
-    spectra = hemisphere_spectra(mesh, folds.curvature_maps, spangy_modes)
-    return Hemisphere(
-        **vars(folds),
-        name=name,
-        thickness=np.full(len(mesh.vertices), np.nan) if thickness is None else np.asarray(thickness, dtype=float),
-        crossing=crossing_faces(mesh),
-        spectra=spectra,
-        weyl=weyl_number(area(mesh), float(spectra[PROXIES[0]].eigenvalues[1])),
-    )
-
-
-def hemisphere_spectra(mesh: TriangleMesh, curvature_maps: Curvature, spangy_modes: SpangyModes) -> dict[str, Spectrum]:
-    """Return the spectrum of each of the `PROXIES` of a hemisphere, all on the same modes."""
-    stiffness, mass = laplacian(mesh)
-    modes, reach = modes_of(spangy_modes, stiffness, mass, first_eigenvalue(stiffness, mass))
+def hemisphere_spectra(
+    mesh: TriangleMesh, curvature_maps: Curvature, spangy_modes: SpangyModes, mass: MassMatrix = "mean"
+) -> dict[str, Spectrum]:
+    """Return the spectrum of each of the `PROXIES` of a hemisphere, all on the same modes; see `spectral_basis`."""
+    basis = spectral_basis(mesh, spangy_modes, mass)
     # values near a cut are not reliable and are replaced by a harmonic continuation
     reliable = np.flatnonzero(curvature_maps.reliable)
     values = np.column_stack([curvature_maps.mean, curvature_maps.shape_index])[reliable]
     maps = harmonic_continuation(mesh.vertices, mesh.faces, reliable, tolerance=1e-12)(values).T
     radius = float(curvature_maps.radius_mm.mean())
-    return {
-        proxy: spectrum(proxy_map, modes, mass, radius_mm=radius, reach=reach)
-        for proxy, proxy_map in zip(PROXIES, maps, strict=True)
-    }
+    return {proxy: spectrum(proxy_map, basis, radius_mm=radius) for proxy, proxy_map in zip(PROXIES, maps, strict=True)}
 
 
 def surface_spectra(
-    left: TriangleMesh | None, right: TriangleMesh | None, radius_mm: float, spangy_modes: SpangyModes
+    left: TriangleMesh | None,
+    right: TriangleMesh | None,
+    curvature_radius_mm: float,
+    spangy_modes: SpangyModes,
+    spangy_mass: MassMatrix = "mean",
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
-    return _stacked(
+    meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    return _band_table(
         {
-            name: band_table(hemisphere_spectra(mesh, curvature(mesh, radius_mm=radius_mm), spangy_modes))
-            for name, mesh in (("left", left), ("right", right))
-            if mesh is not None
+            name: hemisphere_spectra(mesh, curvature(mesh, radius_mm=curvature_radius_mm), spangy_modes, spangy_mass)
+            for name, mesh in meshes.items()
         }
     )
 
 
-def band_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
-    """Return the columns proxy and those of `Spectrum.bands`, a row per proxy and band."""
-    return _stacked({proxy: spectrum.bands for proxy, spectrum in spectra.items()}, "proxy")
+def _band_table(spectra: Mapping[str, Mapping[str, Spectrum]]) -> pd.DataFrame:
+    rows = [
+        part.bands.assign(hemisphere=name, proxy=proxy)
+        for name, parts in spectra.items()
+        for proxy, part in parts.items()
+    ]
+    table = pd.concat(rows, ignore_index=True)
+    return table[list(dict.fromkeys(["hemisphere", "proxy", *table.columns]))]
 
 
-def _mode_table(spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
+def _mode_table(name: str, spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
     part = spectra[PROXIES[0]]
     modes = {"mode": np.arange(len(part.band)), "eigenvalue_per_mm2": part.eigenvalues, "band": part.band}
-    return pd.DataFrame(modes | {f"coefficient_{proxy}": part.coefficients for proxy, part in spectra.items()})
+    coefficients = {f"coefficient_{proxy}": part.coefficients for proxy, part in spectra.items()}
+    return pd.DataFrame({"hemisphere": name} | modes | coefficients)
 
 
-def size_metrics(mesh: TriangleMesh, crossing: int) -> Metrics:
+def size_metrics(mesh: TriangleMesh) -> Metrics:
     """Return volume and area of a hemisphere or of the whole, their ratio, and the number of faces that cut others."""
     volume, area_of_mesh = volume_ml(cap(mesh)), area_cm2(mesh)
-    relative = area_of_mesh / volume ** (2 / 3) if volume > 0 else np.nan
-    return {"volume": volume, "area": area_of_mesh, "relative_area": relative, "crossing_faces": float(crossing)}
+    relative, crossing = area_of_mesh / volume ** (2 / 3) if volume > 0 else np.nan, float(crossing_faces(mesh))
+    return {"volume": volume, "area": area_of_mesh, "relative_area": relative, "crossing_faces": crossing}
 
 
 def folding_metrics(sides: Sequence[Folds]) -> Metrics:
@@ -229,14 +199,15 @@ def area_ratio(whole: Metrics, mean_curvature: float) -> Metrics:
     return {"area_ratio": whole["area"] / (1.0 + mean_curvature * whole["mean_thickness"]) / sheet_cm2}
 
 
-def spectrum_metrics(side: Hemisphere) -> Metrics:
+def spectrum_metrics(spectra: Mapping[str, Spectrum], area_mm2: float) -> Metrics:
     """Return the metrics of a hemisphere's spectra.
 
     A band that is cut off has NaN, and relative powers are NaN where a band that they are shares of is cut off:
     `spectra` has all values with their flags.
     """
-    metrics: Metrics = {"spangy_modes": float(len(side.spectra[PROXIES[0]].band)), "weyl_number": float(side.weyl)}
-    for proxy, found in side.spectra.items():
+    eigenvalues = spectra[PROXIES[0]].eigenvalues
+    metrics = {"spangy_modes": float(len(eigenvalues)), "weyl_number": float(weyl_number(area_mm2, eigenvalues[1]))}
+    for proxy, found in spectra.items():
         bands, name = found.bands, f"spangy_{SPECTRUM_PREFIXES[proxy]}"
         power = bands["power"].where(bands["complete"])
         share = bands["relative_power"].where(bands["complete"] & bands["denominator_complete"])
@@ -244,11 +215,6 @@ def spectrum_metrics(side: Hemisphere) -> Metrics:
         metrics |= {f"{name}B{band}_relative_power": float(share[band]) for band in bands["band"][1:]}
         metrics[f"{name}captured_share"] = found.captured
     return metrics
-
-
-def _folding_and_thickness(sides: Sequence[Hemisphere]) -> Metrics:
-    areas = np.concatenate([vertex_areas(side.mesh) for side in sides])
-    return folding_metrics(sides) | thickness_metrics(np.concatenate([side.thickness for side in sides]), areas)
 
 
 def _table(parts: Mapping[str, Metrics]) -> pd.DataFrame:
@@ -289,6 +255,7 @@ def measure_brain(
     label_volumes_ml: Mapping[str, float] | None = None,
     curvature_radius_mm: float = CURVATURE_RADIUS_MM,
     spangy_modes: SpangyModes = SPANGY_MODES,
+    spangy_mass: MassMatrix = "mean",
 ) -> BrainMetrics:
     """Measure a brain.
 
@@ -307,8 +274,8 @@ def measure_brain(
         Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
     label_volumes_ml
         Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
-    curvature_radius_mm, spangy_modes
-        See `curvature.curvature` and `spangy.modes_of`.
+    curvature_radius_mm, spangy_modes, spangy_mass
+        See `curvature.curvature` and `spangy.spectral_basis`.
 
     Raises
     ------
@@ -317,26 +284,43 @@ def measure_brain(
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _require_outward(whole, *meshes.values())
-    sides = []
-    for name, mesh in meshes.items():
-        thickness = None if thickness_mm is None else at_part(thickness_mm, whole, mesh)
-        sides.append(measure_hemisphere(name, mesh, thickness, curvature_radius_mm, spangy_modes))
-    volumes = {metric: (label_volumes_ml or {}).get(name) for metric, name in LABEL_VOLUMES.items()}
-    whole_metrics = size_metrics(whole, crossing_faces(whole)) | _folding_and_thickness(sides)
+    folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in meshes.items()}
+    spectra = {
+        name: hemisphere_spectra(part.mesh, part.curvature_maps, spangy_modes, spangy_mass)
+        for name, part in folds.items()
+    }
+    thickness = {
+        name: np.full(len(mesh.vertices), np.nan) if thickness_mm is None else at_part(thickness_mm, whole, mesh)
+        for name, mesh in meshes.items()
+    }
+
+    def folding_and_thickness(names: Sequence[str]) -> Metrics:
+        areas = np.concatenate([vertex_areas(meshes[name]) for name in names])
+        values = np.concatenate([thickness[name] for name in names])
+        return folding_metrics([folds[name] for name in names]) | thickness_metrics(values, areas)
+
+    whole_metrics = size_metrics(whole) | folding_and_thickness(list(meshes))
     # without caps of medial walls
-    whole_metrics["area"] = sum(area_cm2(side.mesh) for side in sides)
-    whole_metrics |= {metric: volume for metric, volume in volumes.items() if volume is not None}
-    bent = [np.average(side.curvature_maps.mean, weights=vertex_areas(side.mesh)) for side in sides]
-    mean_curvature = float(np.average(bent, weights=[area_cm2(side.mesh) for side in sides]))
+    whole_metrics["area"] = sum(area_cm2(mesh) for mesh in meshes.values())
+    volumes = label_volumes_ml or {}
+    whole_metrics |= {metric: volumes[name] for metric, name in LABEL_VOLUMES.items() if name in volumes}
+    bent = [np.average(part.curvature_maps.mean, weights=vertex_areas(part.mesh)) for part in folds.values()]
+    mean_curvature = float(np.average(bent, weights=[area_cm2(mesh) for mesh in meshes.values()]))
     metrics = {"whole": whole_metrics | area_ratio(whole_metrics, mean_curvature)}
-    for side in sides:
-        sizes = size_metrics(side.mesh, side.crossing)
-        metrics[side.name] = sizes | _folding_and_thickness([side]) | spectrum_metrics(side)
+    maps = {}
+    for name, mesh in meshes.items():
+        found = spectra[name]
+        metrics[name] = size_metrics(mesh) | folding_and_thickness([name]) | spectrum_metrics(found, area(mesh))
+        maps[name] = folds[name].maps()
+        if np.isfinite(thickness[name]).any():
+            maps[name]["thickness_mm"] = thickness[name]
+        for proxy, part in found.items():
+            maps[name][f"spangy_{SPECTRUM_PREFIXES[proxy]}dominant_band"] = part.dominant_band
     return BrainMetrics(
         table=_table(metrics),
-        maps={side.name: side.maps() for side in sides},
-        spectra=_stacked({side.name: band_table(side.spectra) for side in sides}),
-        coefficients=_stacked({side.name: _mode_table(side.spectra) for side in sides}),
+        maps=maps,
+        spectra=_band_table(spectra),
+        coefficients=pd.concat([_mode_table(name, part) for name, part in spectra.items()], ignore_index=True),
     )
 
 
@@ -345,10 +329,6 @@ def _require_outward(*meshes: TriangleMesh) -> None:
         if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
             volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
             raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
-
-
-def _stacked(tables: Mapping[str, pd.DataFrame], name: str = "hemisphere") -> pd.DataFrame:
-    return pd.concat(tables, names=[name, None]).reset_index(name).reset_index(drop=True)
 
 
 def measure_white(

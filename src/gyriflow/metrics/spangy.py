@@ -5,42 +5,58 @@ how far two spectra are from each other.
 """
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 
-from ..errors import MeshError
-from ..geometry.triangles import Floats, Ints
-from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand
+from ..geometry.matching import match_surface
+from ..geometry.remeshing import decimate
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges
+from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
 from .curvature import kept_curvature
-from .laplace_beltrami import Modes, count_below, lowest_modes, modes_below
+from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, lumped, modes_below
 
 type SpangyModes = int | LastBand
 
 BANDS = 6
 """The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
 
+PARTS = 16
+"""Parts of a band, each a sixteenth of an octave of wavelength, whose powers are given for distances of spectra."""
+PART_POWERS = [f"power_{part:02d}of{PARTS}" for part in range(1, PARTS + 1)]
+
 HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 """The columns that name a hemisphere in the tables of a study."""
+OPEN_AND_CLOSED = "open and closed hemispheres"
+"""Flag of a distance between an open hemisphere and a closed one: closing a cut makes L 5 to 7 % shorter."""
 
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
+
+VERTICES_PER_WAVELENGTH = 8.0
+"""Edges per shortest wave on the surface that modes are computed on; `benchmarks/spectra.py` compares other numbers."""
+LONGEST_EDGE_MM = 1.8
+"""Edges of that surface at most: longer ones do not follow the banks of sulci, whatever the waves."""
+WORTHWHILE = 0.8
+"""A coarser surface is made if it has at most this share of the vertices."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """A folding proxy on the k modes of a surface with n vertices.
 
-    `eigenvalues` λ (k,) are in mm⁻², `coefficients` cᵢ = fᵀ M φᵢ (k,) in the proxy's unit times mm, `band` (k,) the
-    band of each mode, −1 beyond the last one. `dominant_band` (n,) is the signed dominant band, −6 to 6, among the
-    complete bands, 0 where none is; `captured` the share of fᵀMf that the modes hold, 1 if all (Parseval).
+    `eigenvalues` λ (k,) are in mm⁻², `coefficients` (k,) in the proxy's unit times mm, `band` (k,) the band of each
+    mode, −1 beyond the last one. `dominant_band` (n,) is the signed dominant band, −6 to 6, among the complete bands, 0
+    where none is; `captured` the share of the proxy's power ∫f² that the modes hold, 1 if all (Parseval).
 
     `bands` has a row per band: band, wavelength_min_mm, wavelength_max_mm, modes, power (unit of the proxy squared
     times mm²; NaN without modes), relative_power (share of those of B1 to B6 that have modes; NaN for B0), complete
     (the modes reach the band's upper limit), denominator_complete (all bands that relative powers are shares of are),
-    resolved (a wave of the band's middle length keeps 80 % of its curvature, see `curvature.kept_curvature`).
+    kept_curvature (of a shallow wave of the band's middle length, see `curvature.kept_curvature`), resolved (that is at
+    least 80 %), is_open (the surface has an edge), and `PART_POWERS`, the band's power from long to short waves.
     """
 
     eigenvalues: Floats
@@ -49,15 +65,6 @@ class Spectrum:
     bands: pd.DataFrame
     dominant_band: Ints
     captured: float
-
-
-def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
-    """Return λ1, the lowest eigenvalue above 0, in mm⁻²; MeshError where the surface is not in one piece."""
-    values = lowest_modes(stiffness, mass, 3).eigenvalues
-    # the constant is the only mode at 0 of a connected surface; Weyl's spacing gives the scale
-    if values[1] < 1e-6 * 4.0 * np.pi / mass.sum():
-        raise MeshError("the surface is not in one piece", remedy="Remove all but its largest piece.")
-    return float(values[1])
 
 
 def weyl_number(area_mm2: float, first: float) -> int:
@@ -76,122 +83,186 @@ def band_limits(first: float) -> Floats:
     return first * 4.0 ** np.arange(BANDS + 1)
 
 
-def modes_of(
-    choice: SpangyModes, stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, first: float
-) -> tuple[Modes, float]:
-    """Return the modes that a hemisphere's spectrum is made of, and the λ in mm⁻² below which none is missing.
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """The k modes that spectra of a surface with n vertices are made of, on the surface or on a copy with m vertices.
+
+    `eigenvalues` λ (k,) are in mm⁻², `functions` (m, k) in mm⁻¹; `first` is λ1 of the surface, `reach` the λ below
+    which no mode is missing. `places` (n, m) takes values from the copy to the surface, where `energy` (n, n) gives ∫f²
+    in mm², and the functions are orthonormal.
+    """
+
+    eigenvalues: Floats
+    functions: Floats
+    places: sparse.csr_matrix
+    energy: sparse.csc_matrix
+    first: float
+    reach: float
+    is_open: bool
+
+    @property
+    def band(self) -> Ints:
+        """The (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
+        limits = band_limits(self.first)
+        band = np.searchsorted(limits, self.eigenvalues, side="right")
+        # λ1 of the copy may be below that of the surface by rounding
+        band[1:] = np.maximum(band[1:], 1)
+        band[0] = 0
+        band[self.eigenvalues >= limits[-1]] = -1
+        return band
+
+
+def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "mean") -> Basis:
+    """Return the modes that a hemisphere's spectra are made of.
 
     The name of a band stands for all modes up to its end; that none is missing there is known by inertia, so that no
     mode of the next band is needed to show it. They are at most half as many as there are vertices. A number is taken
-    as it is.
+    as it is. With the `mean` mass matrix they are computed on a copy with only as many vertices as the shortest wave
+    needs, and powers are sums over the surface's vertices; neither has an error of order (kh)². `consistent` is as in
+    LaPy: on the surface as it is, with powers by the same matrix. MeshError where the surface is not in one piece.
     """
-    number = stiffness.shape[0] // 2 if isinstance(choice, str) else choice
-    if isinstance(choice, str):
-        end = float(band_limits(first)[int(choice.removeprefix("B"))])
-        if count_below(stiffness, mass, end) <= number:
-            return modes_below(stiffness, mass, end), end
-    modes = lowest_modes(stiffness, mass, number)
-    return modes, float(modes.eigenvalues[-1])
+    stiffness, matrix = laplacian(mesh, mass)
+    first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
+    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
+    by_name = isinstance(choice, str)
+    end = float(band_limits(first)[int(str(choice)[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
+    edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
+    needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
+    if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
+        copy = decimate(mesh, needed)
+        match, columns = match_surface(mesh, copy), len(copy.vertices)
+        rows = np.repeat(np.arange(len(mesh.vertices)), 3)
+        places = sparse.csr_matrix(
+            (match.weights.ravel(), (rows, match.corners.ravel())), (len(mesh.vertices), columns)
+        )
+        stiffness, matrix = laplacian(copy, mass)
+    number = stiffness.shape[0] // 2
+    if by_name and (count := count_below(stiffness, matrix, end)) <= number:
+        modes, reach = modes_below(stiffness, matrix, end, count), end
+    else:
+        modes = lowest_modes(stiffness, matrix, number if by_name else int(choice))
+        reach = float(modes.eigenvalues[-1])
+    # interpolated modes are not quite orthonormal on the surface: the nearest that are (Löwdin 1950)
+    values, vectors = linalg.eigh(modes.functions.T @ ((places.T @ energy @ places) @ modes.functions))
+    functions = modes.functions @ ((vectors / np.sqrt(values)) @ vectors.T)
+    is_open = bool((edges(mesh)[1] == 1).any())
+    return Basis(modes.eigenvalues, functions, places, energy, first, reach, is_open)
 
 
-def bands_of_modes(eigenvalues: Floats) -> Ints:
-    """Return the (k,) band of each mode: 0 for the constant alone, −1 beyond B6."""
-    limits = band_limits(eigenvalues[1])
-    band = np.searchsorted(limits, eigenvalues, side="right")
-    band[0] = 0
-    band[eigenvalues >= limits[-1]] = -1
-    return band
+def spectrum(proxy: Floats, basis: Basis, *, radius_mm: float) -> Spectrum:
+    """Return the band spectrum of a folding proxy, (n,) values per vertex of the surface.
 
-
-def spectrum(
-    proxy: Floats, modes: Modes, mass: sparse.csc_matrix, *, radius_mm: float, reach: float | None = None
-) -> Spectrum:
-    """Return the band spectrum of a folding proxy, (n,) values per vertex.
-
-    `radius_mm` is the radius of the curvature fit. `reach` is the λ in mm⁻² below which no mode is missing, by default
-    that of the highest mode. The dominant band is as in Germanaud et al. 2012, from the part of the proxy in each of B1
-    to B6: at a vertex where the proxy is positive the band with the largest part, elsewhere the one with the smallest,
-    with a minus sign.
+    `radius_mm` is the radius of the curvature fit. The dominant band is as in Germanaud et al. 2012, from the part of
+    the proxy in each of B1 to B6: at a vertex where the proxy is positive the band with the largest part, elsewhere the
+    one with the smallest, with a minus sign.
     """
-    coefficients = modes.functions.T @ (mass @ proxy)
-    band = bands_of_modes(modes.eigenvalues)
-    reach = float(modes.eigenvalues[-1]) if reach is None else reach
-    bands = _band_table(modes.eigenvalues, band, coefficients, radius_mm, reach)
+    functions, band = basis.functions, basis.band
+    coefficients = functions.T @ (basis.places.T @ (basis.energy @ proxy))
+    bands = _band_table(basis, coefficients, radius_mm)
     dominant: Ints = np.zeros(len(proxy), dtype=np.int64)
     if len(whole := bands.loc[bands["complete"] & (bands["band"] > 0), "band"].to_numpy()):
-        parts = np.stack([modes.functions[:, band == k] @ coefficients[band == k] for k in whole])
-        dominant = np.where(proxy > 0, whole[parts.argmax(axis=0)], -whole[parts.argmin(axis=0)])
-    captured = float(np.sum(coefficients**2) / (proxy @ (mass @ proxy))) if proxy.any() else 1.0
-    return Spectrum(modes.eigenvalues, coefficients, band, bands, dominant, captured)
+        parts = np.stack([functions[:, band == k] @ coefficients[band == k] for k in whole], axis=1)
+        parts = basis.places @ parts
+        dominant = np.where(proxy > 0, whole[parts.argmax(axis=1)], -whole[parts.argmin(axis=1)])
+    captured = float(np.sum(coefficients**2) / (proxy @ (basis.energy @ proxy))) if proxy.any() else 1.0
+    return Spectrum(basis.eigenvalues, coefficients, band, bands, dominant, captured)
 
 
-def _band_table(eigenvalues: Floats, band: Ints, coefficients: Floats, radius_mm: float, reach: float) -> pd.DataFrame:
-    limits = band_limits(eigenvalues[1])
-    numbers = np.array([np.count_nonzero(band == k) for k in range(BANDS + 1)])
-    power = np.array([np.sum(coefficients[band == k] ** 2) if numbers[k] else np.nan for k in range(BANDS + 1)])
+def _band_table(basis: Basis, coefficients: Floats, radius_mm: float) -> pd.DataFrame:
+    limits, powers = band_limits(basis.first), coefficients**2
+    numbers = np.array([np.count_nonzero(basis.band == k) for k in range(BANDS + 1)])
+    power = np.array([np.sum(powers[basis.band == k]) if numbers[k] else np.nan for k in range(BANDS + 1)])
     total = np.nansum(power[1:])
     wavelengths = np.concatenate([[np.inf], 2.0 * np.pi / np.sqrt(limits)])
-    complete = np.concatenate([[True], limits[1:] <= reach * (1.0 + ROUNDING)])
-    whole = np.arange(BANDS + 1) == 0
+    complete = np.concatenate([[True], limits[1:] <= basis.reach * (1.0 + ROUNDING)])
+    is_mean = np.arange(BANDS + 1) == 0
     share = kept_curvature(np.sqrt(wavelengths[1:] * wavelengths[:-1]), radius_mm)
-    return pd.DataFrame(
+    inside = basis.band > 0
+    octaves = np.maximum(np.log2(basis.eigenvalues[inside] / basis.first) / 2, 0.0)
+    parts = np.bincount((PARTS * octaves).astype(int), powers[inside], PARTS * BANDS).reshape(BANDS, PARTS)
+    table = pd.DataFrame(
         {
             "band": np.arange(BANDS + 1),
-            "wavelength_min_mm": np.where(whole, np.inf, wavelengths[1:]),
+            "wavelength_min_mm": np.where(is_mean, np.inf, wavelengths[1:]),
             "wavelength_max_mm": wavelengths[:-1],
             "modes": numbers,
             "power": power,
             "relative_power": np.append(np.nan, power[1:] / total if total > 0 else 0 * power[1:]),
             "complete": complete,
             "denominator_complete": bool(complete[numbers > 0].all()),
-            "resolved": whole | (share >= MIN_KEPT_CURVATURE),
+            "kept_curvature": share,
+            "resolved": is_mean | (share >= MIN_KEPT_CURVATURE),
+            "is_open": basis.is_open,
         }
     )
+    return table.join(pd.DataFrame(parts, range(1, BANDS + 1), PART_POWERS))
+
+
+@dataclass(frozen=True, eq=False)
+class _Profile:
+    """A hemisphere's power over wavelength: log2 of L in mm, the power of each part of B1 to B6, and its bands."""
+
+    longest: float
+    powers: Floats
+    complete: NDArray[np.bool_]
+    resolved: NDArray[np.bool_]
+    is_open: bool
+
+    def cumulative(self, octaves: Floats, end: float) -> Floats:
+        """Return the share of the power of waves longer than 2^octaves mm, of those longer than 2^end."""
+        edges = self.longest - np.arange(len(self.powers) + 1) / PARTS
+        sums = np.append(0.0, np.cumsum(self.powers))
+        return np.interp(octaves, edges[::-1], sums[::-1]) / np.interp(end, edges[::-1], sums[::-1])
 
 
 def spectral_distances(spectra: pd.DataFrame) -> pd.DataFrame:
     """Return how far the spectrum of each hemisphere is from those of the same side of all measured brains.
 
-    The distance up to band Bk is √Σ(s − s′)² over the fold bands B4 to Bk, where s is the share that a band has of the
-    power of B1 to Bk: 0 for equal shares, at most √2. Neither the size of the brain nor the number of modes enters it.
-    There is one up to B4, up to B5 and up to B6, each between all pairs whose bands are complete and resolved in both.
+    The distance is the area between the cumulative power of both over log2 of the wavelength, in octaves: how far power
+    has to be moved on average, 1 if all waves are half as long. It has no edges between bands. Each curve is the share
+    of the power of waves down to the end of a band Bk, of the two brains the one at the longer wave. There is one up to
+    B4, up to B5 and up to B6, each between all pairs whose bands are complete and resolved in both.
 
-    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, proxy, band, power, complete,
-    resolved; those of mean curvature are compared. A measured brain is not compared with itself.
+    Spectra have the columns subject, run ("real" for measured brains), week, hemisphere, proxy, and those of
+    `Spectrum.bands`; those of mean curvature are compared. A measured brain is not compared with itself.
 
     Columns subject, run, week, hemisphere, real (the measured brain), real_week, proxy, metric (spectral_distance_B4,
-    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", or the reason for a missing value:
-    "B5 B6 not resolved" or "B6 cut off", not complete, in one of the two).
+    spectral_distance_B4_to_B5, spectral_distance_B4_to_B6), value, unit, flag ("ok", `OPEN_AND_CLOSED`, or the reason
+    for a missing value: "B5 B6 not resolved" or "B6 cut off", not complete, in one of the two).
     """
-    spectra = spectra[spectra["proxy"] == PROXIES[0]]
-    complete, resolved, powers = (
-        spectra.pivot_table(name, HEMISPHERE, "band", aggfunc="first").reindex(columns=range(1, BANDS + 1))
-        for name in ("complete", "resolved", "power")
-    )
-    hemispheres = list(complete.index)
-    fine = resolved.eq(True).to_numpy()
-    whole = powers.reindex(complete.index).where(complete.eq(True)).to_numpy(dtype=float)
-    rows = [
-        (*first, second[0], second[2], *row)
-        for i, first in enumerate(hemispheres)
-        for j, second in enumerate(hemispheres)
-        if second[1] == MEASURED and second[3] == first[3] and i != j
-        for row in _distances(whole[i], whole[j], fine[i] & fine[j])
+    rows = spectra[(spectra["proxy"] == PROXIES[0]) & (spectra["band"] > 0)].sort_values("band")
+    profiles = {
+        key: _Profile(
+            float(np.log2(bands["wavelength_max_mm"].iloc[0])),
+            np.nan_to_num(bands[PART_POWERS].to_numpy(dtype=float)).ravel(),
+            bands["complete"].to_numpy(dtype=bool),
+            bands["resolved"].to_numpy(dtype=bool),
+            bool(bands["is_open"].iloc[0]),
+        )
+        for key, bands in rows.groupby(HEMISPHERE)
+    }
+    found = [
+        (*key, other[0], other[2], PROXIES[0], *row)
+        for key, profile in profiles.items()
+        for other, observed in profiles.items()
+        if other[1] == MEASURED and other[3] == key[3] and key != other
+        for row in _distances(profile, observed)
     ]
-    table = pd.DataFrame(rows, columns=[*HEMISPHERE, "real", "real_week", "metric", "value", "flag"])
-    table.insert(len(HEMISPHERE) + 2, "proxy", PROXIES[0])
-    return table.assign(unit="1")[[*table.columns[:-1], "unit", "flag"]]
+    return pd.DataFrame(found, columns=[*HEMISPHERE, "real", "real_week", "proxy", "metric", "value", "unit", "flag"])
 
 
-def _distances(a: Floats, b: Floats, resolved: NDArray[np.bool_]) -> list[tuple[str, float, str]]:
+def _distances(a: _Profile, b: _Profile) -> list[tuple[str, float, str, str]]:
     rows = []
     for last in FOLD_BANDS:
-        fold = slice(FOLD_BANDS[0] - 1, last)
-        shares = a[:last] / a[:last].sum(), b[:last] / b[:last].sum()
         cut, coarse = (
-            " ".join(f"B{k + 1}" for k in np.flatnonzero(bands)) for bands in (np.isnan(a + b)[:last], ~resolved[:last])
+            " ".join(f"B{k + 1}" for k in np.flatnonzero(~(first & second)[:last]))
+            for first, second in ((a.complete, b.complete), (a.resolved, b.resolved))
         )
-        flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else "ok"
+        flag = f"{cut} cut off" if cut else f"{coarse} not resolved" if coarse else ""
+        end, longest = max(a.longest, b.longest) - last, max(a.longest, b.longest)
+        octaves = np.linspace(end, longest, 4 * PARTS * last + 1, dtype=np.float64)
+        between = np.abs(a.cumulative(octaves, end) - b.cumulative(octaves, end))
+        value = np.nan if flag else float(np.trapezoid(between, octaves))
         name = "spectral_distance_B4" + (f"_to_B{last}" if last > FOLD_BANDS[0] else "")
-        rows.append((name, float(np.linalg.norm(shares[0][fold] - shares[1][fold])) if flag == "ok" else np.nan, flag))
+        rows.append((name, value, "octaves", flag or (OPEN_AND_CLOSED if a.is_open != b.is_open else "ok")))
     return rows

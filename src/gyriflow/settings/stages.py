@@ -6,7 +6,7 @@ from pydantic import Field
 
 from .base import FirstIf, InputFile, Settings
 from .brains import GivenRegions
-from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, Mesher
+from .terms import CURVATURE_RADIUS_MM, MAX_HOLE_MM, SPANGY_MODES, LastBand, MassMatrix, Mesher
 
 
 class SurfaceSettings(Settings):
@@ -72,6 +72,9 @@ class MetricsSettings(Settings):
     spangy_modes: Modes = SPANGY_MODES
     """Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`. Each needs four times as many
     modes as the one before."""
+    spangy_mass: MassMatrix = "mean"
+    """Mass matrix of the eigenmodes: the `mean` of the consistent and the lumped one, with exact eigenvalues on few
+    vertices; or `consistent`, as in LaPy and in the FetalFoldSim paper, on the surface as it is."""
     norm_reference: tuple[str, ...] | None = None
     """Ids of the measured brains that others are compared with, or names of atlases. `null`: all observed brains (of
     the start brain's population, if there are several). Brains with other hemispheres than the first start brain are

@@ -85,6 +85,9 @@ CORTICAL_STEEPNESS = 10.0
 LastBand = Literal["B4", "B5", "B6"]
 """The last complete band of eigenmodes."""
 
+MassMatrix = Literal["mean", "consistent"]
+"""The mass matrix of eigenmodes: the mean of consistent and lumped, or the consistent one."""
+
 CURVATURE_RADIUS_MM = 3.0
 """With edges of 0.8 mm it has the bias of three rings of neighbours and half their noise (docs/metrics.md)."""
 SPANGY_MODES: LastBand = "B5"

@@ -182,7 +182,7 @@ def norm_settings(config: Config) -> dict[str, Any]:
         "norms": 2,
         "open_sulci": config.surface.open_sulci,
         "edge_length_mm": config.surface.edge_length_mm,
-        **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes"}),
+        **config.metrics.model_dump(mode="json", include={"curvature_radius_mm", "spangy_modes", "spangy_mass"}),
         "spectra": "mean_curvature",
         "schemes": sorted({brain.scheme for brain in config.brains if brain.scheme}),
     }

@@ -20,6 +20,7 @@ from gyriflow.compare.calibration import (
 from gyriflow.compare.comparison import ObservedBrain, compare, observed_brain
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import TriangleMesh
+from gyriflow.metrics.spangy import PART_POWERS
 
 from .bumpy import PREPARED, RADIUS, REAL, bumpy
 
@@ -62,7 +63,9 @@ def folded(thickness: float, **flags: bool) -> pd.DataFrame:
     bands = np.arange(1, 7)
     power = np.exp(-((np.log2(128 / (6 * thickness)) - bands + 0.5) ** 2))
     table = pd.DataFrame({"band": bands, "power": power, "relative_power": power / power.sum()})
-    table = table.assign(wavelength_min_mm=128 / 2.0**bands, wavelength_max_mm=256 / 2.0**bands)
+    table = table.assign(wavelength_min_mm=128 / 2.0**bands, wavelength_max_mm=256 / 2.0**bands, is_open=False)
+    octaves = np.arange(0.5, 16 * 6).reshape(6, 16) / 16
+    table[PART_POWERS] = np.exp(-((np.log2(128 / (6 * thickness)) - octaves) ** 2))
     return table.assign(hemisphere="left", proxy="mean_curvature", **({"complete": True, "resolved": True} | flags))
 
 

@@ -25,6 +25,7 @@ from gyriflow.compare.published import (
 from gyriflow.compare.sweeps import (
     COMPARISON_COLUMNS,
     NO_NEAREST,
+    WITHIN_NOISE,
     comparison_table,
     joined_comparisons,
     member_row,
@@ -34,6 +35,7 @@ from gyriflow.compare.sweeps import (
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.settings.stages import CostSettings
 
 
@@ -109,6 +111,10 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
     populations = {"a": "normal", "b": "normal", "c": "operated"}
     observed = {"b": parts(12.0), "c": parts(15.0)}
     both = pd.concat([*power, *bands], ignore_index=True)
+    both = both.drop_duplicates(["run", "subject", "proxy", "band"])
+    both = both.assign(wavelength_max_mm=128.0 / 2.0 ** both["band"], is_open=False)
+    # in the middle of each band
+    both[PART_POWERS] = np.outer(both["power"], np.arange(16) == 7)
     table = comparison_table("sim", "a", populations, metrics, both, parts(10.0), observed)
     assert list(table) == COMPARISON_COLUMNS
     assert set(table["subject"] + table["run"]) == {"asim"}
@@ -123,8 +129,8 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
     assert distances["b", "whole", "surface_distance"] == pytest.approx(2.0, abs=0.1)
     assert distances["c", "whole", "surface_distance95"] == pytest.approx(5.0, abs=0.1)
     assert distances["c", "left", "surface_distance"] == pytest.approx(2.5, abs=0.1)
-    # shares of B1 to B4: 5/20 and 4/19
-    assert distances["b", "left", "spectral_distance_B4"] == pytest.approx(5 / 20 - 4 / 19)
+    # shares of B1 to B4: four times 5/20, and 5/19, 5/19, 5/19, 4/19, an octave from each other
+    assert distances["b", "left", "spectral_distance_B4"] == pytest.approx((1 + 2 + 3) * (5 / 19 - 5 / 20), rel=0.02)
 
 
 def test_comparisons_without_rows_keep_their_columns():
@@ -163,6 +169,9 @@ def test_the_nearest_run_has_the_second_nearest_and_flags():
     assert row["flag"] == "ok"
     (row,) = nearest_runs(compared(t1=0.1, t2=0.3, t3=0.2), MEMBERS, ["thickness_mm"]).to_dict("records")
     assert row["flag"] == "not resolved by the mesh; at the end of the range"
+    for noise, flag in ((0.09, "ok"), (0.11, WITHIN_NOISE)):
+        noisy = compared(t1=0.3, t2=0.1, t3=0.2).assign(noise=noise)
+        assert nearest_runs(noisy, MEMBERS, ["thickness_mm"])["flag"].tolist() == [flag]
 
 
 @pytest.mark.fault(86)

@@ -11,7 +11,7 @@ from gyriflow.compare.ensemble import ensemble_maps
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
-from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, submesh, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, area_cm2, flipped, merged, submesh, vertex_areas
 from gyriflow.growth.carrying import maps_on_template
 from gyriflow.metrics.curvature import curvature
 from gyriflow.metrics.measure import (
@@ -121,6 +121,55 @@ def test_maps_and_spectra(apart: BrainMetrics) -> None:
         assert value(apart, "left", f"spangy_{proxy}captured_share") == pytest.approx(1.0, abs=1e-3)
         coefficients = apart.coefficients[f"coefficient_{proxy.rstrip('_') or 'mean_curvature'}"]
         assert coefficients[0] ** 2 == pytest.approx(power)
+
+
+def test_the_whole_is_both_sides_by_area_where_sides_and_vertices_are_unequal() -> None:
+    def bumpy(axes, subdivisions, x):
+        mesh = ellipsoid(axes, subdivisions)
+        bumps = 1.0 + 0.04 * np.sin(0.5 * mesh.vertices[:, 1]) * np.cos(0.4 * mesh.vertices[:, 2])
+        # denser on one side
+        return TriangleMesh(mesh.vertices * bumps[:, None] + [x, 0, 0] + 4 * np.tanh(mesh.vertices / 20), mesh.faces)
+
+    left, right = bumpy((18.0, 26.0, 20.0), 4, -40.0), bumpy((24.0, 34.0, 22.0), 3, 40.0)
+    thickness = np.concatenate([np.linspace(1.0, 2.0, len(left.vertices)), np.linspace(3.0, 5.0, len(right.vertices))])
+    sides = {"left": left, "right": right}
+    found = measure_brain(
+        *(merged(left, right), left, right), thickness_mm=thickness, curvature_radius_mm=6.0, spangy_modes=30
+    )
+    numbers = found.table.set_index(["metric", "hemisphere"])["value"].unstack()
+    areas = np.array([area_cm2(mesh) for mesh in sides.values()])
+    share = areas / areas.sum()
+    means = ["mean_shape_index", "mean_curvedness", "sulcal_area_share", "mean_sulcal_depth", "mean_thickness"]
+    means += ["curvature_radius", "curvature_wavelength"]
+    sums = ["area", "volume", "intrinsic_curvature_index", "folding_index", "mean_curvature_norm"]
+    both = numbers[["left", "right"]]
+    np.testing.assert_allclose(numbers.loc[means, "whole"], both.loc[means] @ share, rtol=1e-9)
+    np.testing.assert_allclose(numbers.loc[sums, "whole"], both.loc[sums].sum(axis=1), rtol=1e-6)
+    # squares add up: √(A ∫K²) and the spread of thickness
+    squares = both.loc["gaussian_curvature_norm"] ** 2 / areas
+    assert numbers.loc["gaussian_curvature_norm", "whole"] == pytest.approx(np.sqrt(areas.sum() * squares.sum()))
+    spread = both.loc["thickness_sd"] ** 2 + (both.loc["mean_thickness"] - numbers.loc["mean_thickness", "whole"]) ** 2
+    assert numbers.loc["thickness_sd", "whole"] == pytest.approx(np.sqrt(spread @ share))
+    for name in ("gyrification_index", "gyrification_index_envelope"):
+        assert numbers.loc[name, "whole"] == pytest.approx(areas.sum() / np.sum(areas / both.loc[name]))
+    # and each side has its own
+    assert (np.abs(both["left"] / both["right"] - 1)[[*means[:5], *sums]] > 0.01).all()
+    for name, mesh in sides.items():
+        maps = found.maps[name]
+        weights = vertex_areas(mesh)
+        assert both.loc["mean_sulcal_depth", name] == pytest.approx(
+            np.average(maps["sulcal_depth_mm"], weights=weights)
+        )
+        assert both.loc["sulcal_depth_95", name] == pytest.approx(
+            np.quantile(maps["sulcal_depth_mm"], 0.95, weights=weights, method="inverted_cdf")
+        )
+        power = found.spectra.query("hemisphere == @name and proxy == 'shape_index'").set_index("band")["power"]
+        total = np.average(maps["shape_index"] ** 2, weights=weights) * weights.sum()
+        assert both.loc["spangy_shape_index_captured_share", name] == pytest.approx(power.sum() / total, rel=1e-6)
+        assert both.loc["spangy_shape_index_B1_power", name] == pytest.approx(power[1])
+        assert both.loc["relative_area", name] == pytest.approx(
+            both.loc["area", name] / both.loc["volume", name] ** (2 / 3)
+        )
 
 
 def test_folds_of_one_wavelength_are_one_band_of_mean_curvature_but_not_of_shape_index() -> None:

@@ -6,13 +6,22 @@ import pytest
 from facts import Facts
 from scipy import sparse
 from scipy.sparse.linalg import eigsh
-from shapes import ellipsoid, sheet, sphere
+from shapes import ellipsoid, octasphere, rigid, sheet, sphere
 
 from gyriflow.errors import MeshError, SolverError
-from gyriflow.geometry.triangles import TriangleMesh, area, merged, transformed
-from gyriflow.metrics import laplace_beltrami
-from gyriflow.metrics.laplace_beltrami import Modes, laplacian, lowest_modes
-from gyriflow.metrics.spangy import bands_of_modes, first_eigenvalue, modes_of, spectral_distances, spectrum
+from gyriflow.geometry.remeshing import remesh
+from gyriflow.geometry.triangles import TriangleMesh, area, merged, submesh, transformed, vertex_areas
+from gyriflow.metrics import laplace_beltrami, spangy
+from gyriflow.metrics.curvature import kept_curvature
+from gyriflow.metrics.laplace_beltrami import first_eigenvalue, laplacian, lowest_modes
+from gyriflow.metrics.spangy import (
+    OPEN_AND_CLOSED,
+    PART_POWERS,
+    Basis,
+    spectral_basis,
+    spectral_distances,
+    spectrum,
+)
 
 AXES = (35.0, 25.0, 20.0)
 
@@ -23,31 +32,32 @@ def shape() -> TriangleMesh:
 
 
 @pytest.fixture(scope="module")
-def solved(shape: TriangleMesh):
-    stiffness, mass = laplacian(shape)
-    return lowest_modes(stiffness, mass, 200), mass
+def solved(shape: TriangleMesh) -> Basis:
+    return spectral_basis(shape, 200)
 
 
 def test_bands_are_half_open() -> None:
-    values = np.array([0.0, 2.0, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
-    np.testing.assert_array_equal(bands_of_modes(values), [0, 1, 1, 2, 2, 3, 6, 6, -1])
+    # the second is λ1, as solved a second time
+    values = np.array([0.0, 2.0 - 4e-9, 7.999, 8.0, 31.0, 32.0, 2.0 * 4**5, 2.0 * 4**6 - 1e-9, 2.0 * 4**6])
+    nothing = sparse.csc_matrix((1, 1))
+    band = Basis(values, np.empty((1, 9)), nothing, nothing, first=2.0, reach=2.0 * 4**6, is_open=False).band
+    np.testing.assert_array_equal(band, [0, 1, 1, 2, 2, 3, 6, 6, -1])
 
 
 def test_parseval_with_all_modes() -> None:
     mesh = ellipsoid(AXES, 2)
-    stiffness, mass = laplacian(mesh)
-    modes = lowest_modes(stiffness, mass, len(mesh.vertices))
+    basis = spectral_basis(mesh, len(mesh.vertices), "consistent")
     proxy = np.random.default_rng(1).standard_normal(len(mesh.vertices))
-    found = spectrum(proxy, modes, mass, radius_mm=1.0)
+    found = spectrum(proxy, basis, radius_mm=1.0)
     assert found.captured == pytest.approx(1.0, rel=1e-10)
     beyond = np.sum(found.coefficients[found.band == -1] ** 2)
-    assert np.nansum(found.bands["power"]) + beyond == pytest.approx(proxy @ (mass @ proxy), rel=1e-10)
+    total = proxy @ (laplacian(mesh, "consistent")[1] @ proxy)
+    assert np.nansum(found.bands["power"]) + beyond == pytest.approx(total, rel=1e-10)
 
 
 def test_relative_power_leaves_the_mean_out_and_sums_to_one(shape, solved) -> None:
-    modes, mass = solved
     proxy = np.sin(shape.vertices[:, 0] / 4.0) + shape.vertices[:, 2] / 20.0
-    tables = [spectrum(proxy + offset, modes, mass, radius_mm=1.0).bands for offset in (0.0, 100.0)]
+    tables = [spectrum(proxy + offset, solved, radius_mm=1.0).bands for offset in (0.0, 100.0)]
     assert np.isnan(tables[0]["relative_power"][0])
     assert tables[0]["relative_power"].sum() == pytest.approx(1.0)
     np.testing.assert_allclose(tables[0]["relative_power"], tables[1]["relative_power"], atol=1e-9)
@@ -57,9 +67,8 @@ def test_relative_power_leaves_the_mean_out_and_sums_to_one(shape, solved) -> No
 def test_a_sphere_has_its_degrees_in_the_bands() -> None:
     # λ = l(l + 1)/R² and λ1 = 2/R²: B1 holds l = 1 and 2, B2 l = 3 to 5, B3 l = 6 to 10, of 2l + 1 modes each
     mesh = sphere(20.0)
-    stiffness, mass = laplacian(mesh)
     x, y, z = (mesh.vertices / 20.0).T
-    modes = lowest_modes(stiffness, mass, 130)
+    basis = spectral_basis(mesh, 130)
     harmonics = {
         1: (z, x * y),
         2: (5 * z**3 - 3 * z, x**4 - 6 * x**2 * y**2 + y**4),
@@ -67,7 +76,7 @@ def test_a_sphere_has_its_degrees_in_the_bands() -> None:
     }
     for band, proxies in harmonics.items():
         for proxy in proxies:
-            found = spectrum(proxy, modes, mass, radius_mm=1.0)
+            found = spectrum(proxy, basis, radius_mm=1.0)
             assert found.bands["relative_power"][band] > 0.99
     assert found.bands["modes"][:4].tolist() == [1, 3 + 5, 7 + 9 + 11, 13 + 15 + 17 + 19 + 21]
     wavelengths = 2 * np.pi * 20.0 / np.sqrt(2.0) / 2.0 ** np.arange(7)
@@ -84,72 +93,88 @@ def test_two_pieces_are_refused(shape) -> None:
         first_eigenvalue(*pair)
 
 
-def found(choice, mesh: TriangleMesh) -> tuple[Modes, float]:
-    stiffness, mass = laplacian(mesh)
-    return modes_of(choice, stiffness, mass, first_eigenvalue(stiffness, mass))
-
-
 @pytest.mark.parametrize(
     ("choice", "subdivisions", "number"),
     [
         # of 642 vertices, fewer than twice the modes up to B5
         ("B5", 3, 642 // 2),
         (300, 3, 300),
-        # λ = l(l + 1)/R², λ1 = 2/R²: below 2·4⁴/R² lie l = 0 to 21, each 2l + 1 times, and l = 22 by so little that
-        # the finite elements lift it out
-        pytest.param("B4", 5, 22**2, marks=pytest.mark.slow),
+        # λ = l(l + 1)/R², λ1 = 2/R²: below 2·4⁴/R² lie l = 0 to 22, each 2l + 1 times, the last by 1 %
+        pytest.param("B4", 5, 23**2, marks=pytest.mark.slow),
     ],
 )
 def test_how_many_modes_of_a_sphere_are_taken(choice, subdivisions: int, number: int) -> None:
-    assert len(found(choice, sphere(20.0, subdivisions))[0].eigenvalues) == number
+    assert len(spectral_basis(sphere(20.0, subdivisions), choice).eigenvalues) == number
 
 
 @pytest.mark.parametrize("last", [4, 5, 6])
 def test_bands_are_held_entirely_with_no_more_modes_than_needed(last: int) -> None:
     # elongated, so that few modes lie below 4⁶ λ1
     mesh = ellipsoid((4.0, 36.0, 4.0))
-    modes, reach = found(f"B{last}", mesh)
-    bands = spectrum(mesh.vertices[:, 1], modes, laplacian(mesh)[1], radius_mm=1.0, reach=reach).bands
+    basis = spectral_basis(mesh, f"B{last}")
+    bands = spectrum(mesh.vertices[:, 1], basis, radius_mm=1.0).bands
     assert bands["complete"].tolist() == [band <= last for band in range(7)]
     assert bands["denominator_complete"].all()
     # no band holds a mode that only shows that the one before is complete
     assert bands.loc[last + 1 :, "modes"].tolist() == [0] * (6 - last)
-    assert (bands_of_modes(modes.eigenvalues) >= 0).all()
+    assert (basis.band >= 0).all()
 
 
-def written(subject: str, run: str, powers: list[float], cut_off: int = 7, coarse: int = 7) -> pd.DataFrame:
-    """Return the table of a hemisphere with the powers of B1 to B6, incomplete or unresolved from these bands on."""
+def written(subject: str, run: str, waves: dict[float, float], longest: float = 64.0, **columns) -> pd.DataFrame:
+    """Return the table of a hemisphere with the powers of waves of these lengths in mm, and L in mm.
+
+    `cut_off` and `coarse` are the first bands that are incomplete or unresolved.
+    """
     bands = np.arange(7)
+    powers = np.zeros(6 * 16)
+    for wavelength, power in waves.items():
+        powers[int(16 * np.log2(longest / wavelength))] += power
     table = pd.DataFrame({"subject": subject, "run": run, "week": 22.0, "hemisphere": "left", "band": bands})
-    table = table.assign(proxy="mean_curvature", power=[100.0, *powers])
-    return table.assign(complete=bands < cut_off, resolved=bands < coarse)
+    table = table.assign(proxy="mean_curvature", wavelength_max_mm=longest / 2.0 ** np.maximum(bands - 1, 0))
+    table[PART_POWERS] = np.vstack([np.full(16, np.nan), powers.reshape(6, 16)])
+    table = table.assign(complete=bands < columns.get("cut_off", 7), resolved=bands < columns.get("coarse", 7))
+    return table.assign(is_open=columns.get("is_open", False))
 
 
-EVEN, SHIFTED = [1.0, 1.0, 2.0, 2.0, 2.0, 2.0], [1.0, 1.0, 2.0, 3.0, 3.0, 0.0]
+def distances(own: pd.DataFrame, real: pd.DataFrame) -> pd.DataFrame:
+    return spectral_distances(pd.concat([own, real], ignore_index=True)).query("run == 'sim'")
+
+
+EVEN = {50.0: 1.0, 20.0: 1.0, 6.0: 2.0}
 
 
 @pytest.mark.parametrize(
-    ("own", "real", "expected", "flags"),
+    ("own", "real", "flags"),
     [
-        # shares of B4 to B6: 0.2 each against 0.3, 0.3 and 0
-        (([7 * p for p in EVEN],), (SHIFTED,), [3 / 7 - 2 / 6, 2**0.5 / 20, 0.06**0.5], ["ok"] * 3),
-        # a band that is cut off in one has no distance and changes no other
-        (
-            ([1, 1, 2, 4, 99, 0], 5),
-            ([2, 2, 2, 2, 0, 77], 6),
-            [1 / 4, np.nan, np.nan],
-            ["ok", "B5 cut off", "B5 B6 cut off"],
-        ),
-        ((EVEN, 7, 6), (EVEN, 7, 5), [0, np.nan, np.nan], ["ok", "B5 not resolved", "B5 B6 not resolved"]),
+        ({}, {}, ["ok"] * 3),
+        ({"cut_off": 5}, {"cut_off": 6}, ["ok", "B5 cut off", "B5 B6 cut off"]),
+        ({"coarse": 6}, {"coarse": 5}, ["ok", "B5 not resolved", "B5 B6 not resolved"]),
+        ({"is_open": True}, {}, [OPEN_AND_CLOSED] * 3),
+        ({"is_open": True}, {"cut_off": 6}, [OPEN_AND_CLOSED] * 2 + ["B6 cut off"]),
     ],
 )
-def test_distances_are_of_the_shares_of_the_bands_up_to_the_last(own, real, expected, flags) -> None:
-    tables = written("a", "sim", *own), written("b", "real", *real)
-    rows = spectral_distances(pd.concat(tables, ignore_index=True)).query("run == 'sim'")
+def test_distances_say_which_bands_they_miss_and_whether_a_hemisphere_is_open(own, real, flags) -> None:
+    rows = distances(written("a", "sim", EVEN, **own), written("b", "real", {40.0: 1.0, 6.0: 1.0}, **real))
     assert rows["metric"].tolist() == [f"spectral_distance_{bands}" for bands in ("B4", "B4_to_B5", "B4_to_B6")]
-    np.testing.assert_allclose(rows["value"], expected, atol=1e-12)
     assert rows["flag"].tolist() == flags
-    assert set(zip(rows["real"], rows["real_week"], rows["unit"], strict=True)) == {("b", 22.0, "1")}
+    assert rows["value"].isna().tolist() == [flag not in ("ok", OPEN_AND_CLOSED) for flag in flags]
+    assert set(zip(rows["real"], rows["real_week"], rows["unit"], strict=True)) == {("b", 22.0, "octaves")}
+
+
+def test_a_distance_is_how_many_octaves_power_has_to_be_moved() -> None:
+    # a quarter of it by an octave and a half, and as a share: not the amount of power
+    rows = distances(written("a", "sim", {40.0: 3.0, 30.0: 1.0}), written("b", "real", {40.0: 6.0, 30.0 / 2**1.5: 2.0}))
+    np.testing.assert_allclose(rows["value"], 0.25 * 1.5, atol=0.02)
+    # beyond the end of B4, 4 mm, only the longer distances see it
+    rows = distances(written("a", "sim", {40.0: 3.0, 3.0: 1.0}), written("b", "real", {40.0: 3.0}))
+    np.testing.assert_allclose(rows["value"], [0.0, 0.25 * np.log2(40 / 3), 0.25 * np.log2(40 / 3)], atol=0.03)
+
+
+def test_a_distance_has_no_edges_between_bands() -> None:
+    # 8 mm is the border of B3 and B4 where L is 64 mm; of another L, the same waves are elsewhere in their bands
+    for longest in (60.0, 64.0, 70.0):
+        own, real = written("a", "sim", {8.1: 1.0, 20.0: 1.0}), written("b", "real", {7.9: 1.0, 20.0: 1.0}, longest)
+        assert distances(own, real)["value"].iloc[0] < 0.1
 
 
 def test_who_is_compared_with_whom() -> None:
@@ -161,26 +186,103 @@ def test_who_is_compared_with_whom() -> None:
     assert len(table) == 3 * 4
 
 
+@pytest.mark.parametrize(("mass", "error"), [("mean", 0.002), ("consistent", 0.06)])
+def test_the_mean_of_both_mass_matrices_makes_eigenvalues_exact(mass, error) -> None:
+    # degree 12 on a sphere with seven edges per wave
+    stiffness, matrix = laplacian(sphere(20.0), mass)
+    values = lowest_modes(stiffness, matrix, 13**2).eigenvalues
+    ratio = values[12**2 :].mean() / (12 * 13 / 20.0**2)
+    assert ratio == pytest.approx(1.0, abs=error)
+    assert mass == "mean" or ratio > 1.02
+
+
+def waves(mesh: TriangleMesh, degree: int) -> np.ndarray:
+    """Return a harmonic of a degree, in no direction of the mesh, at the vertices of a sphere round 0."""
+    x, y, z = (rigid(20, -50, 35)[:3, :3] @ mesh.vertices.T) / np.linalg.norm(mesh.vertices, axis=1)
+    return np.real((x + 1j * y) ** degree) + z * np.imag((x + 1j * y) ** (degree - 1))
+
+
+def uneven(subdivisions: int) -> TriangleMesh:
+    """Return a sphere of 20 mm whose vertices are twice as dense on one side, and moved at random."""
+    points = sphere(1.0, subdivisions).vertices
+    points = (
+        points + [0.4, 0.1, 0.0] + 0.1 * 2.0**-subdivisions * np.random.default_rng(2).standard_normal(points.shape)
+    )
+    points *= 20.0 / np.linalg.norm(points, axis=1)[:, None]
+    return TriangleMesh(points, sphere(1.0, subdivisions).faces)
+
+
+@pytest.mark.parametrize("subdivisions", [4, 5])
+def test_power_of_a_wave_is_its_square_over_the_surface_on_uneven_vertices_and_on_a_copy(subdivisions) -> None:
+    mesh = uneven(subdivisions)
+    # degree 8 is in the middle of B3; ∫ of the square of both parts by a fine sphere
+    fine = sphere(20.0, 6)
+    exact = np.average(waves(fine, 8) ** 2, weights=vertex_areas(fine)) * 4 * np.pi * 20.0**2
+    basis = spectral_basis(mesh, "B3")
+    assert (basis.places.shape[1] < 0.8 * len(mesh.vertices)) == (subdivisions == 5)
+    found = spectrum(waves(mesh, 8), basis, radius_mm=1.0)
+    assert found.bands["power"][3] == pytest.approx(exact, rel=0.01)
+    assert found.bands["relative_power"][3] > 0.995
+    assert found.bands["modes"].tolist() == [1, 8, 27, 85, 0, 0, 0]
+    assert found.captured == pytest.approx(1.0, abs=0.01)
+    # all of it where the wave is, by parts of an octave: λ8/λ1 = 36, half of log2 of that is 2.58
+    parts = found.bands.loc[1:, PART_POWERS].to_numpy(dtype=float).ravel()
+    assert parts[int(16 * 0.5 * np.log2(36)) + np.arange(-1, 2)].sum() == pytest.approx(exact, rel=0.015)
+
+
+def test_a_copy_gives_the_same_dominant_bands(monkeypatch) -> None:
+    mesh = uneven(5)
+    proxy = waves(mesh, 8) + 0.7 * waves(mesh, 3) + 0.3
+    copied = spectrum(proxy, spectral_basis(mesh, "B3"), radius_mm=1.0)
+    monkeypatch.setattr(spangy, "WORTHWHILE", 0.0)
+    full = spectrum(proxy, spectral_basis(mesh, "B3"), radius_mm=1.0)
+    same = np.average(copied.dominant_band == full.dominant_band, weights=vertex_areas(mesh))
+    assert same > 0.97
+    assert set(np.abs(full.dominant_band)) >= {2, 3}
+    np.testing.assert_allclose(copied.bands["power"], full.bands["power"], rtol=0.01, atol=1e-3 * proxy @ proxy)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "times"),
+    [(2562, 5), *(pytest.param(number, 20, marks=pytest.mark.slow) for number in (14_000, 30_000))],
+)
+def test_rounding_never_cuts_a_band_off(vertices: int, times: int) -> None:
+    mesh = ellipsoid(AXES) if vertices == 2562 else remesh(ellipsoid(AXES, 5), np.sqrt(9000 / (0.87 * vertices)))
+    for number in range(times):
+        moved = mesh.vertices + 1e-3 * np.random.default_rng(number).standard_normal(mesh.vertices.shape)
+        basis = spectral_basis(TriangleMesh(moved, mesh.faces), "B3")
+        bands = spectrum(mesh.vertices[:, 0] ** 2, basis, radius_mm=1.0).bands
+        assert bands["complete"].tolist() == [True] * 4 + [False] * 3
+        assert bands["denominator_complete"].all()
+        assert np.isfinite(bands.loc[1:3, "relative_power"]).all()
+
+
+def test_a_surface_says_whether_it_is_open_and_how_much_curvature_it_keeps() -> None:
+    closed, cut = ellipsoid((30.0, 20.0, 16.0), 3), octasphere(20.0)
+    cut = submesh(cut, cut.vertices[cut.faces].mean(axis=1)[:, 0] > 0)[0]
+    for mesh, is_open in ((closed, False), (cut, True)):
+        bands = spectrum(mesh.vertices[:, 1], spectral_basis(mesh, 40), radius_mm=2.5).bands
+        assert bands["is_open"].tolist() == [is_open] * 7
+        middle = np.sqrt(bands["wavelength_min_mm"] * bands["wavelength_max_mm"])[1:]
+        np.testing.assert_allclose(bands["kept_curvature"][1:], kept_curvature(middle.to_numpy(), 2.5))
+
+
 def test_dominant_band_is_the_one_that_adds_most(solved) -> None:
-    modes, mass = solved
-    band = bands_of_modes(modes.eigenvalues)
-    slow, fast = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (1, 3))
+    slow, fast = (solved.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (1, 3))
     proxy = 10.0 * slow + fast
-    found = spectrum(proxy, modes, mass, radius_mm=1.0).dominant_band
+    found = spectrum(proxy, solved, radius_mm=1.0).dominant_band
     expected = np.where(proxy > 0, np.where(10 * slow > fast, 1, 3), np.where(10 * slow < fast, -1, -3))
     clear = np.abs(proxy) > 1e-3
     np.testing.assert_array_equal(found[clear], expected[clear])
 
 
-def test_a_band_that_is_cut_off_dominates_nowhere(solved) -> None:
-    modes, mass = solved
-    band = bands_of_modes(modes.eigenvalues)
-    slow, cut = (modes.functions[:, np.flatnonzero(band == k)[1]] for k in (2, 4))
-    found = spectrum(slow + 10.0 * cut, modes, mass, radius_mm=1.0)
+def test_a_band_that_is_cut_off_dominates_nowhere(shape, solved) -> None:
+    slow, cut = (solved.functions[:, np.flatnonzero(solved.band == k)[1]] for k in (2, 4))
+    found = spectrum(slow + 10.0 * cut, solved, radius_mm=1.0)
     assert not found.bands["complete"][4]
     assert set(np.abs(found.dominant_band)) <= {1, 2, 3}
-    few = Modes(modes.eigenvalues[:3], modes.functions[:, :3])
-    np.testing.assert_array_equal(spectrum(slow, few, mass, radius_mm=1.0).dominant_band, 0)
+    few = spectral_basis(shape, 3)
+    np.testing.assert_array_equal(spectrum(slow, few, radius_mm=1.0).dominant_band, 0)
 
 
 def rectangle(nx: int, ny: int, width: float, height: float) -> TriangleMesh:
