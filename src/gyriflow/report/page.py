@@ -27,8 +27,6 @@ _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
 DOTS_PER_INCH = 150
 """Pixels of the page per inch of print: a figure as wide as a journal page has 1080."""
-FIRST_PAGE_FIGURES = ("predicted_figure", "weekly_figure")
-"""Kinds of figures. The first figure of these is shown in the summary."""
 BRAIN_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
 """Metrics in the table of brains."""
 NORM_WORDS = {
@@ -53,14 +51,14 @@ def page_figures(
 
     Parameters
     ----------
-    figures : name, section, title, caption in reStructuredText, technical, path and names of each
-        Titles and captions contain the names in braces.
+    figures : name, section, title, caption in reStructuredText, technical, first, path and names of each
+        Titles and captions contain the names in braces. The first one that may be `first` is shown in the summary.
     contents : {path: HTML, or a picture's data URL and its width in inches}
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
         brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
-    first = next((figure["path"] for name in FIRST_PAGE_FIGURES for figure in figures if figure["name"] == name), None)
+    first = next((figure["path"] for figure in figures if figure["first"]), None)
     entries = []
     for figure in figures:
         names, content = figure["names"], contents[figure["path"]]

@@ -98,6 +98,7 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
     """Return figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
     figures = [
         {"name": rule, "section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
+        | {"first": rule in ("weekly_figure", "predicted_figure")}
         | {"path": f"{rule}{number}.png", "names": {"brain": "a"}}
         for number, rule in enumerate(rules)
     ]
@@ -192,7 +193,7 @@ def foretold(weeks: float) -> dict:
 
 
 def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_where_it_is():
-    figures = shown("weekly_figure", "predicted_figure", caption="of *all*")
+    figures = shown("predicted_figure", "weekly_figure", caption="of *all*")
     metrics = pd.concat([METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)])
     text = " ".join(page(figures, validation=None, prediction=foretold(7.5), metrics=metrics).split())
     assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
