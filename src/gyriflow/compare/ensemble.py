@@ -10,9 +10,8 @@ from scipy.stats import norm, t
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
+from ..quantities import Shown, metrics_shown
 
-QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
-"""The metrics of whole brains that have intervals."""
 LEVEL = 0.9
 """Coverage of the prediction interval for one further member."""
 SULCUS, GYRUS = -0.375, 0.375
@@ -44,7 +43,7 @@ def method_errors(tests: Sequence[Mapping[str, Any]], horizon_gw: float) -> dict
     """
     rows = pd.DataFrame(tests).query("model == 'run'")
     errors = {}
-    for metric in QUANTITIES:
+    for metric in metrics_shown(Shown.INTERVALS):
         if f"{metric}_error" not in rows:
             continue
         squares = (rows[f"{metric}_error"] ** 2).groupby(rows["horizon"]).mean().dropna()
@@ -75,9 +74,9 @@ def interval_table(
         the metric was not tested), low, high, observed (NaN without a brain) and contains_observed. A member that did
         not reach a week has no value there.
     """
-    keys = ["week", "metric"]
+    keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
-        table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
+        table[(table["hemisphere"] == "whole") & table["metric"].isin(names)] for table in (run, members, observed)
     )
     rows, start = [], own["week"].min()
     errors = {week: method_errors(tests, week - start) if tests else {} for week in own["week"].unique()}

@@ -8,11 +8,10 @@ import pandas as pd
 
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
+from ..quantities import Shown, metrics_shown
 from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
 from .distances import aligned_distances
 
-SIZE_METRICS = ("area", "volume", "gyrification_index")
-"""Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
 """The metric whose largest value among the compared brains is the number of modes in cut spectra."""
 CROSSING_FACES = "crossing_faces"
@@ -173,7 +172,7 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
 
 
 def _size_rows(observed: str, metrics: pd.DataFrame) -> Iterator[tuple]:
-    rows = metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])]
+    rows = metrics[metrics["metric"].isin([*metrics_shown(Shown.SIZE), *WITHOUT_DISTANCE])]
     for pair in _pairs(rows, observed, ["hemisphere", "metric"]).to_dict("records"):
         has_distance = pair["metric"] not in WITHOUT_DISTANCE
         distance = abs(pair["value"] / pair["value_real"] - 1) if has_distance else np.nan

@@ -15,6 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
+from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, MEASURED, SPREAD_UNKNOWN, element_error, run_names
 from .labels import metric_title, plain, week_label
@@ -27,8 +28,6 @@ _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
 DOTS_PER_INCH = 150
 """Pixels of the page per inch of print: a figure as wide as a journal page has 1080."""
-BRAIN_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
-"""Metrics in the table of brains."""
 NORM_WORDS = {
     "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval from "
     "the uncertainty of the norm, and z. Sex and site are ignored.",
@@ -205,7 +204,7 @@ def _shared(
     """Return the variables that pages of studies and of brains share."""
     ids, centiles, provenance = [brain["id"] for brain in brains], tables.centiles, origin.provenance
     own = centiles[centiles["subject"].isin(ids) & (centiles["run"] == MEASURED)]
-    flags = set(own.loc[own["metric"].isin(BRAIN_METRICS), "flag"])
+    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
     # an atlas has too few brains for centiles among themselves
     flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
     files = [file for file in provenance["files"] if file["brain"] in ids]
@@ -290,12 +289,19 @@ def brains_table(
     judged = quality.set_index("subject")
     causes = judged["cause"].fillna("").where(judged["cause"].fillna("") != "", judged["warnings"].fillna(""))
     whole, scored = (
-        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["metric"].isin(BRAIN_METRICS)]
+        table[
+            (table["run"] == MEASURED)
+            & (table["hemisphere"] == "whole")
+            & table["metric"].isin(metrics_shown(Shown.BRAINS))
+        ]
         for table in (metrics, centiles)
     )
     scored = scored[["subject", "metric"]].assign(text=centile_text(scored))
     whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"text": ""})
-    cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", row.text, "whole") for row in whole.itertuples()}
+    cells = {
+        (row.subject, row.metric): _above(METRICS[row.metric].text(row.value), row.text, "whole")
+        for row in whole.itertuples()
+    }
     heads = {name: metric_title(name) for name in whole["metric"]}
     rows = []
     for brain in brains:

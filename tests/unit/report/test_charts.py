@@ -12,12 +12,13 @@ from pictures import words
 
 from gyriflow.errors import InputError
 from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
-from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
-from gyriflow.report.growth import displacement_chart, growth_chart
+from gyriflow.report.growth import growth_chart
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, prediction_chart, validation_chart
+from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, validation_chart
+from gyriflow.report.spectra import influence_spectra, spectra_weeks_chart
 from gyriflow.report.tables import brain_table
+from gyriflow.report.weeks import displacement_chart, metrics_chart, norms_chart, prediction_chart, regions_chart
 from gyriflow.settings.terms import SPREAD_UNKNOWN
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
