@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
@@ -26,8 +26,6 @@ _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
 _FILE_NAME = re.compile(rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
-DOTS_PER_INCH = 150
-"""Pixels of the page per inch of print: a figure as wide as a journal page has 1080."""
 NORM_WORDS = {
     "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval from "
     "the uncertainty of the norm, and z. Sex and site are ignored.",
@@ -46,7 +44,7 @@ MAX_PENETRATION_MM = 0.5
 def page_figures(
     figures: Sequence[Mapping[str, Any]], contents: Mapping[str, str | tuple[str, float]]
 ) -> list[dict[str, Any]]:
-    """Return the figures and tables of a page: section, title, content, caption, first, technical.
+    """Return the figures and tables of a page: section, title, content (as `contents`), caption, first, technical.
 
     Parameters
     ----------
@@ -69,7 +67,7 @@ def page_figures(
             {
                 "section": figure["section"],
                 "title": title,
-                "content": Markup(content) if isinstance(content, str) else picture(*content, title),
+                "content": Markup(content) if isinstance(content, str) else content,
                 "caption": caption_html(figure["caption"].format(**names)),
                 "first": figure["path"] == first,
                 "technical": figure["technical"],
@@ -93,7 +91,7 @@ class Tables:
 
     Attributes
     ----------
-    quality, metrics, centiles : as for `brains_table`
+    quality, metrics, centiles : as for `brain_rows`
     warnings : columns subject, run, step, level, message
     runs, validation : as for `scores_table`; None if nothing was simulated
     intervals : those of the ensemble of the one prediction, if any
@@ -143,7 +141,8 @@ def study_page(
 
     Parameters
     ----------
-    brains, pictures : as for `brains_table`
+    brains : as for `brain_rows`
+    pictures : data URL and width in inches of the small pictures of each brain that has a page, by its id
     figures : the output of `page_figures`
     norm : name of the norm's brains
     prediction : the output of `Study.prediction_facts`, and `accuracy`, the content of `norms/predictions.yaml`
@@ -211,8 +210,8 @@ def _shared(
     software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
     versions = [(name, version) for name, version in software.items() if version]
     return {
-        "given": brains,
-        "brains": html_table(brains_table(brains, tables.quality, tables.metrics, centiles, pictures)),
+        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
+        "pictures": pictures,
         "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
         "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
         "weeks": next((item for item in figures if item["first"]), None),
@@ -257,26 +256,22 @@ def methods_text(template: str, **used: Any) -> str:
     return environment.from_string(template).render(growth_sentence=growth_sentence, **used)
 
 
-def picture(address: str, inches: float, alt: str) -> Markup:
-    """Return an HTML image from its data URL and its width in print, so that all have the same font size."""
-    width = round(inches * DOTS_PER_INCH)
-    return Markup('<img src="{}" alt="{}" width="{}" loading="lazy">').format(address, alt, width)
-
-
 def caption_html(caption: str) -> Markup:
     """Return a caption in reStructuredText as HTML."""
     settings = {"report_level": 5, "raw_enabled": False, "file_insertion_enabled": False}
     return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
 
 
-def brains_table(
+def brain_rows(
     brains: Sequence[Mapping[str, Any]],
     quality: pd.DataFrame,
     metrics: pd.DataFrame,
     centiles: pd.DataFrame,
-    pictures: Mapping[str, tuple[str, float]],
-) -> pd.DataFrame:
-    """Return a row for each brain: pictures, description with a link to its page, metrics, verdict and warnings.
+    linked: Collection[str] = (),
+) -> list[dict[str, Any]]:
+    """Return what a page says of each brain: its facts, its numbers, and its verdict with the cause or the warnings.
+
+    Numbers are by title of the metric, each with the text below it.
 
     Parameters
     ----------
@@ -284,49 +279,35 @@ def brains_table(
     quality : columns subject, verdict, cause, warnings
         The table of quality control.
     metrics, centiles : the study's; `centile_text` is shown below each number
-    pictures : data URL and width in inches of the pictures of each brain that has a page, by its id
+    linked : ids of the brains whose source is on a page of their own
     """
-    judged = quality.set_index("subject")
-    causes = judged["cause"].fillna("").where(judged["cause"].fillna("") != "", judged["warnings"].fillna(""))
-    whole, scored = (
-        table[
-            (table["run"] == MEASURED)
-            & (table["hemisphere"] == "whole")
-            & table["metric"].isin(metrics_shown(Shown.BRAINS))
-        ]
-        for table in (metrics, centiles)
+    judged = quality.set_index("subject").fillna("")
+    values, texts = (
+        {(row.subject, row.metric): getattr(row, column) for row in table.itertuples() if row.hemisphere == "whole"}
+        for table, column in (
+            (metrics[metrics["run"] == MEASURED].dropna(subset=["value"]), "value"),
+            (centiles[centiles["run"] == MEASURED].assign(text=centile_text), "text"),
+        )
     )
-    scored = scored[["subject", "metric"]].assign(text=centile_text(scored))
-    whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"text": ""})
-    cells = {
-        (row.subject, row.metric): _above(METRICS[row.metric].text(row.value), row.text, "whole")
-        for row in whole.itertuples()
-    }
-    heads = {name: metric_title(name) for name in whole["metric"]}
+    shown = [name for name in metrics_shown(Shown.BRAINS) if name in {metric for _, metric in values}]
     rows = []
     for brain in brains:
         key = brain["id"]
-        row: dict[str, Any] = {"": picture(*pictures[key], key)} if key in pictures else {"": ""} if pictures else {}
-        row["brain"] = _described(brain, linked=key in pictures)
-        row |= {head: cells.get((key, name), "–") for name, head in heads.items()}
-        verdict = Markup('<span class="verdict {0}">{0}</span>').format(judged.loc[key, "verdict"])
-        rows.append(row | {"verdict": _above(verdict, causes[key])})
-    return pd.DataFrame(rows)
-
-
-def _described(brain: Mapping[str, Any], *, linked: bool) -> Markup:
-    """Return a brain's name, as a link to its page, above its age, population, covariates, source and licence."""
-    name = Markup('<a href="brains/{0}.html">{0}</a>' if linked else "{}").format(brain["id"])
-    population = brain["population"] or ("synthetic" if brain["synthetic"] else "")
-    licence = brain["licence"] or ("made here" if brain["synthetic"] else "" if linked else "your own data")
-    covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
-    source = "" if linked else brain["source"]
-    facts = filter(None, [week_label(brain["week"]), population, *covariates, source, licence])
-    return _above(name, "; ".join(facts))
-
-
-def _above(text: str, below: object, kind: str = "") -> Markup:
-    return Markup('{}<br><span class="pale {}">{}</span>').format(text, kind, below)
+        numbers = {
+            metric_title(name): (METRICS[name].text(values[key, name]), texts.get((key, name), ""))
+            if (key, name) in values
+            else ("–", "")
+            for name in shown
+        }
+        is_linked, is_synthetic = key in linked, brain["synthetic"]
+        licence = brain["licence"] or ("made here" if is_synthetic else "" if is_linked else "your own data")
+        covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
+        facts = [week_label(brain["week"]), brain["population"] or ("synthetic" if is_synthetic else ""), *covariates]
+        facts += ["" if is_linked else brain["source"], licence]
+        cause = judged.loc[key, "cause"] or judged.loc[key, "warnings"]
+        described = {"facts": list(filter(None, facts)), "verdict": judged.loc[key, "verdict"], "cause": cause}
+        rows.append({**brain, "numbers": numbers, **described})
+    return rows
 
 
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
@@ -413,8 +394,8 @@ def verdict(
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
-    weeks = [float(week) for week in str(run["weeks"]).strip("[]").split(",")]
-    reached, end = max(weeks), float(run["end_week"])
+    # the table has the list as JSON
+    reached, end = max(json.loads(run["weeks"])), float(run["end_week"])
     words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")

@@ -17,7 +17,7 @@ from gyriflow.report.page import (
     Tables,
     accuracy_sentence,
     brain_page,
-    brains_table,
+    brain_rows,
     caption_html,
     hide_paths,
     methods_text,
@@ -243,15 +243,18 @@ def test_paths_are_hidden():
 
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
-    young, old = brains_table(BRAINS, **MEASURES, pictures=PICTURES).to_dict("records")
-    assert young["verdict"] == Facts("needs review", "a bridge was cut")
-    assert old["verdict"] == Facts("refused", "cropped")
-    assert young["brain"] == Facts("young", "21 GW", "healthy", "sex: F", "CC0 1.0") != Facts("labels")
-    assert old["brain"] == Facts("old", "23 GW", "healthy", "labels")
-    assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (70 to 96), +1.2", "–"]
+    young, old = brain_rows(BRAINS, **MEASURES, linked=PICTURES)
+    assert (young["verdict"], young["cause"]) == ("needs review", "a bridge was cut")
+    assert (old["verdict"], old["cause"]) == ("refused", "cropped")
+    assert young["facts"] == ["21 GW", "healthy", "sex: F", "CC0 1.0"]
+    assert old["facts"][:3] == ["23 GW", "healthy", "labels"]
+    assert [row["numbers"]["volume (mL)"] for row in (young, old)] == [("46.2", "88 (70 to 96), +1.2"), ("–", "")]
     # averages give no centile
-    assert Markup(young["pial area (cm²)"]).striptags() == "90−10.0 %"
-    assert ("<img " in young[""], old[""], "href" in old["brain"]) == (True, "", False)
+    assert young["numbers"]["pial area (cm²)"] == ("90", "−10.0 %")
+    rows = re.findall("<tr>.*?</tr>", page([]).partition('<div class="wide brains">')[2], re.DOTALL)[1:3]
+    assert [("<img " in row, "href" in row) for row in rows] == [(True, True), (False, False)]
+    assert elements(rows[0], "td")[2:4] == ["46.288 (70 to 96), +1.2", "90−10.0 %"]
+    assert elements(rows[1], "td")[2:] == ["–", "–", "refusedcropped"]
 
 
 def test_a_page_says_what_its_centiles_are_worth():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from facts import Facts
+from matplotlib.text import Text
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
@@ -59,7 +60,7 @@ def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
 
 def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
     figure = runs_by_week({"long": dict.fromkeys(np.arange(21.0, 31.0), BRAIN)}, {21.0: BRAIN}, views=("left",))
-    written = [text.get_text() for text in figure.texts]
+    written = [text.get_text() for text in figure.findobj(Text)]
     assert [sum(name in text for text in written) for name in ("long", "observed brain")] == [2, 1]
 
 
