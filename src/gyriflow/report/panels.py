@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle, Patch
 
-from ..geometry.triangles import Floats, TriangleMesh
-from .scene import PIXELS_PER_INCH, TISSUE, View, half_extents, is_visible, picture_axes, render
+from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
+from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
@@ -21,6 +21,10 @@ _DOTS_PER_INCH = 300
 # space around the largest brain, so that brains in neighbouring rows and columns do not touch
 _MARGIN = 1.12
 MAX_COLUMNS = 8
+LINES_MM = 4.0
+"""Spacing of the lines along directions."""
+MIN_FACING_COSINE = 0.3
+"""Minimum cosine between a normal and the view for lines: closer to the outline they would be foreshortened."""
 _PANEL_IN = 1.75
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
@@ -44,16 +48,16 @@ class Panel:
     caption : text below
     light : `TISSUE` or `MAP` of the scene
     mark : (3,) a point of the surface marked by a ring, dotted if the point is on the far side
-    lines : (k, 2, 3) ends of lines on the surface
+    directions : (n, 3) vectors at the vertices, drawn as lines on the surface (`direction_lines`)
     """
 
     mesh: TriangleMesh
     colours: Floats
-    view: View
+    view: View = VIEWS["left"]
     caption: str = ""
     light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
     mark: Floats | None = None
-    lines: Floats | None = None
+    directions: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +192,10 @@ def _draw_row(
             _write(axes, row.absent, (0.5, 0.5), fontsize=6.5)
             continue
         half = width_mm / 2, height_mm / 2
-        look = {"light": panel.light, "lines": panel.lines}
-        image = render(panel.mesh, panel.colours, panel.view, half, PIXELS_PER_INCH * inches_per_mm, **look)
+        lines = None if panel.directions is None else direction_lines(panel.mesh, panel.directions, panel.view)
+        image = render(
+            panel.mesh, panel.colours, panel.view, half, PIXELS_PER_INCH * inches_per_mm, light=panel.light, lines=lines
+        )
         axes.imshow(image, extent=(-half[0], half[0], -half[1], half[1]), aspect="auto")
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
@@ -198,6 +204,20 @@ def _draw_row(
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
         _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
+
+
+def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
+    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of `LINES_MM` that faces a view.
+
+    Vectors of length 1 or more give lines as long as a cube.
+    """
+    normals = vertex_normals(mesh)
+    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
+    vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
+    half = directions[vertices] * (LINES_MM / 2) / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+    # slightly above the surface, which would otherwise hide parts of them
+    at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
+    return np.stack([at - half, at + half], axis=1)
 
 
 def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:

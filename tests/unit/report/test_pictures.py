@@ -9,9 +9,8 @@ from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
 from gyriflow.folding.zones import model_fields, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
-    LINES_MM,
-    direction_lines,
     displacement_maps,
     regions_picture,
     runs_by_week,
