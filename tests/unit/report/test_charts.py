@@ -252,13 +252,8 @@ def test_bands_of_a_norm_lie_between_its_outer_and_its_inner_centiles():
 
 
 def test_intervals_are_around_the_run_and_observed_brains_are_stars():
-    ends = {
-        "low": [9.0, 14.5, 11.0],
-        "high": [10.5, 19.0, 14.0],
-        "run": [10.0, 16.0, 12.5],
-        "observed": [np.nan, 18.5, 12],
-    }
-    rows = pd.DataFrame({"week": [22.0, 27.5, 24.0], "unit": "1", **ends})
+    ends = {"low": [9.0, 14.5, 11.0], "high": [10.5, 19.0, 14.0], "run": [10.0, 16.0, 12.5]}
+    rows = pd.DataFrame({"week": [22.0, 27.5, 24.0], "unit": "1", "observed": [np.nan, 18.5, 12.0], **ends})
     figure = intervals_chart(pd.concat([rows.assign(metric="area"), rows.assign(metric="folding_index")]))
     # a metric without intervals is not drawn
     (axes,) = figure.axes
@@ -271,10 +266,8 @@ def test_intervals_are_around_the_run_and_observed_brains_are_stars():
 
 
 def test_spectra_over_weeks_are_by_side_and_band_and_open_where_a_band_is_cut_off():
-    thin = [
-        *spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3}),
-        *spectrum_rows("thin", 26.5, {4: 0.1, 5: 0.2}, complete=False),
-    ]
+    thin = spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3})
+    thin += spectrum_rows("thin", 26.5, {4: 0.1, 5: 0.2}, complete=False)
     scans = [
         part.assign(subject=brain)
         for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15}))
