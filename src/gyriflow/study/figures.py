@@ -1,10 +1,10 @@
 """The figures and tables of a study: of which brains and runs they are, and the inputs and options that depend on them.
 
-Each function has the name of an entry of `workflow/figures.yaml`, which has the text and the other inputs and options.
-An entry without a function is drawn once.
+A function has the name of an entry of `workflow/figures.yaml`, which has the text and the other inputs and options. An
+entry without a function is drawn for each of the records that it names, or once.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
@@ -30,24 +30,30 @@ MAX_DEVIATIONS = 4
 """Weeks for which the deviation from the expected brain is shown."""
 
 
+EACH: Mapping[str, Callable[[Study], Iterable[Any]]] = {
+    "study": lambda study: [study],
+    "brains": lambda study: study.brains.values(),
+    "runs": lambda study: study.run_simulations,
+    "ensembles": lambda study: study.with_ensemble,
+}
+"""Records that have a figure each, by the key `each` of an entry."""
+
+
 def figures_of(study: Study) -> list[Figure]:
     """Return the figures and tables of a study, in the order of the report."""
     found: list[Figure] = []
     for name, kind in kinds().items():
-        function: Callable[[Kind, Study], Iterator[Figure]] | None = globals().get(name)
-        found += [Figure(kind)] if function is None else function(kind, study)
+        if function := globals().get(name):
+            found += function(kind, study)
+            continue
+        for item in EACH[kind.each](study):
+            if not kind.needs or getattr(item, kind.needs):
+                names = {"brain": item.id} if isinstance(item, Brain) else getattr(item, "names", {})
+                found.append(Figure(kind, names))
     return found
 
 
 # brains
-
-
-def quality_page(kind: Kind, study: Study) -> Iterator[Figure]:
-    for brain in study.brains:
-        yield Figure(kind, {"brain": brain})
-
-
-small_pictures = brain_maps = quality_page
 
 
 def brain_regions(kind: Kind, study: Study) -> Iterator[Figure]:
@@ -150,17 +156,6 @@ def shape_maps(kind: Kind, study: Study) -> Iterator[Figure]:
         yield Figure(kind, names, {"brains": {**brains, observed_name(observed.values()): measured}})
 
 
-def intervals_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    for simulation in study.with_ensemble:
-        yield Figure(kind, simulation.names)
-
-
-def growth_sd_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    for simulation in study.with_ensemble:
-        if simulation.has_growth_maps:
-            yield Figure(kind, simulation.names)
-
-
 def position_spread_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for simulation in study.with_ensemble:
         weeks = {}
@@ -171,15 +166,6 @@ def position_spread_figure(kind: Kind, study: Study) -> Iterator[Figure]:
 
 
 sulcus_probability_figure = position_spread_figure
-
-
-def growth_found_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    for simulation in study.run_simulations:
-        if simulation.has_growth_maps:
-            yield Figure(kind, simulation.names)
-
-
-growth_across_figure = growth_found_figure
 
 
 def zones_figure(kind: Kind, study: Study) -> Iterator[Figure]:
@@ -195,11 +181,6 @@ def model_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for simulation in study.run_simulations:
         if "growth_rate_per_s" in simulation.settings.growth.definition.rates and not simulation.maps:
             yield Figure(kind, simulation.names)
-
-
-def run_tables(kind: Kind, study: Study) -> Iterator[Figure]:
-    if study.run_simulations:
-        yield Figure(kind)
 
 
 def displacement_figure(kind: Kind, study: Study) -> Iterator[Figure]:
@@ -289,11 +270,6 @@ def validation_figure(kind: Kind, study: Study) -> Iterator[Figure]:
 def prediction_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     if study.predictions:
         yield Figure(kind, options={"runs": list(study.config.runs)})
-
-
-def prediction_table(kind: Kind, study: Study) -> Iterator[Figure]:
-    if study.predictions:
-        yield Figure(kind)
 
 
 def _deviations(simulation: Simulation) -> dict[float, list[str]]:

@@ -24,6 +24,8 @@ class Kind:
     draw: str = ""
     inputs: Mapping[str, str] = field(default_factory=dict)
     options: Arguments = field(default_factory=dict)
+    each: str = "study"
+    needs: str = ""
     targets: Sequence[str] = ("figures",)
     section: str = ""
     title: str = ""
