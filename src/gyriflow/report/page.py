@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from itertools import count
 from typing import Any
 
@@ -26,16 +25,6 @@ _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
 _FILE_NAME = re.compile(rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
-NORM_WORDS = {
-    "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval from "
-    "the uncertainty of the norm, and z. Sex and site are ignored.",
-    "few brains": "Below each number: its centile for this age among the norm's other subjects, with the 90 % "
-    "interval, and z. The norm has fewer than 30 subjects, so centiles end at 5 and 95.",
-    SPREAD_UNKNOWN: "Below each number: its difference from the curve of the norm ({norm}). The norm has one average "
-    "brain a week, so the spread of individuals around the curve is unknown and there are no centiles.",
-    "too few brains": "There are too few subjects for centiles: a norm needs ten others.",
-}
-"""Explanations of the table of brains, by flag of the norm."""
 NOT_COMPARED = "No simulation is compared: an observed brain of the same population and week is missing."
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
@@ -111,26 +100,9 @@ class Tables:
             object.__setattr__(self, name, getattr(self, name).replace(_FOLDERS, "", regex=True))
 
 
-@dataclass(frozen=True)
-class Origin:
-    """The origin of a study's results.
-
-    Attributes
-    ----------
-    provenance : the output of `software`, and files (brain, what, sha256)
-    methods : reStructuredText
-    configuration : text, without paths
-    """
-
-    provenance: Mapping[str, Any]
-    methods: str
-    configuration: str
-
-
 def study_page(
     brains: Sequence[Mapping[str, Any]],
     tables: Tables,
-    origin: Origin,
     figures: Sequence[Mapping[str, Any]],
     *,
     norm: str,
@@ -163,7 +135,7 @@ def study_page(
         has_centiles = any("centile" in str(head) for head in numbers)
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
         prediction["individuals"] = norm if has_centiles else ""
-    return _shared(brains, tables, tables.warnings, origin, figures, norm, pictures) | {
+    return _shared(brains, tables, tables.warnings, figures, norm, pictures) | {
         "title": title,
         "verdict": sentence,
         "prediction": prediction,
@@ -175,12 +147,12 @@ def study_page(
 
 
 def brain_page(
-    brain: Mapping[str, Any], tables: Tables, origin: Origin, figures: Sequence[Mapping[str, Any]], *, norm: str
+    brain: Mapping[str, Any], tables: Tables, figures: Sequence[Mapping[str, Any]], *, norm: str
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
     own = tables.metrics["subject"] == brain["id"]
     warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
-    return _shared([brain], tables, warnings, origin, figures, norm, {}) | {
+    return _shared([brain], tables, warnings, figures, norm, {}) | {
         "title": f"Measured cortical folding, {brain['id']}",
         "verdict": "",
         "prediction": None,
@@ -195,36 +167,38 @@ def _shared(
     brains: Sequence[Mapping[str, Any]],
     tables: Tables,
     warnings: pd.DataFrame,
-    origin: Origin,
     figures: Sequence[Mapping[str, Any]],
     norm: str,
     pictures: Mapping[str, tuple[str, float]],
 ) -> dict[str, Any]:
     """Return the variables that pages of studies and of brains share."""
-    ids, centiles, provenance = [brain["id"] for brain in brains], tables.centiles, origin.provenance
-    own = centiles[centiles["subject"].isin(ids) & (centiles["run"] == MEASURED)]
+    centiles = tables.centiles[tables.centiles["run"] == MEASURED]
+    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
     flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
     # an atlas has too few brains for centiles among themselves
     flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    files = [file for file in provenance["files"] if file["brain"] in ids]
-    software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
-    versions = [(name, version) for name, version in software.items() if version]
     return {
         "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
         "pictures": pictures,
-        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
+        "norm": norm,
+        "flags": flags,
+        "spread_unknown": SPREAD_UNKNOWN,
         "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
-        "provenance": provenance_line(provenance),
-        "methods": caption_html(origin.methods),
-        "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
-        "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
-        "configuration": origin.configuration,
     }
 
 
-def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any], **content: Any) -> str:
+def report_page(
+    template: str,
+    parts: Mapping[str, str],
+    view: Mapping[str, Any],
+    *,
+    provenance: Mapping[str, Any],
+    methods: str,
+    configuration: str,
+    **content: Any,
+) -> str:
     """Return the page.
 
     Parameters
@@ -233,14 +207,18 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
     parts : style, three, notice, controls, viewer
         The style sheet and the scripts of the 3D view with their licence, inserted unescaped.
     view : the output of `surfaces_view`
-    content : the other variables of the template; HTML as `Markup`
+    provenance : the output of `software`, and files (brain, what, sha256)
+    methods : reStructuredText
+    configuration : text, without paths
+    content : the output of `study_page` or `brain_page`
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     # a script must not contain its own end tag
     data = Markup(json.dumps(view, separators=(",", ":")).replace("</", "<\\/"))
     inside = {name: Markup(text.replace("</script", "<\\/script")) for name, text in parts.items()}
     page = environment.from_string(template)
-    return page.render(**content, **inside, has_view=bool(view["groups"]), surfaces=data)
+    origin = {"provenance": provenance, "methods": caption_html(methods), "configuration": configuration}
+    return page.render(**content, **inside, **origin, has_view=bool(view["groups"]), surfaces=data)
 
 
 def methods_text(template: str, **used: Any) -> str:
@@ -459,16 +437,6 @@ def group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     rows["brain, run"] = places
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
     return groups.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
-
-
-def provenance_line(provenance: Mapping[str, Any]) -> str:
-    """Return a sentence with the time and the version of the code."""
-    commit = provenance["commit"]
-    source = "not from a checkout of the source, so without a commit"
-    if commit:
-        source = f"commit {commit.removesuffix('-dirty')}{', changed' if commit.endswith('-dirty') else ''}"
-    time = datetime.fromisoformat(provenance["recorded"]).strftime("%Y-%m-%d %H:%M UTC")
-    return f"Made {time} by gyriflow {provenance['gyriflow']}, {source}."
 
 
 def hide_paths(value: Any) -> Any:

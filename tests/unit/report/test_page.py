@@ -11,9 +11,7 @@ from markupsafe import Markup, escape
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.page import (
-    NORM_WORDS,
     NOT_COMPARED,
-    Origin,
     Tables,
     accuracy_sentence,
     brain_page,
@@ -22,7 +20,6 @@ from gyriflow.report.page import (
     hide_paths,
     methods_text,
     page_figures,
-    provenance_line,
     report_page,
     run_verdict,
     scores_table,
@@ -106,13 +103,13 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
 
 
 TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
-ORIGIN = Origin(PROVENANCE, "**Brains.** Two.", "start: young\n")
+ORIGIN = {"provenance": PROVENANCE, "methods": "**Brains.** Two.", "configuration": "start: young\n"}
 
 
 def page(figures: list[dict], view: dict | None = None, prediction: dict | None = None, **tables) -> str:
     """Return the page of a study, with others than the usual tables."""
     about = {"norm": "the norm", "pictures": PICTURES, "prediction": prediction}
-    return written(study_page(BRAINS, Tables(**TABLES | tables), ORIGIN, figures, **about), view)
+    return written(study_page(BRAINS, Tables(**TABLES | tables), figures, **about), view)
 
 
 def elements(text: str, name: str) -> list[str]:
@@ -122,7 +119,7 @@ def elements(text: str, name: str) -> list[str]:
 
 def written(content: dict, view: dict | None = None) -> str:
     texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
-    return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
+    return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **ORIGIN, **content)
 
 
 def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
@@ -138,7 +135,7 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert Facts(2, 21, "23 GW", "healthy", "young", 1) in elements(text, "p")
     assert "12ab" in text
     assert Facts("2026-01-01 12:30 UTC", "0.1", "abc") in elements(text, "p")
-    assert provenance_line(PROVENANCE) != provenance_line(PROVENANCE | {"commit": "abc"})
+    assert "commit abc, changed" in text
     assert "numpy" in text
     assert "absent" not in text
 
@@ -261,9 +258,11 @@ def test_a_page_says_what_its_centiles_are_worth():
     few = pd.concat([MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")])
     # those of an atlas itself are not spoken of
     for text in (page(shown("growth_figure")), page([], centiles=few)):
-        sentences = elements(text, "p")
-        explained = [flag for flag, words in NORM_WORDS.items() if words.format(norm="the norm") in sentences]
-        assert explained == ["ok", SPREAD_UNKNOWN]
+        sentences = [sentence for sentence in elements(text, "p") if "norm" in sentence]
+        assert sentences == [Facts("90 %", "z"), Facts("the norm")]
+    for flag, facts in (("few brains", (30, 5, 95)), ("too few brains", ("ten",))):
+        text = page([], centiles=MEASURES["centiles"].assign(flag=flag))
+        assert [sentence for sentence in elements(text, "p") if "norm" in sentence] == [Facts(*facts)]
 
 
 def test_a_brain_has_a_page_of_its_own():
@@ -271,7 +270,7 @@ def test_a_brain_has_a_page_of_its_own():
         {"subject": ["young", "other"], "run": np.nan, "step": "s", "level": "warning", "message": ["own", "other's"]}
     )
     tables = Tables(**TABLES | {"warnings": warnings})
-    text = written(brain_page(BRAINS[0], tables, ORIGIN, shown("quality"), norm="the norm"))
+    text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert elements(text, "h1") == [Facts("young")]
     assert 'href="../report.html"' in text
     assert "other&#39;s" not in text
