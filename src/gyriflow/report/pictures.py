@@ -119,7 +119,7 @@ def runs_by_week(
         The map `distance_mm` is shown below.
     predicted : heading of a predicted brain (blue) in `observed`
     """
-    special = {predicted: SIMULATED_SURFACE_COLOUR}
+    special: dict[Any, str] = {predicted: SIMULATED_SURFACE_COLOUR}
     groups = {
         name: {week: _plain(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
         for name, meshes in runs.items()
@@ -314,13 +314,15 @@ def influence_picture(
     brains = {headings[run]: halves for run, halves in members.items()} | (
         {observed_name: observed} if observed else {}
     )
-    maps = {name: halves and _map_of(halves, "shape_index") for name, halves in brains.items()}
+    maps = {name: _map_of(halves, "shape_index") if halves else None for name, halves in brains.items()}
     scale = scale_of("shape_index", np.empty(0))
     colours = {observed_name: OBSERVED_SURFACE_COLOUR}
-    plain = [item and _plain(item[0], colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, item in maps.items()]
-    mapped = [item and _mapped(item, scale) for item in maps.values()]
+    plain = [
+        _plain(item[0], colours.get(name, SIMULATED_SURFACE_COLOUR)) if item else None for name, item in maps.items()
+    ]
+    mapped = [_mapped(item, scale) if item else None for item in maps.values()]
     rows = [
-        Row(f"{label}{view} view", [panel and replace(panel, view=VIEWS[view]) for panel in panels], ABSENT)
+        Row(f"{label}{view} view", [replace(panel, view=VIEWS[view]) if panel else None for panel in panels], ABSENT)
         for label, panels in (("", plain), ("shape index\n", mapped))
         for view in SIDE_VIEWS
     ]

@@ -74,8 +74,9 @@ def weeks_chart(
         for layer in layers:
             rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
             if isinstance(layer.value, tuple):
-                edges = [rows[column].astype(float) for column in layer.value]
-                axes.fill_between(rows["week"].astype(float), *edges, linewidth=0, **layer.style)
+                # without rows, columns are not numeric
+                weeks_at, low, high = (rows[column].astype(float) for column in ("week", *layer.value))
+                axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
             elif len(rows):
                 axes.plot(rows["week"], rows[layer.value], **layer.style)
             if "trusted" in rows and not rows["trusted"].all():
@@ -271,9 +272,9 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
     layers = []
     for (region, run), part in rows.groupby(["region", "run"], sort=False):
         if run == MEASURED:
-            layers += observed_marks(part, colours[region], markersize=6)
+            layers += observed_marks(part, colours[str(region)], markersize=6)
         elif run in lines:
-            layers.append(Layer(part, {"color": colours[region], "linestyle": lines[run], "linewidth": 1.1}))
+            layers.append(Layer(part, {"color": colours[str(region)], "linestyle": lines[str(run)], "linewidth": 1.1}))
     figure, panels = weeks_chart(titles, layers, rows["week"], foot_in=0.75)
     for name, axes in panels.items():
         # signed numbers and ratios are not compared with 0

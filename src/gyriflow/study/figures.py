@@ -280,9 +280,8 @@ def _deviations(simulation: Simulation) -> dict[float, list[str]]:
 
 def expected_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for simulation in study.atlas_predictions:
-        surfaces, observed, deviations = (
-            function(simulation) for function in (surfaces_by_week, observed_by_week, _deviations)
-        )
+        surfaces, observed = surfaces_by_week(simulation), observed_by_week(simulation)
+        deviations = _deviations(simulation)
         # the last week, and others at equal steps
         weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
         weeks_drawn = {min(surfaces), *weeks}
