@@ -83,19 +83,24 @@ def brain_grid(groups: Mapping[str, Mapping[Any, Panel]], views: Sequence[str], 
     keys, seen = _ordered(*groups.values()), [VIEWS[name] for name in views]
     heads = list(map(column_label, keys))
 
-    def panels(group: Mapping[Any, Panel], *views: View) -> list[Panel | None]:
-        cells = [(view, group.get(key)) for view in views for key in keys]
-        captions = [cell.caption if cell and view == seen[0] else "" for view, cell in cells]
-        return [
-            cell and replace(cell, view=view, caption=words)
-            for (view, cell), words in zip(cells, captions, strict=True)
-        ]
-
     if len(seen) * len(keys) <= MAX_COLUMNS:
-        rows = [Row(name, panels(group, *seen)) for name, group in groups.items()]
+        rows = [
+            Row(name, [panel for view in seen for panel in _seen(group, keys, view, with_caption=view == seen[0])])
+            for name, group in groups.items()
+        ]
         return panel_grid([f"{head}\n{view.name} view" for view in seen for head in heads], rows, **more)
-    names = [(f"{name}\n{view.name} view".strip(), view, group) for view in seen for name, group in groups.items()]
-    return panel_grid(heads, [Row(name, panels(group, view)) for name, view, group in names], **more)
+    rows = [
+        Row(f"{name}\n{view.name} view".strip(), _seen(group, keys, view, with_caption=view == seen[0]))
+        for view in seen
+        for name, group in groups.items()
+    ]
+    return panel_grid(heads, rows, **more)
+
+
+def _seen(group: Mapping[Any, Panel], keys: Iterable, view: View, *, with_caption: bool = True) -> list[Panel | None]:
+    """Return the brains of a group from a view, None where the group has none."""
+    caption = {} if with_caption else {"caption": ""}
+    return [replace(group[key], view=view, **caption) if key in group else None for key in keys]
 
 
 @styled
@@ -314,16 +319,15 @@ def influence_picture(
     brains = {headings[run]: halves for run, halves in members.items()} | (
         {observed_name: observed} if observed else {}
     )
-    maps = {name: _map_of(halves, "shape_index") if halves else None for name, halves in brains.items()}
-    scale = scale_of("shape_index", np.empty(0))
-    colours = {observed_name: OBSERVED_SURFACE_COLOUR}
-    plain = [
-        _plain(item[0], colours.get(name, SIMULATED_SURFACE_COLOUR)) if item else None for name, item in maps.items()
-    ]
-    mapped = [_mapped(item, scale) if item else None for item in maps.values()]
+    maps = {name: _map_of(halves, "shape_index") for name, halves in brains.items() if halves}
+    scale, colours = scale_of("shape_index", np.empty(0)), {observed_name: OBSERVED_SURFACE_COLOUR}
+    groups = {
+        "": {name: _plain(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
+        "shape index\n": {name: _mapped(surface_map, scale) for name, surface_map in maps.items()},
+    }
     rows = [
-        Row(f"{label}{view} view", [replace(panel, view=VIEWS[view]) if panel else None for panel in panels], ABSENT)
-        for label, panels in (("", plain), ("shape index\n", mapped))
+        Row(f"{label}{view} view", _seen(group, brains, VIEWS[view]), ABSENT)
+        for label, group in groups.items()
         for view in SIDE_VIEWS
     ]
     return panel_grid(list(brains), rows, colour_bar=(scale, map_title("shape_index")))
