@@ -88,6 +88,8 @@ def test_every_function_of_figures_has_the_name_of_an_entry():
         if callable(function) and list(inspect.signature(function).parameters)[:2] == ["kind", "study"]
     }
     assert functions < {kind.name for kind in KINDS}
+    # a function says itself of what there is a figure
+    assert {(kind.each, kind.needs) for kind in KINDS if kind.name in functions} == {("study", "")}
 
 
 def test_figures_give_their_function_what_it_takes_and_have_names_for_their_words_and_files():
