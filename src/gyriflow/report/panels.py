@@ -120,7 +120,8 @@ def panel_grid(
         for number, row in enumerate(block_rows):
             # pictures are between the headings or captions above and the captions below
             cells = [figure.add_subplot(grid[2 * number + 1, column]) for column in range(len(heads[block]))]
-            widths_mm, height_mm = widths_in[block] / inches_per_mm, float(heights[2 * number + 1] / inches_per_mm)
+            widths_mm = [float(width_in / inches_per_mm) for width_in in widths_in[block]]
+            height_mm = float(heights[2 * number + 1] / inches_per_mm)
             _draw_row(cells, row, row.panels[block], widths_mm, height_mm, inches_per_mm)
             # a letter for each row, or for each panel of a single row
             lettered = cells[:1] if len(rows) > 1 else cells if len(columns) > 1 else []
@@ -178,7 +179,7 @@ def _draw_row(
     cells: Sequence[Axes],
     row: Row,
     panels: Sequence[Panel | None],
-    widths_mm: Floats,
+    widths_mm: Sequence[float],
     height_mm: float,
     inches_per_mm: float,
 ) -> None:

@@ -99,8 +99,8 @@ def brain_grid(groups: Mapping[str, Mapping[Any, Panel]], views: Sequence[str], 
 
 def _seen(group: Mapping[Any, Panel], keys: Iterable, view: View, *, with_caption: bool = True) -> list[Panel | None]:
     """Return the brains of a group from a view, None where the group has none."""
-    caption = {} if with_caption else {"caption": ""}
-    return [replace(group[key], view=view, **caption) if key in group else None for key in keys]
+    panels = [group.get(key) for key in keys]
+    return [panel and replace(panel, view=view, caption=panel.caption if with_caption else "") for panel in panels]
 
 
 @styled
