@@ -144,7 +144,7 @@ BY_TESTS = {
     "metrics/test_norms.py": [("src/gyriflow/metrics/tables.py", " / (to_week - from_week)", "")],
     "metrics/test_gyrification.py": [("src/gyriflow/metrics/gyrification.py", "RADIUS_MM = 10.0", "RADIUS_MM = 15.0")],
     "metrics/test_measure.py": [
-        ("src/gyriflow/quantities.py", '"curvedness",\n        unit="1/mm"', '"curvedness",\n        unit="1"')
+        ("src/gyriflow/quantities.py", '"curvedness", "1/mm", "curvedness"', '"curvedness", "1", "curvedness"')
     ],
     # figures, pages and files
     "report/test_quality.py": [("src/gyriflow/report/quality.py", 'else "LR"', 'else "RL"')],
@@ -165,7 +165,7 @@ BY_TESTS = {
         ("workflow/scripts/run_tables.py", 'settings["growth_of"] = grown', 'settings["growth_of"] = ""'),
     ],
     "io/test_exports.py": [
-        ("src/gyriflow/quantities.py", '"sulcal_depth_mm",\n        unit="mm"', '"sulcal_depth_mm",\n        unit="1"'),
+        ("src/gyriflow/quantities.py", '"sulcal_depth_mm", "mm"', '"sulcal_depth_mm", "1"'),
         ("src/gyriflow/io/exports.py", "_hemi-{side[0].upper()}{desc}_{kind}", "_hemi-L{desc}_{kind}"),
         ("src/gyriflow/io/made_files.py", " if path not in others}", "}"),
         ("src/gyriflow/quantities.py", "export_sign=-1", "export_sign=1"),

@@ -1,4 +1,4 @@
-# Figures and tables of the registry, `gyriflow.study.figures`: a rule per kind; kinds with the same `job` share it.
+# Figures and tables of `workflow/figures.yaml`: a rule for each entry, called as it is, or as its key `rule` says.
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 
@@ -11,7 +11,7 @@ def inputs_of(figure):
 for name, jobs in by_rule(FIGURES).items():
     kinds = [figure.kind for figure in jobs[0]]
 
-    def drawn(wildcards, jobs={job[0].path: job for job in jobs}, pattern=kinds[0].pattern):
+    def drawn(wildcards, jobs={job[0].path: job for job in jobs}, pattern=kinds[0].file):
         return jobs[pattern.format(**dict(wildcards))]
 
     rule:
@@ -22,7 +22,7 @@ for name, jobs in by_rule(FIGURES).items():
         output:
             [file for kind in kinds for file in kind.outputs],
         log:
-            figure_log(name, kinds[0].pattern),
+            figure_log(name, kinds[0].file),
         wildcard_constraints:
             **{key: one_of(dict.fromkeys(job[0].names[key] for job in jobs)) for key in jobs[0][0].wildcards},
         conda:
@@ -39,7 +39,7 @@ for name, jobs in by_rule(FIGURES).items():
             ],
             code=code_hash(
                 DRAW,
-                *(Path(SOURCE, "gyriflow", "report", f"{kind.draw.partition(':')[0]}.py") for kind in kinds),
+                *(Path(SOURCE, "gyriflow", "report", f"{kind.draw.partition('.')[0]}.py") for kind in kinds),
             ),
         script:
             "../scripts/draw.py"

@@ -1,5 +1,5 @@
 # Resources and warnings of all jobs, and the report: an HTML page of the study and one of each brain, with the figures
-# and tables of the registry.
+# and tables of `workflow/figures.yaml`.
 from itertools import takewhile
 
 from gyriflow.running.snakemake_internals import benchmark_patterns
@@ -78,7 +78,7 @@ rule study_records:
 ON_PAGE = {brain: [] for brain in (*study.brains, None)}
 for figure in FIGURES:
     if figure.kind.section:
-        of_brain = figure.kind.target in ("quality", "brain")
+        of_brain = not {"quality", "brain"}.isdisjoint(figure.kind.targets)
         ON_PAGE[figure.names["brain"] if of_brain else None].append(figure.described)
 
 
@@ -113,7 +113,7 @@ rule html_report:
         validation=f"{STUDY}/validation.csv" if study.validated else [],
         atlas_brain=study.prediction.atlas_surface if study.prediction else [],
         intervals=study.prediction.file(ENSEMBLE) if study.prediction and study.prediction.ensemble else [],
-        small=[figure.path for figure in FIGURES if figure.kind.target == "small"],
+        small=[figure.path for figure in FIGURES if "small" in figure.kind.targets],
         accuracy=PREDICTION_TESTS if study.prediction else [],
         surfaces=files_in(SURFACES),
         provenance=rules.study_records.output.report,

@@ -1,4 +1,4 @@
-"""Draw figures and tables of the registry: read their input files and call their functions."""
+"""Draw figures and tables of `workflow/figures.yaml`: read their input files and call their functions."""
 
 from importlib import import_module
 from pathlib import Path
@@ -65,7 +65,7 @@ def read(inputs):
 
 with step(snakemake.log[0]):
     for figure in snakemake.params.figures:
-        name, _, function = figure["draw"].partition(":")
+        name, _, function = figure["draw"].partition(".")
         module = import_module(f"gyriflow.report.{name}")
         drawn = getattr(module, function)(**read(dict(figure["inputs"])), **figure["options"])
         if isinstance(drawn, pd.DataFrame):

@@ -5,7 +5,7 @@ from gyriflow.io.figures import picture_addresses, read_body
 from gyriflow.io.files import read_json, read_table, read_text, write_json, write_text
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml, yaml_text
-from gyriflow.report.page import Origin, Tables, brain_page, hide_paths, page_figures, report_page, study_page
+from gyriflow.report.page import Tables, brain_page, hide_paths, page_figures, report_page, study_page
 from gyriflow.report.view3d import surfaces_view
 from gyriflow.step import step
 
@@ -31,11 +31,12 @@ def read_weeks(weeks):
 with step(snakemake.log[0]):
     template, parts = read_text(files.page), {name: read_text(files[name]) for name in PARTS}
     tables = Tables(**{name: read_table(files[name]) for name in TABLES if files[name]})
-    origin = Origin(read_json(files.provenance), read_text(files.methods), yaml_text(hide_paths(params.config)))
+    origin = {"provenance": read_json(files.provenance), "methods": read_text(files.methods)}
+    origin["configuration"] = yaml_text(hide_paths(params.config))
     brains = {brain["id"]: brain for brain in params.brains}
     for path, (name, figures) in zip(output.brains, params.brain_figures.items(), strict=True):
-        page = brain_page(brains[name], tables, origin, with_content(figures), norm=params.norm)
-        write_text(path, report_page(template, parts, {"groups": []}, **page))
+        page = brain_page(brains[name], tables, with_content(figures), norm=params.norm)
+        write_text(path, report_page(template, parts, {"groups": []}, **origin, **page))
     small = dict(zip(params.brain_figures, picture_addresses(files.small, PICTURE_BYTES), strict=True))
     prediction = params.prediction
     if prediction:
@@ -43,9 +44,9 @@ with step(snakemake.log[0]):
         tests = prediction_facts(accuracy["rows"], prediction["start_week"], prediction["week"])
         prediction = prediction | {"accuracy": accuracy, "tests": tests}
     about = {"norm": params.norm, "pictures": small, "prediction": prediction}
-    page = study_page(params.brains, tables, origin, with_content(params.figures), **about)
+    page = study_page(params.brains, tables, with_content(params.figures), **about)
     runs, observed = params.surfaces["runs"], params.surfaces["observed"]
     runs = {run: read_weeks(weeks) for run, weeks in runs.items()}
     view = surfaces_view(runs, read_weeks(observed), observed_name=params.observed_name)
     write_json(output.view, view)
-    write_text(output.report, report_page(template, parts, view, **page))
+    write_text(output.report, report_page(template, parts, view, **origin, **page))

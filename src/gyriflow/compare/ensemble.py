@@ -10,7 +10,8 @@ from scipy.stats import t
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
-from .accuracy import LEVEL, QUANTITIES, ErrorInTests, error_in_tests, from_log, log_errors, log_value
+from ..quantities import Shown, metrics_shown
+from .accuracy import LEVEL, ErrorInTests, error_in_tests, from_log, log_errors, log_value
 
 SULCUS, GYRUS = -0.375, 0.375
 """Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
@@ -56,9 +57,9 @@ def interval_table(
         low, high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
         there.
     """
-    keys = ["week", "metric"]
+    keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
-        table[(table["hemisphere"] == "whole") & table["metric"].isin(QUANTITIES)] for table in (run, members, observed)
+        table[(table["hemisphere"] == "whole") & table["metric"].isin(names)] for table in (run, members, observed)
     )
     rows, start = [], own["week"].min()
     for metric, table in varied.groupby("metric"):

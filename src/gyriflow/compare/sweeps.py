@@ -8,11 +8,10 @@ import pandas as pd
 
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
+from ..quantities import Shown, metrics_shown
 from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
 from .comparison import aligned_distances
 
-SIZE_METRICS = ("area", "volume", "gyrification_index")
-"""Metrics whose relative difference from the observed brain is a measure of distance."""
 WEYL_NUMBER = "weyl_number"
 """The metric whose largest value among the compared brains is the number of modes in cut spectra."""
 CROSSING_FACES = "crossing_faces"
@@ -81,7 +80,9 @@ def comparison_table(
     values = (bands[name].where(complete) for name in ("relative_power", "relative_power_observed"))
     bands = _with_distance(bands.assign(**dict(zip(_VALUES, values, strict=True)), measure=measure), resolved)
 
-    sizes = _pairs(metrics[metrics["metric"].isin([*SIZE_METRICS, *WITHOUT_DISTANCE])], ["hemisphere", "metric"])
+    sizes = _pairs(
+        metrics[metrics["metric"].isin([*metrics_shown(Shown.SIZE), *WITHOUT_DISTANCE])], ["hemisphere", "metric"]
+    )
     sizes = sizes.rename(columns={"metric": "measure", "value_observed": "observed_value"}).assign(flag="ok")
     distance = (sizes["value"] / sizes["observed_value"] - 1).abs()
     sizes["distance"] = distance.where(~sizes["measure"].isin(WITHOUT_DISTANCE))

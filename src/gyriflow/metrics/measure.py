@@ -25,7 +25,7 @@ from ..geometry.triangles import (
     vertex_areas,
     volume_ml,
 )
-from ..quantities import METRICS, WHITE_METRICS
+from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES, MassMatrix
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
@@ -336,12 +336,12 @@ def measure_white(
 ) -> tuple[pd.DataFrame, dict[str, dict[str, NDArray]]]:
     """Return the metrics and the maps of the white surfaces of "left" and "right", or of the only hemisphere.
 
-    They are measured as pial ones are. The table has hemisphere, metric, value and unit of their area and of
-    `WHITE_METRICS`, the names with `white_` in front; the maps are those of `Folds` per hemisphere.
+    They are measured as pial ones are. The table has hemisphere, metric, value and unit of the metrics that are shown
+    of white surfaces, the names with `white_` in front; the maps are those of `Folds` per hemisphere.
     """
     folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in sides.items()}
     metrics = {}
     for name, parts in {"whole": list(folds.values()), **{name: [part] for name, part in folds.items()}}.items():
         values = {"area": sum(area(part.mesh) for part in parts) * CM2_PER_MM2} | folding_metrics(parts)
-        metrics[name] = {f"white_{metric}": values[metric] for metric in WHITE_METRICS}
+        metrics[name] = {f"white_{metric}": values[metric] for metric in metrics_shown(Shown.WHITE)}
     return _table(metrics), {name: part.maps() for name, part in folds.items()}

@@ -1,6 +1,6 @@
-"""Charts of growth: areas, volumes and growth rates of series of brains, and displacements of runs."""
+"""Chart of growth: areas, volumes and growth rates of series of brains."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import cycle
 from typing import Any
 
@@ -8,17 +8,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from ..settings.terms import OBSERVED_BRAIN
 from .style import (
-    MUTED_COLOUR,
     RUN_COLOURS,
     from_zero,
     panel_figure,
-    run_colours,
-    run_legend,
-    runs_by_name,
     styled,
     week_axis,
     wrap,
@@ -28,7 +23,6 @@ SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series, without that of the simulations."""
 MAX_RATE_PANELS = 4
 """Up to so many series have a panel of rates each; more share one."""
-PUBLISHED_MARKERS = ("s", "^", "D", "v")
 
 
 @styled
@@ -141,55 +135,3 @@ def _folding_line(axes: Axes, rates: pd.DataFrame, rate_per_s: float | Mapping[f
     drawn = np.union1d(ends, weeks[(weeks > ends[0]) & (weeks < ends[-1])])
     places = np.interp(drawn, ends, np.arange(len(ends)) - 0.5)
     axes.plot(places, np.interp(drawn, weeks, values), label="folding", **style)
-
-
-@styled
-def displacement_chart(
-    displacement: pd.DataFrame, *, runs: Sequence[str] = (), published: Mapping[str, Any] | None = None
-) -> Figure:
-    """Draw the maximal and the mean displacement norm of all nodes per week.
-
-    Norms are divided by the weeks between output weeks. Runs are lines, published values grey.
-
-    Parameters
-    ----------
-    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
-    published
-        `displacement` has `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
-    """
-    named = runs_by_name(displacement)
-    colours, published_rows = run_colours(named["run"], runs), _published_norms(published)
-    markers = dict(zip(published_rows["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
-    rows = pd.concat([published_rows, named[named["nodes"] == "all"]])
-    rows["middle"], duration = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
-    figure, panels = panel_figure(2, per_row=2)
-    for axes, column, label in zip(panels, ("max_mm", "mean_mm"), ("maximal", "mean"), strict=True):
-        per_week = rows.assign(per_week=rows[column] / duration).sort_values("middle")
-        for run, line in per_week.groupby("run", sort=False):
-            style: dict[str, Any] = {"marker": "o", "color": colours.get(str(run), MUTED_COLOUR)}
-            if run in markers:
-                style |= {"marker": markers[run], "linestyle": "--"}
-            axes.plot(line["middle"], line["per_week"], label=run, **style)
-        axes.set_title(f"{label} displacement, all nodes")
-        axes.set_ylabel("displacement (mm per week)")
-        from_zero(axes)
-        week_axis(axes, [*rows["from_week"], *rows["to_week"]])
-        axes.set_xlabel("gestational age (GW), middle of the interval")
-    extra = [
-        Line2D([], [], color=MUTED_COLOUR, marker=marker, linestyle="--", label=source)
-        for source, marker in markers.items()
-    ]
-    run_legend(figure, colours, extra=extra)
-    return figure
-
-
-def _published_norms(published: Mapping[str, Any] | None) -> pd.DataFrame:
-    """Return published norms as a table like that of the study, with their sources as runs."""
-    weeks = np.array(published["displacement"]["from_weeks"] if published else [], dtype=float)
-    rows = published["displacement"]["rows"] if published else []
-    columns = ("max_mm", "mean_mm")
-    tables = [
-        pd.DataFrame({"run": row["source"], "from_week": weeks, "to_week": weeks + 1} | {k: row[k] for k in columns})
-        for row in rows
-    ]
-    return pd.concat(tables) if tables else pd.DataFrame(columns=["run", "from_week", "to_week", *columns])

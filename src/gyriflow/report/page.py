@@ -2,9 +2,8 @@
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from itertools import count
 from typing import Any
 
@@ -15,6 +14,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from ..formats import ALL_SUFFIXES
+from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
 from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, MEASURED, SPREAD_UNKNOWN, element_error, run_names
 from .labels import metric_title, plain, week_label
@@ -25,22 +25,6 @@ _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
 _FILE_NAME = re.compile(rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
-DOTS_PER_INCH = 150
-"""Pixels of the page per inch of print: a figure as wide as a journal page has 1080."""
-FIRST_PAGE_FIGURES = ("predicted_figure", "weekly_figure")
-"""Kinds of figures. The first figure of these is shown in the summary."""
-BRAIN_METRICS = ("volume", "area", "gyrification_index", "mean_sulcal_depth", "mean_thickness")
-"""Metrics in the table of brains."""
-NORM_WORDS = {
-    "ok": "Below each number: its centile for this age among the norm's other subjects, with the 90 % interval from "
-    "the uncertainty of the norm, and z. Sex and site are ignored.",
-    "few brains": "Below each number: its centile for this age among the norm's other subjects, with the 90 % "
-    "interval, and z. The norm has fewer than 30 subjects, so centiles end at 5 and 95.",
-    SPREAD_UNKNOWN: "Below each number: its difference from the curve of the norm ({norm}). The norm has one average "
-    "brain a week, so the spread of individuals around the curve is unknown and there are no centiles.",
-    "too few brains": "There are too few subjects for centiles: a norm needs ten others.",
-}
-"""Explanations of the table of brains, by flag of the norm."""
 NOT_COMPARED = "No simulation is compared: an observed brain of the same population and week is missing."
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
@@ -49,18 +33,18 @@ MAX_PENETRATION_MM = 0.5
 def page_figures(
     figures: Sequence[Mapping[str, Any]], contents: Mapping[str, str | tuple[str, float]]
 ) -> list[dict[str, Any]]:
-    """Return the figures and tables of a page: section, title, content, caption, first, technical.
+    """Return the figures and tables of a page: section, title, content (as `contents`), caption, first, technical.
 
     Parameters
     ----------
-    figures : name, section, title, caption in reStructuredText, technical, path and names of each
-        Titles and captions contain the names in braces.
+    figures : name, section, title, caption in reStructuredText, technical, first, path and names of each
+        Titles and captions contain the names in braces. The first one that may be `first` is shown in the summary.
     contents : {path: HTML, or a picture's data URL and its width in inches}
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
         brains.setdefault(figure["name"], set()).add(figure["names"].get("brain"))
-    first = next((figure["path"] for name in FIRST_PAGE_FIGURES for figure in figures if figure["name"] == name), None)
+    first = next((figure["path"] for figure in figures if figure["first"]), None)
     entries = []
     for figure in figures:
         names, content = figure["names"], contents[figure["path"]]
@@ -72,7 +56,7 @@ def page_figures(
             {
                 "section": figure["section"],
                 "title": title,
-                "content": Markup(content) if isinstance(content, str) else picture(*content, title),
+                "content": Markup(content) if isinstance(content, str) else content,
                 "caption": caption_html(figure["caption"].format(**names)),
                 "first": figure["path"] == first,
                 "technical": figure["technical"],
@@ -96,7 +80,7 @@ class Tables:
 
     Attributes
     ----------
-    quality, metrics, centiles : as for `brains_table`
+    quality, metrics, centiles : as for `brain_rows`
     warnings : columns subject, run, step, level, message
     runs, validation : as for `scores_table`; None if nothing was simulated
     intervals : those of the ensemble of the one prediction, if any
@@ -116,26 +100,9 @@ class Tables:
             object.__setattr__(self, name, getattr(self, name).replace(_FOLDERS, "", regex=True))
 
 
-@dataclass(frozen=True)
-class Origin:
-    """The origin of a study's results.
-
-    Attributes
-    ----------
-    provenance : the output of `software`, and files (brain, what, sha256)
-    methods : reStructuredText
-    configuration : text, without paths
-    """
-
-    provenance: Mapping[str, Any]
-    methods: str
-    configuration: str
-
-
 def study_page(
     brains: Sequence[Mapping[str, Any]],
     tables: Tables,
-    origin: Origin,
     figures: Sequence[Mapping[str, Any]],
     *,
     norm: str,
@@ -146,7 +113,8 @@ def study_page(
 
     Parameters
     ----------
-    brains, pictures : as for `brains_table`
+    brains : as for `brain_rows`
+    pictures : data URL and width in inches of the small pictures of each brain that has a page, by its id
     figures : the output of `page_figures`
     norm : name of the norm's brains
     prediction : the output of `Study.prediction_facts`; `accuracy`, the content of `norms/predictions.yaml`; and
@@ -170,7 +138,7 @@ def study_page(
         has_centiles = any("centile" in str(head) for head in numbers)
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
         prediction["individuals"] = norm if has_centiles else ""
-    return _shared(brains, tables, tables.warnings, origin, figures, norm, pictures) | {
+    return _shared(brains, tables, tables.warnings, figures, norm, pictures) | {
         "title": title,
         "verdict": sentence,
         "prediction": prediction,
@@ -182,12 +150,12 @@ def study_page(
 
 
 def brain_page(
-    brain: Mapping[str, Any], tables: Tables, origin: Origin, figures: Sequence[Mapping[str, Any]], *, norm: str
+    brain: Mapping[str, Any], tables: Tables, figures: Sequence[Mapping[str, Any]], *, norm: str
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
     own = tables.metrics["subject"] == brain["id"]
     warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
-    return _shared([brain], tables, warnings, origin, figures, norm, {}) | {
+    return _shared([brain], tables, warnings, figures, norm, {}) | {
         "title": f"Measured cortical folding, {brain['id']}",
         "verdict": "",
         "prediction": None,
@@ -202,36 +170,38 @@ def _shared(
     brains: Sequence[Mapping[str, Any]],
     tables: Tables,
     warnings: pd.DataFrame,
-    origin: Origin,
     figures: Sequence[Mapping[str, Any]],
     norm: str,
     pictures: Mapping[str, tuple[str, float]],
 ) -> dict[str, Any]:
     """Return the variables that pages of studies and of brains share."""
-    ids, centiles, provenance = [brain["id"] for brain in brains], tables.centiles, origin.provenance
-    own = centiles[centiles["subject"].isin(ids) & (centiles["run"] == MEASURED)]
-    flags = set(own.loc[own["metric"].isin(BRAIN_METRICS), "flag"])
+    centiles = tables.centiles[tables.centiles["run"] == MEASURED]
+    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
+    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
     # an atlas has too few brains for centiles among themselves
     flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    files = [file for file in provenance["files"] if file["brain"] in ids]
-    software = {"gyriflow": provenance["gyriflow"], "Python": provenance["python"], **provenance["packages"]}
-    versions = [(name, version) for name, version in software.items() if version]
     return {
-        "given": brains,
-        "brains": html_table(brains_table(brains, tables.quality, tables.metrics, centiles, pictures)),
-        "norm": [words.format(norm=norm) for flag, words in NORM_WORDS.items() if flag in flags],
+        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
+        "pictures": pictures,
+        "norm": norm,
+        "flags": flags,
+        "spread_unknown": SPREAD_UNKNOWN,
         "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
         "weeks": next((item for item in figures if item["first"]), None),
         "sections": sections([item for item in figures if not item["first"]]),
-        "provenance": provenance_line(provenance),
-        "methods": caption_html(origin.methods),
-        "files": html_table(pd.DataFrame(files).rename(columns={"sha256": "SHA-256"})),
-        "versions": html_table(pd.DataFrame(versions, columns=["package", "version"])),
-        "configuration": origin.configuration,
     }
 
 
-def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any], **content: Any) -> str:
+def report_page(
+    template: str,
+    parts: Mapping[str, str],
+    view: Mapping[str, Any],
+    *,
+    provenance: Mapping[str, Any],
+    methods: str,
+    configuration: str,
+    **content: Any,
+) -> str:
     """Return the page.
 
     Parameters
@@ -240,14 +210,18 @@ def report_page(template: str, parts: Mapping[str, str], view: Mapping[str, Any]
     parts : style, three, notice, controls, viewer
         The style sheet and the scripts of the 3D view with their licence, inserted unescaped.
     view : the output of `surfaces_view`
-    content : the other variables of the template; HTML as `Markup`
+    provenance : the output of `software`, and files (brain, what, sha256)
+    methods : reStructuredText
+    configuration : text, without paths
+    content : the output of `study_page` or `brain_page`
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     # a script must not contain its own end tag
     data = Markup(json.dumps(view, separators=(",", ":")).replace("</", "<\\/"))
     inside = {name: Markup(text.replace("</script", "<\\/script")) for name, text in parts.items()}
     page = environment.from_string(template)
-    return page.render(**content, **inside, has_view=bool(view["groups"]), surfaces=data)
+    origin = {"provenance": provenance, "methods": caption_html(methods), "configuration": configuration}
+    return page.render(**content, **inside, **origin, has_view=bool(view["groups"]), surfaces=data)
 
 
 def methods_text(template: str, **used: Any) -> str:
@@ -263,26 +237,22 @@ def methods_text(template: str, **used: Any) -> str:
     return environment.from_string(template).render(growth_sentence=growth_sentence, **used)
 
 
-def picture(address: str, inches: float, alt: str) -> Markup:
-    """Return an HTML image from its data URL and its width in print, so that all have the same font size."""
-    width = round(inches * DOTS_PER_INCH)
-    return Markup('<img src="{}" alt="{}" width="{}" loading="lazy">').format(address, alt, width)
-
-
 def caption_html(caption: str) -> Markup:
     """Return a caption in reStructuredText as HTML."""
     settings = {"report_level": 5, "raw_enabled": False, "file_insertion_enabled": False}
     return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
 
 
-def brains_table(
+def brain_rows(
     brains: Sequence[Mapping[str, Any]],
     quality: pd.DataFrame,
     metrics: pd.DataFrame,
     centiles: pd.DataFrame,
-    pictures: Mapping[str, tuple[str, float]],
-) -> pd.DataFrame:
-    """Return a row for each brain: pictures, description with a link to its page, metrics, verdict and warnings.
+    linked: Collection[str] = (),
+) -> list[dict[str, Any]]:
+    """Return what a page says of each brain: its facts, its numbers, and its verdict with the cause or the warnings.
+
+    Numbers are by title of the metric, each with the text below it.
 
     Parameters
     ----------
@@ -290,42 +260,35 @@ def brains_table(
     quality : columns subject, verdict, cause, warnings
         The table of quality control.
     metrics, centiles : the study's; `centile_text` is shown below each number
-    pictures : data URL and width in inches of the pictures of each brain that has a page, by its id
+    linked : ids of the brains whose source is on a page of their own
     """
-    judged = quality.set_index("subject")
-    causes = judged["cause"].fillna("").where(judged["cause"].fillna("") != "", judged["warnings"].fillna(""))
-    whole, scored = (
-        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["metric"].isin(BRAIN_METRICS)]
-        for table in (metrics, centiles)
+    judged = quality.set_index("subject").fillna("")
+    values, texts = (
+        {(row.subject, row.metric): getattr(row, column) for row in table.itertuples() if row.hemisphere == "whole"}
+        for table, column in (
+            (metrics[metrics["run"] == MEASURED].dropna(subset=["value"]), "value"),
+            (centiles[centiles["run"] == MEASURED].assign(text=centile_text), "text"),
+        )
     )
-    scored = scored[["subject", "metric"]].assign(text=centile_text(scored))
-    whole = whole.dropna(subset=["value"]).merge(scored, "left").fillna({"text": ""})
-    cells = {(row.subject, row.metric): _above(f"{row.value:.4g}", row.text, "whole") for row in whole.itertuples()}
-    heads = {name: metric_title(name) for name in whole["metric"]}
+    shown = [name for name in metrics_shown(Shown.BRAINS) if name in {metric for _, metric in values}]
     rows = []
     for brain in brains:
         key = brain["id"]
-        row: dict[str, Any] = {"": picture(*pictures[key], key)} if key in pictures else {"": ""} if pictures else {}
-        row["brain"] = _described(brain, linked=key in pictures)
-        row |= {head: cells.get((key, name), "–") for name, head in heads.items()}
-        verdict = Markup('<span class="verdict {0}">{0}</span>').format(judged.loc[key, "verdict"])
-        rows.append(row | {"verdict": _above(verdict, causes[key])})
-    return pd.DataFrame(rows)
-
-
-def _described(brain: Mapping[str, Any], *, linked: bool) -> Markup:
-    """Return a brain's name, as a link to its page, above its age, population, covariates, source and licence."""
-    name = Markup('<a href="brains/{0}.html">{0}</a>' if linked else "{}").format(brain["id"])
-    population = brain["population"] or ("synthetic" if brain["synthetic"] else "")
-    licence = brain["licence"] or ("made here" if brain["synthetic"] else "" if linked else "your own data")
-    covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
-    source = "" if linked else brain["source"]
-    facts = filter(None, [week_label(brain["week"]), population, *covariates, source, licence])
-    return _above(name, "; ".join(facts))
-
-
-def _above(text: str, below: object, kind: str = "") -> Markup:
-    return Markup('{}<br><span class="pale {}">{}</span>').format(text, kind, below)
+        numbers = {
+            metric_title(name): (METRICS[name].text(values[key, name]), texts.get((key, name), ""))
+            if (key, name) in values
+            else ("–", "")
+            for name in shown
+        }
+        is_linked, is_synthetic = key in linked, brain["synthetic"]
+        licence = brain["licence"] or ("made here" if is_synthetic else "" if is_linked else "your own data")
+        covariates = [f"{key}: {value}" for key, value in brain["covariates"].items()]
+        facts = [week_label(brain["week"]), brain["population"] or ("synthetic" if is_synthetic else ""), *covariates]
+        facts += ["" if is_linked else brain["source"], licence]
+        cause = judged.loc[key, "cause"] or judged.loc[key, "warnings"]
+        described = {"facts": list(filter(None, facts)), "verdict": judged.loc[key, "verdict"], "cause": cause}
+        rows.append({**brain, "numbers": numbers, **described})
+    return rows
 
 
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
@@ -416,8 +379,8 @@ def verdict(
 
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
-    weeks = [float(week) for week in str(run["weeks"]).strip("[]").split(",")]
-    reached, end = max(weeks), float(run["end_week"])
+    # the table has the list as JSON
+    reached, end = max(json.loads(run["weeks"])), float(run["end_week"])
     words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")
@@ -481,16 +444,6 @@ def group_warnings(warnings: pd.DataFrame) -> pd.DataFrame:
     rows["brain, run"] = places
     groups = rows.groupby(["step", "message"], sort=False)["brain, run"]
     return groups.agg(lambda names: "; ".join(filter(None, dict.fromkeys(names)))).reset_index()
-
-
-def provenance_line(provenance: Mapping[str, Any]) -> str:
-    """Return a sentence with the time and the version of the code."""
-    commit = provenance["commit"]
-    source = "not from a checkout of the source, so without a commit"
-    if commit:
-        source = f"commit {commit.removesuffix('-dirty')}{', changed' if commit.endswith('-dirty') else ''}"
-    time = datetime.fromisoformat(provenance["recorded"]).strftime("%Y-%m-%d %H:%M UTC")
-    return f"Made {time} by gyriflow {provenance['gyriflow']}, {source}."
 
 
 def hide_paths(value: Any) -> Any:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from string import ascii_lowercase
 from typing import Any
 
@@ -10,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle, Patch
 
-from ..geometry.triangles import Floats, TriangleMesh
-from .scene import PIXELS_PER_INCH, TISSUE, View, half_extents, is_visible, picture_axes, render
+from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
+from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
@@ -21,6 +21,10 @@ _DOTS_PER_INCH = 300
 # space around the largest brain, so that brains in neighbouring rows and columns do not touch
 _MARGIN = 1.12
 MAX_COLUMNS = 8
+LINES_MM = 4.0
+"""Spacing of the lines along directions."""
+MIN_FACING_COSINE = 0.3
+"""Minimum cosine between a normal and the view for lines: closer to the outline they would be foreshortened."""
 _PANEL_IN = 1.75
 # no column is narrower than this part of the widest
 _NARROWEST = 0.7
@@ -44,16 +48,16 @@ class Panel:
     caption : text below
     light : `TISSUE` or `MAP` of the scene
     mark : (3,) a point of the surface marked by a ring, dotted if the point is on the far side
-    lines : (k, 2, 3) ends of lines on the surface
+    directions : (n, 3) vectors at the vertices, drawn as lines on the surface (`direction_lines`)
     """
 
     mesh: TriangleMesh
     colours: Floats
-    view: View
+    view: View = VIEWS["left"]
     caption: str = ""
     light: Mapping[str, Any] = field(default_factory=lambda: TISSUE)
     mark: Floats | None = None
-    lines: Floats | None = None
+    directions: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,37 +67,6 @@ class Row:
     label: str
     panels: Sequence[Panel | None]
     absent: str = ""
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Sizes in inches.
-
-    `left` is the left edge of the first panel, `panels` are the widths of all columns, `blocks` the columns of each
-    block, one below the other. `foot` is the height below all blocks.
-    """
-
-    width: float
-    left: float
-    panels: Sequence[float]
-    blocks: Sequence[slice]
-    foot: float
-    inches_per_mm: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Adjacent columns: their headings and rows, and `heights` in inches of each row's pictures and captions."""
-
-    columns: slice
-    heads: Sequence[str]
-    rows: Sequence[Row]
-    heights: Sequence[tuple[float, float]]
-
-    @property
-    def height(self) -> float:
-        """Height of all rows."""
-        return sum(pictures + captions for pictures, captions in self.heights)
 
 
 def round_length(limit_mm: float) -> float:
@@ -121,60 +94,62 @@ def panel_grid(
     legend : entries of a legend
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
-    layout = _layout(rows, has_bar=colour_bar is not None, entries=len(legend))
-    heads = [wrap(head, int(panel / _LETTER_IN)) for head, panel in zip(columns, layout.panels, strict=True)]
-    blocks = [_block(rows, heads, block, layout.inches_per_mm) for block in layout.blocks]
-    head_in = _dots(0.2 + 0.12 * max(head.count("\n") for head in heads))
-    total = _TOP_IN + layout.foot + len(blocks) * head_in + sum(block.height for block in blocks)
-    figure = Figure(figsize=(layout.width, total))
-    top, letters = total - _TOP_IN, iter(ascii_lowercase)
-    for block in blocks:
-        _draw_heads(figure, block, layout, middle=top - head_in / 2)
-        top -= head_in
-        for row, (pictures, captions) in zip(block.rows, block.heights, strict=True):
+    lines = max(row.label.count("\n") for row in rows)
+    label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
+    widths_in, blocks, inches_per_mm = _columns(rows, FULL_WIDTH_IN - label_in)
+    widest_in = max(widths_in[block].sum() for block in blocks)
+    width = _dots(max(SINGLE_COLUMN_IN, label_in + widest_in))
+    left = _dots(label_in + (width - label_in - widest_in) / 2)
+    heads = [wrap(head, int(panel / _LETTER_IN)) for head, panel in zip(columns, widths_in, strict=True)]
+    head_in = 0.2 + 0.12 * max(head.count("\n") for head in heads)
+    # without rows that are empty in a block
+    drawn = [[row for row in rows if row.absent or any(row.panels[block])] for block in blocks]
+    heights_in = [
+        _dots([head_in, *(height for row in block_rows for height in _heights_in(row, block, inches_per_mm))])
+        for block, block_rows in zip(blocks, drawn, strict=True)
+    ]
+    legend_columns = 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
+    foot_in = max(0.66 if colour_bar or legend else 0.46, 0.15 * -(-len(legend) // legend_columns) + 0.16)
+    total = _TOP_IN + _dots(foot_in) + sum(heights.sum() for heights in heights_in)
+    figure, top, letters = Figure(figsize=(width, total)), total - _TOP_IN, iter(ascii_lowercase)
+    for block, block_rows, heights in zip(blocks, drawn, heights_in, strict=True):
+        ends = {"left": left / width, "right": (left + widths_in[block].sum()) / width, "top": top / total}
+        top -= heights.sum()
+        ratios = {"width_ratios": widths_in[block], "height_ratios": heights, "hspace": 0, "wspace": 0}
+        grid = GridSpec(len(heights), len(heads[block]), figure, bottom=top / total, **ends, **ratios)
+        for number, row in enumerate(block_rows):
+            # pictures are between the headings or captions above and the captions below
+            cells = [figure.add_subplot(grid[2 * number + 1, column]) for column in range(len(heads[block]))]
+            widths_mm = [float(width_in / inches_per_mm) for width_in in widths_in[block]]
+            height_mm = float(heights[2 * number + 1] / inches_per_mm)
+            _draw_row(cells, row, row.panels[block], widths_mm, height_mm, inches_per_mm)
             # a letter for each row, or for each panel of a single row
-            count = 1 if len(rows) > 1 else len(block.heads) if len(columns) > 1 else 0
-            _draw_row(
-                figure, row, block.columns, layout, list(islice(letters, count)), bottom=top - pictures, height=pictures
-            )
-            top -= pictures + captions
-    _draw_scale_bar(figure, layout, {end for row in rows for panel in row.panels if panel for end in panel.view.ends})
+            lettered = cells[:1] if len(rows) > 1 else cells if len(columns) > 1 else []
+            for axes, letter in zip(lettered, letters, strict=False):
+                # next to the row's label, or above the letters of the ends
+                is_labelled = row.label and axes is cells[0]
+                align = {"ha": "right", "va": "top"} if is_labelled else {"ha": "left", "va": "bottom"}
+                _write(axes, letter, (0.0, 1.0), (-2, 2), fontsize=9, fontweight="bold", **align)
+            for axes, head in zip(cells if number == 0 else [], heads[block], strict=False):
+                _write(axes, head, (0.5, 1.0), (0, 36 * head_in), va="center")
+    _draw_scale_bar(figure, rows, foot_in, widths_in.max(), inches_per_mm)
     if colour_bar:
-        _draw_colour_bar(figure, layout, *colour_bar)
+        _draw_colour_bar(figure, *colour_bar)
     if legend:
-        figure.legend(handles=legend, ncols=_legend_columns(layout.width), loc="lower right", borderaxespad=0.2)
+        figure.legend(handles=legend, ncols=legend_columns, loc="lower right", borderaxespad=0.2)
     return figure
 
 
-def _layout(rows: Sequence[Row], *, has_bar: bool, entries: int) -> _Layout:
-    """Return the sizes of a grid above a legend with so many entries: one scale, as large as the page allows."""
-    # half the width of each column in mm: its widest brain and a margin
+def _columns(rows: Sequence[Row], room_in: float) -> tuple[Floats, list[slice], float]:
+    """Return the widths of all columns in inches, the columns of each block, and the scale in inches per mm."""
     columns = zip(*(row.panels for row in rows), strict=True)
-    widest = [max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns]
-    halves = _MARGIN * np.maximum(widest, _NARROWEST * max(widest))
+    widest = np.array([max((half_extents(p.mesh, p.view)[0] for p in column if p), default=0.0) for column in columns])
+    widths_mm = 2 * _MARGIN * np.maximum(widest, _NARROWEST * widest.max())
     # blocks with as equal numbers of columns as possible
-    size = -(-len(halves) // -(-len(halves) // MAX_COLUMNS))
-    blocks = [slice(start, start + size) for start in range(0, len(halves), size)]
-    lines = max(row.label.count("\n") for row in rows)
-    label_in = 0.24 + (0.06 + 0.12 * lines if lines else 0.0)
-    most_mm = max(2 * halves[block].sum() for block in blocks)
-    inches_per_mm = min(_PANEL_IN / (2 * halves.max()), (FULL_WIDTH_IN - label_in) / most_mm)
-    panels = [_dots(2 * half * inches_per_mm) for half in halves]
-    most_in = max(sum(panels[block]) for block in blocks)
-    width = _dots(max(SINGLE_COLUMN_IN, label_in + most_in))
-    left = _dots(label_in + (width - label_in - most_in) / 2)
-    foot = max(0.66 if has_bar or entries else 0.46, 0.15 * -(-entries // _legend_columns(width)) + 0.16)
-    return _Layout(width, left, panels, blocks, _dots(foot), inches_per_mm)
-
-
-def _legend_columns(width: float) -> int:
-    return 2 if width > 1.5 * SINGLE_COLUMN_IN else 1
-
-
-def _block(rows: Sequence[Row], heads: Sequence[str], columns: slice, inches_per_mm: float) -> _Block:
-    """Return a block without its empty rows."""
-    visible = [row for row in rows if row.absent or any(row.panels[columns])]
-    return _Block(columns, heads[columns], visible, [_heights_in(row, columns, inches_per_mm) for row in visible])
+    size = -(-len(widths_mm) // -(-len(widths_mm) // MAX_COLUMNS))
+    blocks = [slice(start, start + size) for start in range(0, len(widths_mm), size)]
+    inches_per_mm = min(_PANEL_IN / widths_mm.max(), room_in / max(widths_mm[block].sum() for block in blocks))
+    return _dots(widths_mm * inches_per_mm), blocks, inches_per_mm
 
 
 def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, float]:
@@ -184,59 +159,66 @@ def _heights_in(row: Row, block: slice, inches_per_mm: float) -> tuple[float, fl
     # the label is written along the height
     label = 0.06 * max(len(line) for line in row.label.split("\n")) + 0.1
     lines = max((len(panel.caption.splitlines()) for panel in panels), default=0)
-    return _dots(max(2 * _MARGIN * tallest * inches_per_mm, label)), _dots(0.13 * lines)
+    return max(2 * _MARGIN * tallest * inches_per_mm, label), 0.13 * lines
 
 
-def _dots(inches: float) -> float:
-    """Round a length in inches to whole dots."""
-    return round(inches * _DOTS_PER_INCH) / _DOTS_PER_INCH
+def _dots(inches: Any) -> Any:
+    """Round lengths in inches to whole dots."""
+    return np.round(np.asarray(inches) * _DOTS_PER_INCH) / _DOTS_PER_INCH
 
 
-def _draw_heads(figure: Figure, block: _Block, layout: _Layout, *, middle: float) -> None:
-    left, height = layout.left, figure.get_figheight()
-    for head, panel in zip(block.heads, layout.panels[block.columns], strict=True):
-        place = (left + panel / 2) / layout.width, middle / height
-        figure.text(*place, head, ha="center", va="center", fontsize=7)
-        left += panel
+def _write(
+    axes: Axes, text: str, at: tuple[float, float], shift_pt: tuple[float, float] = (0, 0), **style: Any
+) -> None:
+    """Write at a place in fractions of a panel, shifted by points."""
+    style = {"fontsize": 7, "ha": "center", "va": "center", **style}
+    axes.annotate(text, at, shift_pt, xycoords="axes fraction", textcoords="offset points", **style)
 
 
 def _draw_row(
-    figure: Figure, row: Row, block: slice, layout: _Layout, letters: Sequence[str], *, bottom: float, height: float
+    cells: Sequence[Axes],
+    row: Row,
+    panels: Sequence[Panel | None],
+    widths_mm: Sequence[float],
+    height_mm: float,
+    inches_per_mm: float,
 ) -> None:
-    total = figure.get_figheight()
-    middle = (bottom + height / 2) / total
-    figure.text(
-        (layout.left - 0.06) / layout.width, middle, row.label, rotation=90, ha="right", va="center", fontsize=7
-    )
-    half_height = height / layout.inches_per_mm / 2
-    previous, left = None, layout.left
-    for index, (panel, wide) in enumerate(zip(row.panels[block], layout.panels[block], strict=True)):
-        axes = figure.add_axes((left / layout.width, bottom / total, wide / layout.width, height / total))
-        left += wide
-        half_width = wide / layout.inches_per_mm / 2
+    """Draw the pictures of a row in its cells, whose sizes are given, with the row's label on the left."""
+    previous = None
+    _write(cells[0], row.label, (0.0, 0.5), (-4.3, 0), rotation=90, ha="right")
+    for index, (axes, panel, width_mm) in enumerate(zip(cells, panels, widths_mm, strict=True)):
         axes.set_label(f"{row.label}, column {index}")
         axes.set_axis_off()
-        if index < len(letters):
-            # next to the row's label, or above the letters of the ends
-            style: dict[str, Any] = {"ha": "left", "va": "bottom"}
-            if row.label and not index:
-                style = {"ha": "right", "va": "top"}
-            style |= {"xytext": (-2, 2), "textcoords": "offset points", "xycoords": "axes fraction"}
-            axes.annotate(letters[index], (0.0, 1.0), fontsize=9, fontweight="bold", **style)
         if panel is None:
-            axes.text(0.5, 0.5, row.absent, transform=axes.transAxes, ha="center", va="center", fontsize=6.5)
+            _write(axes, row.absent, (0.5, 0.5), fontsize=6.5)
             continue
-        size = (half_width, half_height), PIXELS_PER_INCH * layout.inches_per_mm
-        image = render(panel.mesh, panel.colours, panel.view, *size, light=panel.light, lines=panel.lines)
-        axes.imshow(image, extent=(-half_width, half_width, -half_height, half_height), aspect="auto")
+        half = width_mm / 2, height_mm / 2
+        lines = None if panel.directions is None else direction_lines(panel.mesh, panel.directions, panel.view)
+        image = render(
+            panel.mesh, panel.colours, panel.view, half, PIXELS_PER_INCH * inches_per_mm, light=panel.light, lines=lines
+        )
+        axes.imshow(image, extent=(-half[0], half[0], -half[1], half[1]), aspect="auto")
         if panel.view != previous:
             for place, align, end in ((0.04, "left", panel.view.ends[0]), (0.96, "right", panel.view.ends[1])):
-                axes.text(place, 1.0, end, transform=axes.transAxes, ha=align, va="top", fontsize=6)
+                _write(axes, end, (place, 1.0), ha=align, va="top", fontsize=6)
         previous = panel.view
         if panel.mark is not None:
             _draw_ring(axes, panel, panel.mark)
-        if panel.caption:
-            axes.text(0.5, -0.01, panel.caption, transform=axes.transAxes, ha="center", va="top", fontsize=6.5)
+        _write(axes, panel.caption, (0.5, -0.01), va="top", fontsize=6.5)
+
+
+def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
+    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of `LINES_MM` that faces a view.
+
+    Vectors of length 1 or more give lines as long as a cube.
+    """
+    normals = vertex_normals(mesh)
+    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
+    vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
+    half = directions[vertices] * (LINES_MM / 2) / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
+    # slightly above the surface, which would otherwise hide parts of them
+    at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
+    return np.stack([at - half, at + half], axis=1)
 
 
 def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
@@ -250,25 +232,28 @@ def _draw_ring(axes: Axes, panel: Panel, point: Floats) -> None:
         axes.add_patch(ring)
 
 
-def _draw_colour_bar(figure: Figure, layout: _Layout, scale: ScalarMappable, label: str) -> None:
-    start, total = _SCALE_SHARE * layout.width + 0.1, figure.get_figheight()
-    place = start / layout.width, 0.5 / total, (layout.width - start - 0.3) / layout.width, 0.08 / total
+def _draw_colour_bar(figure: Figure, scale: ScalarMappable, label: str) -> None:
+    width, total = figure.get_size_inches()
+    start = _SCALE_SHARE * width + 0.1
+    place = start / width, 0.5 / total, (width - start - 0.3) / width, 0.08 / total
     bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation="horizontal")
     bar.set_label(label, labelpad=1)
     bar.ax.tick_params(pad=1, length=2)
     bar.outline.set_linewidth(0.5)
 
 
-def _draw_scale_bar(figure: Figure, layout: _Layout, ends: set[str]) -> None:
-    total = figure.get_figheight()
-    room_mm = (_SCALE_SHARE * layout.width - 2 * _EDGE_IN) / layout.inches_per_mm
-    length = round_length(min(0.6 * max(layout.panels) / layout.inches_per_mm, room_mm))
-    size = (length * layout.inches_per_mm / layout.width, 0.04 / total)
-    axes = figure.add_axes((_EDGE_IN / layout.width, (layout.foot - 0.2) / total, *size))
+def _draw_scale_bar(
+    figure: Figure, rows: Sequence[Row], foot_in: float, widest_in: float, inches_per_mm: float
+) -> None:
+    """Draw the scale bar, and below it what the letters of the views mean."""
+    width, total = figure.get_size_inches()
+    length = round_length(min(0.6 * widest_in, _SCALE_SHARE * width - 2 * _EDGE_IN) / inches_per_mm)
+    axes = figure.add_axes((_EDGE_IN / width, (foot_in - 0.2) / total, length * inches_per_mm / width, 0.04 / total))
     axes.set_label("scale bar")
     axes.set_xlim(0, length)
     axes.axvspan(0, length, color="black", linewidth=0)
     axes.set_axis_off()
     axes.text(0.0, -0.6, f"{length:g} mm", transform=axes.transAxes, ha="left", va="top", fontsize=7)
+    ends = {end for row in rows for panel in row.panels if panel for end in panel.view.ends}
     words = ", ".join(f"{letter} {name}" for letter, name in _END_NAMES.items() if letter in ends)
-    figure.text(_EDGE_IN / layout.width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)
+    figure.text(_EDGE_IN / width, 0.02 / total, words, ha="left", va="bottom", fontsize=6)

@@ -1,6 +1,7 @@
 """Pictures of surfaces: simulated and observed brains, maps, regions and zones."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle, pairwise
 from typing import Any
 
@@ -11,12 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged, vertex_normals
+from ..geometry.triangles import Floats, Ints, TriangleMesh, face_areas, merged
 from ..quantities import SIGNED_COLOURS, VERTEX_MAPS, name_in_interval
 from ..settings.folding import AXES, FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2
-from .labels import column_label, map_title, plain, value_labels
+from .labels import column_label, map_title, value_labels
 from .panels import MAX_COLUMNS, Panel, Row, panel_grid
 from .scene import (
     MAP,
@@ -43,10 +44,8 @@ SIDE_VIEWS = ("left", "top")
 ROUND_VIEWS = ("left", "right", "top", "bottom")
 MEDIAL_VIEWS = ("left", "bottom", "left medial", "right medial")
 ROUNDING = 1e-9
-LINES_MM, DIRECTION_QUANTILE = 4.0, 0.9
-"""Spacing of direction lines, and the quantile of the vectors' lengths above which all lines are equally long."""
-MIN_FACING_COSINE = 0.3
-"""Minimum cosine between a normal and the view for lines: closer to the outline they would be foreshortened."""
+DIRECTION_QUANTILE = 0.9
+"""Quantile of the lengths of directions above which all lines are equally long."""
 ABSENT = "ended\nbefore\nthis week"
 """Text in place of a run that ended before the week."""
 ZONE_COLOURS = {
@@ -67,19 +66,41 @@ def _ordered(*groups: Mapping) -> list:
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
 
 
-def _plain_panel(mesh: TriangleMesh | None, colour: str, view: View) -> Panel | None:
-    return None if mesh is None else Panel(mesh, uniform_colours(mesh, colour), view)
+def _plain(mesh: TriangleMesh, colour: str) -> Panel:
+    return Panel(mesh, uniform_colours(mesh, colour))
 
 
-def _side_by_side(
-    keys: Sequence, panels: Mapping[str, Mapping[View, Sequence[Panel | None]]]
-) -> tuple[list[str], list[Row]]:
-    """Return the headings and rows of a grid: a row per group with all views, or per view and group if too wide."""
-    views, heads = list(next(iter(panels.values()))), [column_label(key) for key in keys]
-    if len(views) * len(keys) > MAX_COLUMNS:
-        return heads, [Row(f"{name}\n{v.name} view".strip(), group[v]) for v in views for name, group in panels.items()]
-    rows = [Row(name, [panel for view in views for panel in group[view]]) for name, group in panels.items()]
-    return [f"{head}\n{view.name} view" for view in views for head in heads], rows
+def _mapped(surface_map: SurfaceMap, scale: ScalarMappable, directions: Floats | None = None) -> Panel:
+    mesh, values = surface_map
+    return Panel(mesh, paint(values, scale), light=MAP, directions=directions)
+
+
+def brain_grid(groups: Mapping[str, Mapping[Any, Panel]], views: Sequence[str], **more: Any) -> Figure:
+    """Draw groups of brains from several views, a column per week, interval or name; `more` for `panel_grid`.
+
+    A group has a row with all views, or a row per view where these are too wide. Captions are below the first view.
+    """
+    keys, seen = _ordered(*groups.values()), [VIEWS[name] for name in views]
+    heads = list(map(column_label, keys))
+
+    if len(seen) * len(keys) <= MAX_COLUMNS:
+        rows = [
+            Row(name, [panel for view in seen for panel in _seen(group, keys, view, with_caption=view == seen[0])])
+            for name, group in groups.items()
+        ]
+        return panel_grid([f"{head}\n{view.name} view" for view in seen for head in heads], rows, **more)
+    rows = [
+        Row(f"{name}\n{view.name} view".strip(), _seen(group, keys, view, with_caption=view == seen[0]))
+        for view in seen
+        for name, group in groups.items()
+    ]
+    return panel_grid(heads, rows, **more)
+
+
+def _seen(group: Mapping[Any, Panel], keys: Iterable, view: View, *, with_caption: bool = True) -> list[Panel | None]:
+    """Return the brains of a group from a view, None where the group has none."""
+    panels = [group.get(key) for key in keys]
+    return [panel and replace(panel, view=view, caption=panel.caption if with_caption else "") for panel in panels]
 
 
 @styled
@@ -103,22 +124,22 @@ def runs_by_week(
         The map `distance_mm` is shown below.
     predicted : heading of a predicted brain (blue) in `observed`
     """
-    groups = {name: (meshes, SIMULATED_SURFACE_COLOUR) for name, meshes in runs.items() if meshes}
-    if observed:
-        groups[observed_name] = (observed, OBSERVED_SURFACE_COLOUR)
-    keys, seen = _ordered(*(meshes for meshes, _ in groups.values())), [VIEWS[name] for name in views]
-    special = {predicted: SIMULATED_SURFACE_COLOUR}
-    panels = {
-        name: {view: [_plain_panel(meshes.get(key), special.get(key, colour), view) for key in keys] for view in seen}
-        for name, (meshes, colour) in groups.items()
+    special: dict[Any, str] = {predicted: SIMULATED_SURFACE_COLOUR}
+    groups = {
+        name: {week: _plain(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
+        for name, meshes in runs.items()
+        if meshes
     }
-    bar = None
-    if deviations:
-        distance_maps = {week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()}
-        scale = scale_of("distance_mm", np.concatenate([values for _, values in distance_maps.values()]))
-        panels["distance"] = {view: [_map_panel(distance_maps.get(key), scale, view) for key in keys] for view in seen}
-        bar = scale, map_title("distance_mm")
-    return panel_grid(*_side_by_side(keys, panels), colour_bar=bar)
+    if observed:
+        groups[observed_name] = {
+            key: _plain(mesh, special.get(key, OBSERVED_SURFACE_COLOUR)) for key, mesh in observed.items()
+        }
+    if not deviations:
+        return brain_grid(groups, views)
+    maps = {week: (mesh, maps["distance_mm"]) for week, (mesh, maps) in deviations.items()}
+    scale = scale_of("distance_mm", np.concatenate([values for _, values in maps.values()]))
+    groups["distance"] = {week: _mapped(surface_map, scale) for week, surface_map in maps.items()}
+    return brain_grid(groups, views, colour_bar=(scale, map_title("distance_mm")))
 
 
 def displacements(frames: Mapping[float, SurfaceMaps]) -> dict[tuple[float, float], SurfaceMap]:
@@ -143,21 +164,17 @@ def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figu
     frames : {run: {week: (surface in RAS+ mm, fields)}}
     """
     moved = {run: displacements(weeks) for run, weeks in frames.items()}
-    keys, seen = _ordered(*moved.values()), [VIEWS[name] for name in SIDE_VIEWS]
     every = np.concatenate([norms for maps in moved.values() for _, norms in maps.values()])
     scale = scale_of("displacement_mm", every)
 
-    def panel(surface_map: SurfaceMap | None, view: View) -> Panel | None:
-        if surface_map is None:
-            return None
-        mesh, norms = surface_map
+    def panel(mesh: TriangleMesh, norms: Floats) -> Panel:
         place = mesh.vertices[int(np.nanargmax(norms))]
         where = ", ".join(f"{value:z.0f}" for value in place).replace("-", "−")
         words = f"max {np.nanmax(norms):.2f} mm\nat {where}\nmean {np.nanmean(norms):.2f} mm"
-        return Panel(mesh, paint(norms, scale), view, words if view == seen[0] else "", MAP, place)
+        return replace(_mapped((mesh, norms), scale), caption=words, mark=place)
 
-    panels = {run: {view: [panel(maps.get(key), view) for key in keys] for view in seen} for run, maps in moved.items()}
-    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, "norm of the displacement (mm)"))
+    groups = {run: {key: panel(*surface_map) for key, surface_map in maps.items()} for run, maps in moved.items()}
+    return brain_grid(groups, SIDE_VIEWS, colour_bar=(scale, "norm of the displacement (mm)"))
 
 
 def round_up(value: float) -> float:
@@ -237,17 +254,16 @@ def scalar_maps(
         Drawn as lines of proportional length; the longest tenth have the same length.
     """
     every = np.concatenate([values for group in maps.values() for _, values in group.values()])
-    scale, keys, seen = scale_of(quantity, every), _ordered(*maps.values()), [VIEWS[name] for name in views]
-    shares: dict[Any, Floats] = {}
+    scale, shares = scale_of(quantity, every), {}
     if directions:
         lengths = np.linalg.norm(np.concatenate(list(directions.values())), axis=1)
         shares = {key: vectors / np.quantile(lengths, DIRECTION_QUANTILE) for key, vectors in directions.items()}
-    panels = {
-        group: {view: [_map_panel(values.get(key), scale, view, shares.get(key)) for key in keys] for view in seen}
+    groups = {
+        group: {key: _mapped(surface_map, scale, shares.get(key)) for key, surface_map in values.items()}
         for group, values in maps.items()
     }
     legend = [] if np.isfinite(every).all() else [Patch(color=UNKNOWN_COLOUR, label="not measured")]
-    return panel_grid(*_side_by_side(keys, panels), colour_bar=(scale, map_title(quantity)), legend=legend)
+    return brain_grid(groups, views, colour_bar=(scale, map_title(quantity)), legend=legend)
 
 
 def growth_maps(
@@ -280,30 +296,6 @@ def growth_maps(
     return scalar_maps({"growth": maps}, quantity=quantity, directions=directions, views=views)
 
 
-def _map_panel(
-    surface_map: SurfaceMap | None, scale: ScalarMappable, view: View, directions: Floats | None = None
-) -> Panel | None:
-    if surface_map is None:
-        return None
-    mesh, values = surface_map
-    lines = None if directions is None else direction_lines(mesh, directions, view)
-    return Panel(mesh, paint(values, scale), view, light=MAP, lines=lines)
-
-
-def direction_lines(mesh: TriangleMesh, directions: Floats, view: View) -> Floats:
-    """Return the (k, 2, 3) ends of lines along (n, 3) vectors, one per cube of `LINES_MM` that faces a view.
-
-    Vectors of length 1 or more give lines as long as a cube.
-    """
-    normals = vertex_normals(mesh)
-    vertices = np.unique(np.floor(mesh.vertices / LINES_MM), axis=0, return_index=True)[1]
-    vertices = vertices[normals[vertices] @ view.towards > MIN_FACING_COSINE]
-    half = directions[vertices] * (LINES_MM / 2) / np.linalg.norm(directions[vertices], axis=1, keepdims=True).clip(1)
-    # slightly above the surface, which would otherwise hide parts of them
-    at = mesh.vertices[vertices] + LINES_MM / 8 * normals[vertices]
-    return np.stack([at - half, at + half], axis=1)
-
-
 @styled
 def influence_picture(
     members: Mapping[str, Halves | None],
@@ -323,22 +315,22 @@ def influence_picture(
     values : {run: {parameter: value}}
         The varied parameters, for the headings.
     """
-    quantity = "shape_index"
     headings = dict(zip(values, value_labels(list(values.values())), strict=True))
     brains = {headings[run]: halves for run, halves in members.items()} | (
         {observed_name: observed} if observed else {}
     )
-    colours = dict.fromkeys(brains, SIMULATED_SURFACE_COLOUR) | {observed_name: OBSERVED_SURFACE_COLOUR}
-    maps = {name: _map_of(halves, quantity) if halves else None for name, halves in brains.items()}
-    scale, seen = scale_of(quantity, np.empty(0)), [VIEWS[name] for name in SIDE_VIEWS]
-    rows = []
-    for view in seen:
-        panels = [_plain_panel(item and item[0], colours[name], view) for name, item in maps.items()]
-        rows.append(Row(f"{view.name} view", panels, ABSENT))
-    for view in seen:
-        panels = [_map_panel(item, scale, view) for item in maps.values()]
-        rows.append(Row(f"{plain(quantity)}\n{view.name} view", panels, ABSENT))
-    return panel_grid(list(brains), rows, colour_bar=(scale, map_title(quantity)))
+    maps = {name: _map_of(halves, "shape_index") for name, halves in brains.items() if halves}
+    scale, colours = scale_of("shape_index", np.empty(0)), {observed_name: OBSERVED_SURFACE_COLOUR}
+    groups = {
+        "": {name: _plain(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
+        "shape index\n": {name: _mapped(surface_map, scale) for name, surface_map in maps.items()},
+    }
+    rows = [
+        Row(f"{label}{view} view", _seen(group, brains, VIEWS[view]), ABSENT)
+        for label, group in groups.items()
+        for view in SIDE_VIEWS
+    ]
+    return panel_grid(list(brains), rows, colour_bar=(scale, map_title("shape_index")))
 
 
 @styled
@@ -402,7 +394,7 @@ def regions_picture(brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints
     if has_unnamed:
         legend.append(Patch(color=NEUTRAL_COLOUR, label="no region"))
     rows = [
-        Row(f"{view.name} view", [Panel(mesh, shades, view) for mesh, shades in painted.values()])
+        Row(f"{view.name} view", [Panel(mesh, shades, view=view) for mesh, shades in painted.values()])
         for view in map(VIEWS.__getitem__, ROUND_VIEWS)
     ]
     return panel_grid(list(painted), rows, legend=legend)
@@ -424,7 +416,7 @@ def zones_picture(regions: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]
     present = [item for item in zip(ZONE_NAMES, colours, areas, strict=True) if item[2]]
     legend = [Patch(color=colour, label=f"{name} {area:.1f} cm²") for name, colour, area in present]
     panels = [
-        Panel(*restricted(mesh, to_rgba_array(colours)[zones, :3], view.hemisphere, fissure_x_mm), view, light=MAP)
+        Panel(*restricted(mesh, to_rgba_array(colours)[zones, :3], view.hemisphere, fissure_x_mm), view=view, light=MAP)
         for view in map(VIEWS.__getitem__, MEDIAL_VIEWS)
     ]
     # a brain of one hemisphere has no medial view of the other

@@ -1,7 +1,6 @@
-"""Charts of simulations compared with observed brains: gain, horizon, onset of sulci, sweeps, calibrations."""
+"""Charts of simulations compared with observed brains: gain, onset of sulci, sweeps, calibrations."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,18 +9,16 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from ..errors import InputError
-from ..quantities import COMPARED_MAPS, VERTEX_MAPS
+from ..quantities import COMPARED_MAPS, VERTEX_MAPS, Shown, metrics_shown
 from ..settings.terms import MEASURED, SIDES
-from .labels import SIMPLER_PREDICTIONS, parameter_label, plain, with_unit
+from .labels import parameter_label, plain, with_unit
 from .style import (
     FULL_WIDTH_IN,
     MUTED_COLOUR,
     OBSERVED_COLOUR,
     RUN_COLOURS,
-    from_zero,
     new_figure,
     panel_figure,
     run_colours,
@@ -38,7 +35,6 @@ ROW_IN = 0.22
 """Height of a sulcus's row."""
 SIDE_STYLES = {"whole": ("o", RUN_COLOURS[0]), "left": ("<", RUN_COLOURS[0]), "right": (">", RUN_COLOURS[1])}
 SIDE_NAMES = {"whole": "whole brain", "left": "left hemisphere", "right": "right hemisphere"}
-_SIZES = ("area", "volume", "gyrification_index")
 
 
 @styled
@@ -100,42 +96,6 @@ def _bars(rows: pd.DataFrame, name: str, measure: str) -> Any:
     """Return the (2, n) lengths of error bars below and above values, to the ends of their intervals."""
     value, low, high = (rows[f"{part}_{measure}"] for part in (name, f"{name}_low", f"{name}_high"))
     return np.stack([value - low, high - value]).clip(min=0)
-
-
-@styled
-def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
-    """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
-
-    Runs are solid lines, simpler predictions dashed.
-
-    Parameters
-    ----------
-    prediction : columns run, start, horizon, model (`run` or a simpler prediction), r_shape_index and distance_mm
-    """
-    columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
-    places = list(product(dict.fromkeys(prediction["start"]), columns))
-    layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
-    figure, panels = panel_figure(len(places), **layout)
-    colours = run_colours(prediction["run"], runs)
-    # simpler predictions are the same for all runs
-    lines = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
-    shades = run_colours([*colours, *lines["line"]])
-    ways = dict(zip([name for name in shades if name not in colours], reversed(shades.values()), strict=False))
-    for axes, (start, column) in zip(panels, places, strict=True):
-        for name, rows in lines[lines["start"] == start].groupby("line", sort=False):
-            line = rows.groupby("horizon")[column].first()
-            axes.plot(line.index, line, ".--" if name in ways else "o-", color=(ways | colours)[str(name)])
-        axes.set_title(f"{start}: {columns[column]}")
-        axes.set_xlabel("weeks after the start")
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
-        axes.margins(x=0.1)
-    from_zero(panels[1])
-    extra = [
-        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_PREDICTIONS.get(way, plain(way)))
-        for way, colour in ways.items()
-    ]
-    run_legend(figure, colours, extra=extra)
-    return figure
 
 
 @styled
@@ -237,7 +197,7 @@ def nearest_chart(
         if (value := lines.get(measure.removesuffix("_weyl"))) is not None:
             axes.axvline(value, color=MUTED_COLOUR, linestyle="--", linewidth=0.9)
         # distances of sizes are relative to the observed brain
-        unit = "share of the observed" if measure in _SIZES else here["unit"].iloc[0]
+        unit = "share of the observed" if measure in metrics_shown(Shown.SIZE) else here["unit"].iloc[0]
         axes.set_title(wrap(with_unit(plain(measure), unit), 30), fontsize=7.5)
         axes.set_xlabel(parameter_label(varied))
         if number % 3 == 0:

@@ -9,7 +9,7 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
-from ..quantities import METRICS
+from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.stages import CostSettings
 from ..settings.terms import ELEMENTS_NEEDED, MEASURED, OBSERVED_BRAIN, SIDES, element_error
 from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
@@ -40,12 +40,6 @@ COMMON_PARAMETERS = (
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
-PREDICTION_METRICS = (
-    *("volume", "area", "relative_area", "gyrification_index", "mean_sulcal_depth", "mean_curvedness"),
-)
-"""Metrics of predicted brains, without cortical thickness, which is a setting."""
-AROUND_ZERO = "mean_shape_index"
-"""A metric around zero, for which differences in per cent are meaningless."""
 MESH_MEASURES = {
     "tets": "elements",
     "min_radius_ratio": "least radius ratio",
@@ -71,6 +65,10 @@ def _reported(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows["metric"].map(lambda name: METRICS[name].is_reported).astype(bool)]
 
 
+def _signed_metrics(rows: pd.DataFrame) -> pd.Series:
+    return rows["metric"].map(lambda name: METRICS[name].is_signed).astype(bool)
+
+
 def metrics_table(metrics: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN) -> pd.DataFrame:
     """Return the metrics of whole brains: the observed brain, each run, and each run's difference in %.
 
@@ -92,12 +90,13 @@ def metrics_table(metrics: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN)
     week = max(set(rows.loc[observed, "week"]) & set(rows.loc[~observed, "week"]) or set(rows["week"]))
     rows = rows[rows["week"] == week].assign(name=_named)
     wide = rows.pivot_table("value", "name", "run", aggfunc="mean").reindex(dict.fromkeys(rows["name"]))
-    around_zero = wide.index.isin(rows.loc[rows["metric"] == AROUND_ZERO, "name"])
+    # of what may be zero, a difference in per cent is meaningless
+    is_signed = wide.index.isin(rows.loc[_signed_metrics(rows), "name"])
     observed_values = wide[MEASURED] if MEASURED in wide else pd.Series(np.nan, index=wide.index)
     columns = {observed_name: observed_values}
     for run in run_colours(rows["run"]):
         differences = 100 * (wide[run] / observed_values - 1)
-        columns |= {run: wide[run], f"{run}, difference (%)": differences.map(_signed).where(~around_zero, "–")}
+        columns |= {run: wide[run], f"{run}, difference (%)": differences.map(_signed).where(~is_signed, "–")}
     return pd.DataFrame(columns).rename_axis(f"metric at {week_label(week)}")
 
 
@@ -108,7 +107,7 @@ def _signed(percent: float, unit: str = "") -> str:
 
 def centile_text(centiles: pd.DataFrame) -> list[str]:
     """Return the text of each row of centiles: "centile (interval), z", the difference from the norm in %, or "–"."""
-    differences = (centiles["value"] / centiles["expected"] - 1).where(centiles["metric"] != AROUND_ZERO)
+    differences = (centiles["value"] / centiles["expected"] - 1).where(~_signed_metrics(centiles))
     return [
         f"{centile:.0f} ({low:.0f} to {high:.0f}), {z:+.1f}".replace("-", "−")
         if np.isfinite(centile)
@@ -247,7 +246,7 @@ def predicted_table(
     centiles : of the study, as for `brain_table`
     intervals : the output of `compare.ensemble.interval_table`
     """
-    rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(PREDICTION_METRICS)]
+    rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(metrics_shown(Shown.PREDICTION))]
     rows = rows.assign(name=_named).set_index("name")
 
     scores = centiles[(centiles["hemisphere"] == "whole") & centiles["centile"].notna()].assign(name=_named)

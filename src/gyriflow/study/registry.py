@@ -1,58 +1,43 @@
-"""Records of the figures and tables of a study: the drawing function, the files, and the text of the report."""
+"""Records of the figures and tables of a study: the entries of `workflow/figures.yaml`, and their files."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
+from ..io.yaml_files import read_keys
 from ..settings.terms import OBSERVED_BRAIN
-from .paths import RUN, STUDY
+from ..shipped import SHIPPED
 from .records import Brain, Measurement, Simulation
 
-Arguments = dict[str, Any]
+Arguments = Mapping[str, Any]
 """Inputs or options of a drawing function, by parameter."""
-RUN_FIGURES, STUDY_FIGURES = f"{RUN}/figures", f"{STUDY}/figures"
-AROUND = ["left", "right", "top", "bottom"]
-THREE_SIDES = ["left", "top", "bottom"]
 
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A kind of figure or table: the function that draws it and its text in the report.
-
-    Attributes
-    ----------
-    name : name of the kind, and of its rule unless `job` is given
-    pattern : path with wildcards: a PNG (a PDF is written with it) or an HTML page
-    draw : the function, as `module:function` of `gyriflow.report`; empty if the file has a rule of its own
-    section, title, caption
-        Text of the report, the caption in reStructuredText, with the names of a figure in braces. Kinds without a
-        section are not in the report.
-    technical : whether the report collapses it
-    target : the target that includes it; empty if only the target `paper` does
-    paper : whether the target `paper` includes it
-    job : name of the rule, if one job draws several kinds
-    """
+    """A kind of figure or table: an entry of `workflow/figures.yaml`, which explains the keys."""
 
     name: str
-    pattern: str
+    file: str
+    rule: str
     draw: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    options: Arguments = field(default_factory=dict)
+    each: str = "study"
+    needs: str = ""
+    targets: Sequence[str] = ("figures",)
     section: str = ""
     title: str = ""
     caption: str = ""
     technical: bool = False
-    target: str = "figures"
-    paper: bool = False
-    job: str = ""
-
-    @property
-    def rule(self) -> str:
-        return self.job or self.name
+    first: bool = False
 
     @property
     def outputs(self) -> list[str]:
         """The files that are written, with wildcards."""
-        stem, dot, _ = self.pattern.rpartition(".png")
-        return [self.pattern, f"{stem}.pdf"] if dot else [self.pattern]
+        stem, dot, _ = self.file.rpartition(".png")
+        return [self.file, f"{stem}.pdf"] if dot else [self.file]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,23 +46,29 @@ class Figure:
 
     Attributes
     ----------
-    inputs : files by parameter of the function: a file, or lists and dictionaries of files
-    options : the other arguments of the function
     names : values of the wildcards, and other names in the title and the caption
+    inputs
+        Files by parameter of the function: a file, or lists and dictionaries of files. Those of the kind are added.
+    options : the other arguments of the function. Those of the kind are added.
     may_end
         Run, start and week of simulations that may end before that week; their files in `inputs["members"]` are then
         left out.
     """
 
     kind: Kind
-    inputs: Mapping[str, Any] = field(default_factory=dict)
-    options: Mapping[str, Any] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
-    may_end: tuple[tuple[str, str, float], ...] = ()
+    inputs: Arguments = field(default_factory=dict)
+    options: Arguments = field(default_factory=dict)
+    may_end: Sequence[tuple[str, str, float]] = ()
+
+    def __post_init__(self) -> None:
+        files = {key: file.format(**self.names) for key, file in self.kind.inputs.items()}
+        object.__setattr__(self, "inputs", {**files, **self.inputs})
+        object.__setattr__(self, "options", {**self.kind.options, **self.options})
 
     @property
     def path(self) -> str:
-        return self.kind.pattern.format(**self.names)
+        return self.kind.file.format(**self.names)
 
     @property
     def files(self) -> list[str]:
@@ -86,9 +77,9 @@ class Figure:
     @property
     def wildcards(self) -> dict[str, str]:
         """The names that occur in the path."""
-        return {key: name for key, name in self.names.items() if f"{{{key}}}" in self.kind.pattern}
+        return {key: name for key, name in self.names.items() if f"{{{key}}}" in self.kind.file}
 
-    def inputs_without(self, runs: Iterable[str]) -> Mapping[str, Any]:
+    def inputs_without(self, runs: Iterable[str]) -> Arguments:
         """Return the inputs, with None for runs that ended before."""
         if "members" not in self.inputs:
             return self.inputs
@@ -99,8 +90,15 @@ class Figure:
     @property
     def described(self) -> dict[str, Any]:
         """The text of the report, with the path."""
-        keys = ("name", "section", "title", "caption", "technical")
+        keys = ("name", "section", "title", "caption", "technical", "first")
         return {**{key: getattr(self.kind, key) for key in keys}, "path": self.path, "names": dict(self.names)}
+
+
+@cache
+def kinds() -> dict[str, Kind]:
+    """Return the kinds of figures and tables by name, in the order of the report."""
+    entries = read_keys(SHIPPED / "workflow" / "figures.yaml")
+    return {name: Kind(name, **{"rule": name, **entry}) for name, entry in entries.items()}
 
 
 def files_in(inputs: Any) -> list[str]:
@@ -115,12 +113,7 @@ def files_in(inputs: Any) -> list[str]:
 
 def target_files(figures: Iterable[Figure], *targets: str) -> list[str]:
     """Return the files that targets include."""
-    return [
-        file
-        for figure in figures
-        if figure.kind.target in targets or (figure.kind.paper and "paper" in targets)
-        for file in figure.files
-    ]
+    return [file for figure in figures if not set(targets).isdisjoint(figure.kind.targets) for file in figure.files]
 
 
 def by_rule(figures: Iterable[Figure]) -> dict[str, list[list[Figure]]]:

@@ -12,12 +12,20 @@ from pictures import words
 
 from gyriflow.errors import InputError
 from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
-from gyriflow.report.charts import influence_spectra, metrics_chart, norms_chart, regions_chart, spectra_weeks_chart
-from gyriflow.report.growth import displacement_chart, growth_chart
+from gyriflow.report.growth import growth_chart
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, prediction_chart, validation_chart
+from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, validation_chart
+from gyriflow.report.spectra import influence_spectra, spectra_weeks_chart
 from gyriflow.report.tables import brain_table
+from gyriflow.report.weeks import (
+    displacement_chart,
+    intervals_chart,
+    metrics_chart,
+    norms_chart,
+    prediction_chart,
+    regions_chart,
+)
 from gyriflow.settings.terms import SPREAD_UNKNOWN
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "region", "metric", "value", "unit"]
@@ -224,6 +232,67 @@ def test_a_brain_has_its_numbers_with_where_they_stand(metrics_with_norms):
     assert list(brain_table(own, measured_scores(own, [], cohort_norms(own, [])))) == ["whole"]
 
 
+def edges(axes, number: int) -> list[list[float]]:
+    """Return the lower and the upper edge of a band by week: week, low, high."""
+    points = axes.collections[number].get_paths()[0].vertices
+    return [[week, *sorted(set(points[points[:, 0] == week, 1]))] for week in np.unique(points[:, 0])]
+
+
+def test_bands_of_a_norm_lie_between_its_outer_and_its_inner_centiles():
+    centiles = {"expected": [100.0, 130.0, 200.0], "q05": [90.0, 110.0, 160.0], "q25": [95.0, 122.0, 185.0]}
+    centiles |= {"q75": [106.0, 141.0, 220.0], "q95": [118.0, 160.0, 270.0]}
+    curves = pd.DataFrame({"hemisphere": "whole", "metric": "area", "week": [22.0, 23.0, 25.5], **centiles})
+    other = curves.assign(hemisphere="left", expected=1.0, q05=0.0, q95=2.0)
+    brain = metric_rows("real", "whole", "area", {24.0: 150.0}, "cm2")
+    axes = norms_chart(brain, pd.concat([other, curves]), reference=["s"], brains=["s"]).axes[0]
+    assert edges(axes, 0) == [[22.0, 90.0, 118.0], [23.0, 110.0, 160.0], [25.5, 160.0, 270.0]]
+    assert edges(axes, 1) == [[22.0, 95.0, 106.0], [23.0, 122.0, 141.0], [25.5, 185.0, 220.0]]
+    median = max(axes.lines, key=lambda line: (len(line.get_xdata()), line.get_linewidth()))
+    assert median.get_xydata().tolist() == [[22.0, 100.0], [23.0, 130.0], [25.5, 200.0]]
+
+
+def test_intervals_are_around_the_run_and_observed_brains_are_stars():
+    ends = {"low": [9.0, 14.5, 11.0], "high": [10.5, 19.0, 14.0], "run": [10.0, 16.0, 12.5]}
+    rows = pd.DataFrame({"week": [22.0, 27.5, 24.0], "unit": "1", "observed": [np.nan, 18.5, 12.0], **ends})
+    figure = intervals_chart(pd.concat([rows.assign(metric="area"), rows.assign(metric="folding_index")]))
+    # a metric without intervals is not drawn
+    (axes,) = figure.axes
+    assert axes.get_title() == "pial area (cm²)"
+    assert edges(axes, 0) == [[22.0, 9.0, 10.5], [24.0, 11.0, 14.0], [27.5, 14.5, 19.0]]
+    run, stars = axes.lines
+    assert run.get_xydata().tolist() == [[22.0, 10.0], [24.0, 12.5], [27.5, 16.0]]
+    assert (stars.get_marker(), stars.get_xydata()[1:].tolist()) == ("*", [[24.0, 12.0], [27.5, 18.5]])
+    assert {"run", "90 % interval", "observed brain"} <= words(figure)
+
+
+def test_spectra_over_weeks_are_by_side_and_band_and_open_where_a_band_is_cut_off():
+    thin = spectrum_rows("thin", 28.0, {4: 0.2, 5: 0.3})
+    thin += spectrum_rows("thin", 26.5, {4: 0.1, 5: 0.2}, complete=False)
+    scans = [
+        part.assign(subject=brain)
+        for brain, week, power in (("a1", 26.0, {4: 0.25}), ("a2", 27.5, {4: 0.15}))
+        for part in spectrum_rows("real", week, power)
+    ]
+    figure = spectra_weeks_chart(pd.concat([*thin, *scans]), subjects={"a1": "a", "a2": "a"})
+    left4, left5, right4, _ = figure.axes
+
+    def drawn(axes):
+        lines = [(line.get_marker(), line.get_linestyle(), line.get_markerfacecolor()) for line in axes.lines]
+        return {kind: line.get_xydata().round(3).tolist() for kind, line in zip(lines, axes.lines, strict=True)}
+
+    colour = next(line.get_color() for line in left5.lines)
+    assert drawn(left5) == {
+        ("o", "-", colour): [[26.5, 0.2], [28.0, 0.3]],
+        ("o", "None", "white"): [[26.5, 0.2]],
+    }
+    # the right side has half the power
+    assert drawn(right4)["o", "-", colour] == [[26.5, 0.05], [28.0, 0.1]]
+    joined = [line for line in left4.lines if line.get_marker() == "None"]
+    assert [line.get_xydata().round(3).tolist() for line in joined] == [[[26.0, 0.25], [27.5, 0.15]]]
+    assert drawn(left4)["*", "None", "#000000"] == [[26.0, 0.25], [27.5, 0.15]]
+    assert [axes.get_title() for axes in figure.axes] == ["B4, primary folds", "B5, secondary folds", "", ""]
+
+
 AREAS = pd.DataFrame(
     {"series": "volume", "week": [21.0, 23.0, 22.0], "area_cm2": [100, 130, 115], "volume_ml": [50, 70, 60]}
 )
@@ -325,7 +394,7 @@ def gains(runs, weeks=(22, 23, 24)):
             for measure in ("shape_index", "mean_curvature"):
                 gain = 0.01 * (number + week - 21)
                 for name, value in (("gain", gain), ("headroom", 0.2)):
-                    ends = {f"{name}_low_{measure}": value - 0.02, f"{name}_high_{measure}": value + 0.02}
+                    ends = {f"{name}_low_{measure}": value - 0.02, f"{name}_high_{measure}": value + 0.05}
                     row |= {f"{name}_{measure}": value} | ends
             rows.append(row)
     return pd.DataFrame(rows)
@@ -339,6 +408,9 @@ def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
     (stars,) = (line for line in axes.lines if line.get_marker() == "*")
     np.testing.assert_allclose(np.asarray(stars.get_ydata(), dtype=float), 0.2)
     assert any(line.get_linestyle() == ":" for line in axes.lines)
+    # the bars of the first run end where its interval does
+    bars = np.array(axes.collections[0].get_segments())[:, :, 1]
+    np.testing.assert_allclose(bars, [[value - 0.02, value + 0.05] for value in (0.01, 0.02, 0.03)])
 
 
 def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():

@@ -11,18 +11,15 @@ from markupsafe import Markup, escape
 
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.page import (
-    NORM_WORDS,
     NOT_COMPARED,
-    Origin,
     Tables,
     accuracy_sentence,
     brain_page,
-    brains_table,
+    brain_rows,
     caption_html,
     hide_paths,
     methods_text,
     page_figures,
-    provenance_line,
     report_page,
     run_verdict,
     scores_table,
@@ -99,6 +96,7 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
     """Return figures of rules, of which those that begin with "steps" are technical, in sections called as they."""
     figures = [
         {"name": rule, "section": rule, "title": title, "caption": caption, "technical": rule.startswith("steps")}
+        | {"first": rule in ("weekly_figure", "predicted_figure")}
         | {"path": f"{rule}{number}.png", "names": {"brain": "a"}}
         for number, rule in enumerate(rules)
     ]
@@ -106,13 +104,13 @@ def shown(*rules: str, title: str = "{brain}", caption: str = "of *all* brains",
 
 
 TABLES = MEASURES | {"runs": RUNS, "validation": VALIDATION, "warnings": NO_WARNINGS}
-ORIGIN = Origin(PROVENANCE, "**Brains.** Two.", "start: young\n")
+ORIGIN = {"provenance": PROVENANCE, "methods": "**Brains.** Two.", "configuration": "start: young\n"}
 
 
 def page(figures: list[dict], view: dict | None = None, prediction: dict | None = None, **tables) -> str:
     """Return the page of a study, with others than the usual tables."""
     about = {"norm": "the norm", "pictures": PICTURES, "prediction": prediction}
-    return written(study_page(BRAINS, Tables(**TABLES | tables), ORIGIN, figures, **about), view)
+    return written(study_page(BRAINS, Tables(**TABLES | tables), figures, **about), view)
 
 
 def elements(text: str, name: str) -> list[str]:
@@ -122,7 +120,7 @@ def elements(text: str, name: str) -> list[str]:
 
 def written(content: dict, view: dict | None = None) -> str:
     texts = {name: (PAGE / file).read_text() for name, file in PARTS.items()}
-    return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **content)
+    return report_page((PAGE / "page.html").read_text(), texts, view or {"groups": [], "maps": []}, **ORIGIN, **content)
 
 
 def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
@@ -138,7 +136,7 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert Facts(2, 21, "23 GW", "healthy", "young", 1) in elements(text, "p")
     assert "12ab" in text
     assert Facts("2026-01-01 12:30 UTC", "0.1", "abc") in elements(text, "p")
-    assert provenance_line(PROVENANCE) != provenance_line(PROVENANCE | {"commit": "abc"})
+    assert "commit abc, changed" in text
     assert "numpy" in text
     assert "absent" not in text
 
@@ -195,7 +193,7 @@ def foretold(weeks: float) -> dict:
 
 
 def test_the_report_of_a_prediction_says_that_it_is_one_how_good_such_were_and_where_it_is():
-    figures = shown("weekly_figure", "predicted_figure", caption="of *all*")
+    figures = shown("predicted_figure", "weekly_figure", caption="of *all*")
     metrics = pd.concat([METRICS, METRICS[1:2].assign(run="thin", week=29.5, value=210.5)])
     text = " ".join(page(figures, validation=None, prediction=foretold(7.5), metrics=metrics).split())
     assert elements(text, "h1") == [Facts("young", "29.5 GW", "the atlas crl")]
@@ -255,24 +253,29 @@ def test_paths_are_hidden():
 
 
 def test_a_brain_has_a_row_with_pictures_numbers_verdict_and_cause_or_warnings():
-    young, old = brains_table(BRAINS, **MEASURES, pictures=PICTURES).to_dict("records")
-    assert young["verdict"] == Facts("needs review", "a bridge was cut")
-    assert old["verdict"] == Facts("refused", "cropped")
-    assert young["brain"] == Facts("young", "21 GW", "healthy", "sex: F", "CC0 1.0") != Facts("labels")
-    assert old["brain"] == Facts("old", "23 GW", "healthy", "labels")
-    assert [Markup(row["volume (mL)"]).striptags() for row in (young, old)] == ["46.288 (70 to 96), +1.2", "–"]
+    young, old = brain_rows(BRAINS, **MEASURES, linked=PICTURES)
+    assert (young["verdict"], young["cause"]) == ("needs review", "a bridge was cut")
+    assert (old["verdict"], old["cause"]) == ("refused", "cropped")
+    assert young["facts"] == ["21 GW", "healthy", "sex: F", "CC0 1.0"]
+    assert old["facts"][:3] == ["23 GW", "healthy", "labels"]
+    assert [row["numbers"]["volume (mL)"] for row in (young, old)] == [("46.2", "88 (70 to 96), +1.2"), ("–", "")]
     # averages give no centile
-    assert Markup(young["pial area (cm²)"]).striptags() == "90−10.0 %"
-    assert ("<img " in young[""], old[""], "href" in old["brain"]) == (True, "", False)
+    assert young["numbers"]["pial area (cm²)"] == ("90", "−10.0 %")
+    rows = re.findall("<tr>.*?</tr>", page([]).partition('<div class="wide brains">')[2], re.DOTALL)[1:3]
+    assert [("<img " in row, "href" in row) for row in rows] == [(True, True), (False, False)]
+    assert elements(rows[0], "td")[2:4] == ["46.288 (70 to 96), +1.2", "90−10.0 %"]
+    assert elements(rows[1], "td")[2:] == ["–", "–", "refusedcropped"]
 
 
 def test_a_page_says_what_its_centiles_are_worth():
     few = pd.concat([MEASURES["centiles"], MEASURES["centiles"].assign(flag="too few brains")])
     # those of an atlas itself are not spoken of
     for text in (page(shown("growth_figure")), page([], centiles=few)):
-        sentences = elements(text, "p")
-        explained = [flag for flag, words in NORM_WORDS.items() if words.format(norm="the norm") in sentences]
-        assert explained == ["ok", SPREAD_UNKNOWN]
+        sentences = [sentence for sentence in elements(text, "p") if "norm" in sentence]
+        assert sentences == [Facts("90 %", "z"), Facts("the norm")]
+    for flag, facts in (("few brains", (30, 5, 95)), ("too few brains", ("ten",))):
+        text = page([], centiles=MEASURES["centiles"].assign(flag=flag))
+        assert [sentence for sentence in elements(text, "p") if "norm" in sentence] == [Facts(*facts)]
 
 
 def test_a_brain_has_a_page_of_its_own():
@@ -280,7 +283,7 @@ def test_a_brain_has_a_page_of_its_own():
         {"subject": ["young", "other"], "run": np.nan, "step": "s", "level": "warning", "message": ["own", "other's"]}
     )
     tables = Tables(**TABLES | {"warnings": warnings})
-    text = written(brain_page(BRAINS[0], tables, ORIGIN, shown("quality"), norm="the norm"))
+    text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
     assert elements(text, "h1") == [Facts("young")]
     assert 'href="../report.html"' in text
     assert "other&#39;s" not in text

@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 from facts import Facts
+from matplotlib.text import Text
 from pictures import colour_bar, covered, picture, pictures, tone, words
 from shapes import box, ellipsoid, ellipsoid_mesh, sphere
 
 from gyriflow.folding.zones import model_fields, zones_of_run
 from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.quantities import name_in_interval
+from gyriflow.report.panels import LINES_MM, direction_lines
 from gyriflow.report.pictures import (
-    LINES_MM,
-    direction_lines,
     displacement_maps,
+    growth_maps,
+    influence_picture,
     regions_picture,
     runs_by_week,
     scalar_maps,
@@ -59,7 +62,7 @@ def test_a_predicted_brain_alone_is_blue_between_start_and_atlas():
 
 def test_weeks_that_stand_below_others_have_no_row_of_a_brain_that_ends_before():
     figure = runs_by_week({"long": dict.fromkeys(np.arange(21.0, 31.0), BRAIN)}, {21.0: BRAIN}, views=("left",))
-    written = [text.get_text() for text in figure.texts]
+    written = [text.get_text() for text in figure.findobj(Text)]
     assert [sum(name in text for text in written) for name in ("long", "observed brain")] == [2, 1]
 
 
@@ -158,6 +161,53 @@ def test_a_map_that_one_hemisphere_lacks_is_grey_there():
     image = picture(figure).astype(float)
     left, right = tone(image[:, : image.shape[1] // 2]), tone(image[:, image.shape[1] // 2 :])
     assert np.ptp(right) < 3 < np.ptp(left)
+
+
+def test_growth_of_an_interval_is_on_the_surface_at_its_end():
+    frames = {week: (box((20, 30, height)), {}) for week, height in ((21.0, 20), (22.5, 24), (25.0, 30))}
+    values = {(21.0, 22.5): 2.0, (22.5, 25.0): 8.0}
+    names = {"area_growth_percent_per_gw": 1.0, "thickness_growth_percent_per_gw": -0.5}
+    maps = {
+        name_in_interval(name, *ends): np.full(8, factor * value)
+        for name, factor in names.items()
+        for ends, value in values.items()
+    }
+    figure = growth_maps(frames, maps, views=("left",))
+    assert {"21–22.5 GW\nleft view", "22.5–25 GW\nleft view"} <= words(figure)
+    assert colour_bar(figure, "growth of area").get_xlim() == pytest.approx((0.0, 8.0))
+    first, second = picture(figure, 0), picture(figure, 1)
+    assert covered(second).any(axis=1).sum() / covered(first).any(axis=1).sum() == pytest.approx(30 / 24, rel=0.02)
+    assert tone(first).sum() > 1.3 * tone(second).sum()
+    across = growth_maps(frames, maps, quantity="thickness_growth_percent_per_gw", views=("left",))
+    assert colour_bar(across, "across").get_xlim() == pytest.approx((-4.0, 4.0))
+
+
+def test_an_observed_surface_outside_of_the_expected_one_is_red_and_inside_blue():
+    distance = np.where(BRAIN.vertices[:, 1] > 0, 3.0, -1.5)
+    deviations = {26.0: (BRAIN, {"distance_mm": distance})}
+    figure = runs_by_week(
+        {"expected": {22.0: BRAIN, 26.0: BRAIN}}, {26.0: BRAIN}, deviations=deviations, views=("top",)
+    )
+    # rows: the run in two weeks, the observed brain, the distance
+    image = picture(figure, 3).astype(float)
+    front, back = tone(image[: image.shape[0] // 3]), tone(image[-image.shape[0] // 3 :])
+    assert front[0] > front[2] + 30
+    assert back[2] > back[0] + 10
+    assert colour_bar(figure, "distance").get_xlim() == pytest.approx((-3.0, 3.0))
+
+
+def test_runs_of_a_sweep_stand_in_their_order_with_the_observed_brain_last():
+    halves = {name: [(box((20, 30, tall)), {"shape_index": np.full(8, value)})] for name, tall, value in (
+        ("thin", 20, -0.9), ("thick", 28, 0.9), ("real", 24, 0.1))}  # fmt: skip
+    members = {"a": halves["thick"], "b": None, "c": halves["thin"]}
+    values = {run: {"thickness_mm": size} for run, size in (("a", 2.5), ("b", 2.0), ("c", 1.5))}
+    figure = influence_picture(members, halves["real"], values=values, observed_name="seen")
+    assert {"2.5 mm", "2 mm", "1.5 mm", "seen", "ended\nbefore\nthis week"} <= words(figure)
+    # in each row three pictures: surfaces from the left and from above, then their shape index
+    tall = [covered(picture(figure, number)).any(axis=1).sum() for number in range(3)]
+    assert np.array(tall) / tall[2] == pytest.approx([28 / 24, 20 / 24, 1.0], rel=0.03)
+    red, _, blue = np.transpose([tone(picture(figure, number)) for number in (0, 1, 2, 6, 7)])
+    assert (red > blue).tolist() == [False, False, True, True, False]
 
 
 @pytest.mark.parametrize("quantity", ["curvedness", "sulcal_depth_mm"])

@@ -17,13 +17,13 @@ from gyriflow.io.frames import read_pial_frames
 from gyriflow.report.page import caption_html
 from gyriflow.report.pictures import displacements
 from gyriflow.shipped import DEMO, SHIPPED
-from gyriflow.study import comparison_figures, figures, resolve
+from gyriflow.study import figures, resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
-from gyriflow.study.registry import Kind, by_rule, files_in, target_files
+from gyriflow.study.registry import by_rule, files_in, kinds, target_files
 from gyriflow.units import SECONDS_PER_GW
 
-KINDS = [kind for module in (figures, comparison_figures) for kind in vars(module).values() if isinstance(kind, Kind)]
+KINDS = list(kinds().values())
 SHAPE = {"semi_axes_mm": [20, 26, 18]}
 BRAINS = [{"id": name, "week": week, "shape": SHAPE} for name, week in (("a", 21), ("b", 22), ("c", 23))]
 STUDY = {"brains": BRAINS, "start": "a", "folding": {"end_week": 22}, "runs": {"thin": {}, "thick": {}}}
@@ -63,12 +63,12 @@ def jobs_of(rule):
 
 
 def drawing_function(kind):
-    module, _, function = kind.draw.partition(":")
+    module, _, function = kind.draw.partition(".")
     return getattr(import_module(f"gyriflow.report.{module}"), function)
 
 
 def test_kinds_have_names_and_files_of_their_own():
-    assert len({kind.name for kind in KINDS}) == len({kind.pattern for kind in KINDS}) == len(KINDS) > 30
+    assert len({kind.name for kind in KINDS}) == len({kind.file for kind in KINDS}) == len(KINDS) > 30
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -77,7 +77,19 @@ def test_a_kind_is_drawn_by_a_function_of_the_report_and_has_all_words_or_none(k
     assert len({bool(words) for words in (kind.section, kind.title, kind.caption)}) == 1
     assert "system-message" not in caption_html(kind.caption)
     # what the target `paper` alone asks for is not in the report
-    assert kind.target or (kind.paper and not kind.section)
+    assert kind.targets
+    assert not (kind.section and set(kind.targets) == {"paper"})
+
+
+def test_every_function_of_figures_has_the_name_of_an_entry():
+    functions = {
+        name
+        for name, function in vars(figures).items()
+        if callable(function) and list(inspect.signature(function).parameters)[:2] == ["kind", "study"]
+    }
+    assert functions < {kind.name for kind in KINDS}
+    # a function says itself of what there is a figure
+    assert {(kind.each, kind.needs) for kind in KINDS if kind.name in functions} == {("study", "")}
 
 
 def test_figures_give_their_function_what_it_takes_and_have_names_for_their_words_and_files():
@@ -140,7 +152,7 @@ def test_members_of_a_study_that_ended_before_have_no_files():
 
 def drawn(monkeypatch, tmp_path, draw, inputs, **options):
     """Run the script of figures and return what it has the report's function draw."""
-    module, _, function = draw.partition(":")
+    module, _, function = draw.partition(".")
     given = {}
 
     def noted(**content):
@@ -206,7 +218,7 @@ def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_pa
     at = {name: str(tmp_path / name) for name in ("quality.json", "params.yaml", "published.yaml", "spectra.csv")}
     inputs = {"quality": {"a": at["quality.json"]}, "ceiling": None, "tables": [at["spectra.csv"]]}
     inputs |= {"frames": {"thin": frames}, "params": at["params.yaml"], "published": at["published.yaml"]}
-    given = drawn(monkeypatch, tmp_path, "tables:mesh_quality_table", inputs, gates={})
+    given = drawn(monkeypatch, tmp_path, "tables.mesh_quality_table", inputs, gates={})
     assert (given["quality"], given["ceiling"], given["gates"]) == ({"a": {"tets": 7}}, None, {})
     assert given["params"].end_week == 22
     assert given["published"] == {"nearest": []}

@@ -22,7 +22,14 @@ COLOURS = {"young": (200, 30, 30), "old": (30, 30, 200), "overview": (30, 160, 3
 NAMES = ("young", "old")
 FOLDED = [("thin", "young"), ("thick", "old")]
 GROWTH = ["own", "population P"]
-FIGURE = {"section": "Surfaces", "title": "Seen", "caption": "a picture", "technical": False, "names": {}}
+FIGURE = {
+    "section": "Surfaces",
+    "title": "Seen",
+    "caption": "a picture",
+    "technical": False,
+    "first": False,
+    "names": {},
+}
 
 
 @pytest.fixture

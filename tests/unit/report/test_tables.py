@@ -7,9 +7,11 @@ import pandas as pd
 import pytest
 from facts import Facts
 
+from gyriflow.quantities import METRICS
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.tables import (
     accuracy_table,
+    centile_text,
     html_table,
     mesh_quality_table,
     metrics_table,
@@ -135,6 +137,13 @@ def test_html_is_escaped_and_marks_numbers_and_verdicts():
         ("verdict fine", "fine"), ("whole", "a &amp; b"), ("number", "0.3333"), ("number", "–"), ("number", "7")
     ]  # fmt: skip
     assert "<th>brain</th>" in html_table(table.rename_axis("brain"))
+
+
+def test_a_number_of_a_metric_has_its_digits_and_a_metric_that_may_be_negative_no_difference_in_percent():
+    assert [METRICS["area"].text(value) for value in (144.94, 0.00123456, -2.5)] == ["144.9", "0.001235", "−2.5"]
+    names = ["mean_shape_index", "white_mean_shape_index", "area"]
+    scores = pd.DataFrame({"metric": names, "value": 0.3, "expected": 0.25, "centile": np.nan, "z": np.nan})
+    assert centile_text(scores.assign(centile_low=np.nan, centile_high=np.nan)) == ["–", "–", "+20.0 %"]
 
 
 JOBS = pd.DataFrame(

@@ -1,0 +1,368 @@
+"""Charts over the weeks, a panel for each quantity: metrics, norms, intervals, regions, predictions, displacement.
+
+As in the other charts, `runs` are all runs of a study, which determine the colours, and `observed_name` is the name of
+observed brains.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ..errors import InputError
+from ..quantities import METRICS, Shown, metrics_shown
+from ..settings.terms import MEASURED, OBSERVED_BRAIN
+from .labels import SIMPLER_PREDICTIONS, metric_title, plain
+from .pictures import region_colours
+from .style import (
+    MUTED_COLOUR,
+    NEUTRAL_COLOUR,
+    OBSERVED_COLOUR,
+    RUN_COLOURS,
+    from_zero,
+    panel_figure,
+    run_colours,
+    run_legend,
+    runs_by_name,
+    star,
+    styled,
+    week_axis,
+)
+
+SUBJECT_MARKERS = ("s", "^", "D", "v", "P", "X", "<", ">")
+"""Markers of the subjects of a cohort. With more subjects, none has a marker of its own."""
+PUBLISHED_MARKERS = ("s", "^", "D", "v")
+NO_SUBJECTS: Mapping[str, str] = {}
+LINES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+JOINED: Mapping[str, Any] = {"color": MUTED_COLOUR, "linewidth": 0.8, "zorder": 2.5}
+"""Line through the scans of a subject."""
+MANY_BRAINS = 30
+"""Number of reference brains above which their marks are small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Points of one look, in all panels that have some.
+
+    Attributes
+    ----------
+    rows
+        Columns panel, week, and the `value`. If there is a column `trusted`, marks are open where it is False.
+    style : arguments of `Axes.plot`; of a band, of `Axes.fill_between`
+    value : name of a column, or of those of the lower and the upper edge of a band
+    """
+
+    rows: pd.DataFrame
+    style: Mapping[str, Any]
+    value: str | tuple[str, str] = "value"
+
+
+def weeks_chart(
+    titles: Mapping[str, str], layers: Sequence[Layer], weeks: Sequence[float] | pd.Series, **layout: Any
+) -> tuple[Figure, dict[str, Axes]]:
+    """Draw layers over the weeks, the first at the back, in a panel for each title; `layout` of `panel_figure`."""
+    figure, panels = panel_figure(len(titles), **layout)
+    for axes, (panel, title) in zip(panels, titles.items(), strict=True):
+        for layer in layers:
+            rows = layer.rows[layer.rows["panel"] == panel].sort_values("week")
+            if isinstance(layer.value, tuple):
+                # without rows, columns are not numeric
+                weeks_at, low, high = (rows[column].astype(float) for column in ("week", *layer.value))
+                axes.fill_between(weeks_at, low, high, linewidth=0, **layer.style)
+            elif len(rows):
+                axes.plot(rows["week"], rows[layer.value], **layer.style)
+            if "trusted" in rows and not rows["trusted"].all():
+                doubtful = rows[~rows["trusted"]]
+                style = {**layer.style, "markerfacecolor": "white", "linestyle": ""}
+                axes.plot(doubtful["week"], doubtful["value"], **style)
+        axes.set_title(title)
+        week_axis(axes, weeks)
+    return figure, dict(zip(titles, panels, strict=True))
+
+
+def run_lines(rows: pd.DataFrame, colours: Mapping[str, Any]) -> list[Layer]:
+    """Return the line of each run."""
+    style = {"marker": "o", "markersize": 2.5}
+    return [Layer(rows[rows["run"] == run], {"color": colour, **style}) for run, colour in colours.items()]
+
+
+def observed_marks(
+    rows: pd.DataFrame,
+    colour: Any = OBSERVED_COLOUR,
+    *,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+    markers: Mapping[str, str] = NO_SUBJECTS,
+    shades: Mapping[str, Any] = NO_SUBJECTS,
+    **style: Any,
+) -> list[Layer]:
+    """Return observed brains in their `shades`, else `colour`; scans of a subject are joined and have its marker."""
+    layers = []
+    for person, scans in rows.groupby(rows["subject"].map(lambda brain: subjects.get(brain, "")), sort=False):
+        if person and len(set(scans["week"])) > 1:
+            layers.append(Layer(scans.assign(trusted=True), JOINED))
+        marker = markers.get(str(person), "*")
+        look = {"marker": marker, "markersize": 7 if marker == "*" else 4.5, "linestyle": "", "zorder": 3, **style}
+        for shade, part in scans.groupby(scans["subject"].map(lambda brain: shades.get(brain, colour)), sort=False):
+            layers.append(Layer(part, {"color": shade, **look}))
+    return layers
+
+
+def subject_markers(rows: pd.DataFrame, subjects: Mapping[str, str]) -> dict[str, str]:
+    """Return the marker of each subject with observed brains; none if there are more subjects than markers."""
+    brains = rows.loc[rows["run"] == MEASURED, "subject"]
+    people = list(dict.fromkeys(subjects[brain] for brain in brains if brain in subjects))
+    return dict(zip(people, SUBJECT_MARKERS, strict=False)) if 1 < len(people) <= len(SUBJECT_MARKERS) else {}
+
+
+def group_shades(groups: Mapping[str, str], colours: Mapping[str, Any]) -> tuple[dict[str, Any], list[Artist]]:
+    """Return the colour of each brain in a group, not used by any run, and the legend entries."""
+    free = [colour for colour in RUN_COLOURS if colour not in colours.values()]
+    group_colours = dict(zip(dict.fromkeys(groups.values()), free, strict=False))
+    entries: list[Artist] = [star(name, colour, marker="o", markersize=5) for name, colour in group_colours.items()]
+    return {brain: group_colours[name] for brain, name in groups.items() if name in group_colours}, entries
+
+
+def _shown(metrics: pd.DataFrame, where: Shown) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Return the rows of metrics that are shown in a chart, and its titles; InputError if there are none."""
+    titles = {name: metric_title(name) for name in metrics_shown(where) if (metrics["metric"] == name).any()}
+    if not titles:
+        raise InputError("no metric to draw", found=sorted(set(metrics["metric"])), expected=metrics_shown(where))
+    return metrics[metrics["metric"].isin(titles)].assign(panel=lambda rows: rows["metric"]), titles
+
+
+@styled
+def metrics_chart(
+    metrics: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    observed_name: str = OBSERVED_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
+) -> Figure:
+    """Draw a panel per metric of whole brains over weeks: runs as lines, observed brains as black stars.
+
+    The scans of a subject are joined. Subjects have markers if there are at most eight; groups of brains have colours.
+    Metrics that the table lacks are left out.
+
+    Parameters
+    ----------
+    metrics : columns subject, run, week, hemisphere, metric, value, unit
+        `run` is "real" for observed brains; InputError if the table has none of the metrics.
+    subjects : {brain: subject}, if known
+    groups : {brain: its value of a covariate}
+    """
+    whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
+    rows, titles = _shown(whole, Shown.CHART)
+    colours, observed = run_colours(whole["run"], runs), rows[rows["run"] == MEASURED]
+    markers, (shades, entries) = subject_markers(whole, subjects), group_shades(groups, colours)
+    marks = observed_marks(observed, subjects=subjects, markers=markers, shades=shades)
+    figure, _ = weeks_chart(titles, [*run_lines(rows, colours), *marks], whole["week"])
+    named = [*(subjects if markers else ()), *shades]
+    has_stars = not observed["subject"].isin(named).all()
+    run_legend(figure, colours, observed_name=observed_name if has_stars else "", markers=markers, extra=entries)
+    return figure
+
+
+@styled
+def intervals_chart(ensemble: pd.DataFrame) -> Figure:
+    """Draw the intervals of an ensemble over the weeks, a panel per metric, with its run and the observed brains.
+
+    `ensemble` has columns week, metric, run, low, high, observed.
+    """
+    rows, titles = _shown(ensemble, Shown.INTERVALS)
+    layers = [
+        Layer(rows, {"color": NEUTRAL_COLOUR}, ("low", "high")),
+        Layer(rows, {"color": RUN_COLOURS[0], "marker": "o", "markersize": 2.5}, "run"),
+        Layer(rows, {"color": OBSERVED_COLOUR, "marker": "*", "markersize": 7, "linestyle": ""}, "observed"),
+    ]
+    figure, _ = weeks_chart(titles, layers, rows["week"], per_row=2)
+    extra: list[Artist] = [Patch(color=NEUTRAL_COLOUR, label="interval")]
+    extra += [star(OBSERVED_BRAIN)] if ensemble["observed"].notna().any() else []
+    run_legend(figure, {"run": RUN_COLOURS[0]}, extra=extra)
+    return figure
+
+
+@styled
+def norms_chart(
+    metrics: pd.DataFrame,
+    curves: pd.DataFrame,
+    *,
+    reference: Sequence[str],
+    brains: Sequence[str],
+    runs: Sequence[str] = (),
+    observed_name: str = OBSERVED_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
+) -> Figure:
+    """Draw a panel per metric of whole brains: reference brains, their norm curve, other brains and runs.
+
+    Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the spread of individuals is known. Stars
+    are observed brains: black in the reference, else coloured, as are groups. Lines are runs.
+
+    Parameters
+    ----------
+    metrics : columns subject, run, week, hemisphere, metric, value, unit
+    curves : columns hemisphere, metric, week, expected, q05, q25, q75, q95
+    reference
+        Brains that the curves were fitted to.
+    brains
+        Brains with the same hemispheres as the reference. Only they, and simulations from them, are drawn.
+    subjects, groups : as for `metrics_chart`
+
+    InputError if the table has none of the metrics.
+    """
+    whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
+    rows, titles = _shown(whole, Shown.NORMS)
+    norm = curves[(curves["hemisphere"] == "whole") & curves["metric"].isin(titles)]
+    norm = norm.assign(panel=norm["metric"])
+    colours = run_colours(whole["run"], runs)
+    markers, (shades, extra) = subject_markers(whole, subjects), group_shades(groups, colours)
+    observed = rows[rows["run"] == MEASURED]
+    own, others = (observed[observed["subject"].isin(reference) == is_own] for is_own in (True, False))
+    small: dict[str, Any] = {"markersize": 3.0} if own["subject"].nunique() > MANY_BRAINS else {}
+    line, thin = ({"color": MUTED_COLOUR, "linewidth": width, "zorder": 4} for width in (1.3, 0.6))
+    layers = [
+        Layer(norm, {"color": NEUTRAL_COLOUR, "alpha": 0.6}, ("q05", "q95")),
+        Layer(norm, {"color": NEUTRAL_COLOUR}, ("q25", "q75")),
+        Layer(norm, line, "expected"),
+        *(Layer(norm, thin, quantile) for quantile in ("q05", "q25", "q75", "q95")),
+        *run_lines(rows, colours),
+        *observed_marks(own, subjects=subjects, markers=markers, shades=shades, **small),
+        *observed_marks(others, RUN_COLOURS[-1], subjects=subjects, markers=markers, shades=shades),
+    ]
+    figure, _ = weeks_chart(titles, layers, rows["week"], panel_in=2.0, foot_in=0.6)
+    if not others["subject"].isin(shades).all():
+        extra.append(star("other observed brains", RUN_COLOURS[-1]))
+    if curves["q05"].notna().any():
+        extra.append(Patch(color=NEUTRAL_COLOUR, label="centiles 5, 25, 50, 75, 95"))
+    elif len(curves):
+        extra.append(Line2D([], [], color=MUTED_COLOUR, label="norm, spread unknown"))
+    run_legend(figure, colours, observed_name=observed_name, markers=markers, extra=extra)
+    return figure
+
+
+@styled
+def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN) -> Figure:
+    """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
+
+    Observed brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
+
+    Parameters
+    ----------
+    regions : columns subject, run, week, hemisphere, region, metric, value, unit
+    asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    """
+    rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
+    colours, lines = region_colours(rows["region"]), dict(zip(run_colours(rows["run"]), LINES, strict=False))
+    # both sides together
+    rows = rows.groupby(["panel", "subject", "run", "week", "region"], sort=False)["value"].agg(["sum", "mean"])
+    rows = rows.reset_index().assign(value=lambda both: both["sum"].where(both["panel"] == "area", both["mean"]))
+    of_areas = runs_by_name(asymmetry[(asymmetry["metric"] == "area") & asymmetry["region"].isin(colours)])
+    rows = pd.concat([rows, of_areas.assign(panel="asymmetry", value=of_areas["asymmetry_index"])])
+    titles |= {"area": f"{titles['area']}, both sides"} if "area" in titles else {}
+    titles["asymmetry"] = "asymmetry of area, 2 (L − R)/(L + R)"
+    layers = []
+    for (region, run), part in rows.groupby(["region", "run"], sort=False):
+        if run == MEASURED:
+            layers += observed_marks(part, colours[str(region)], markersize=6)
+        elif run in lines:
+            layers.append(Layer(part, {"color": colours[str(region)], "linestyle": lines[str(run)], "linewidth": 1.1}))
+    figure, panels = weeks_chart(titles, layers, rows["week"], foot_in=0.75)
+    for name, axes in panels.items():
+        # signed numbers and ratios are not compared with 0
+        if name != "asymmetry" and not METRICS[name].is_signed and METRICS[name].unit != "1":
+            from_zero(axes)
+    panels["asymmetry"].axhline(0, color=MUTED_COLOUR, linewidth=0.8)
+    extra = [Line2D([], [], color=c, marker="s", linestyle="none", label=name) for name, c in colours.items()]
+    extra += [Line2D([], [], color=MUTED_COLOUR, linestyle=line, label=run) for run, line in lines.items()]
+    run_legend(figure, {}, extra=[*extra, star(observed_name, MUTED_COLOUR)])
+    return figure
+
+
+@styled
+def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
+    """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
+
+    Runs are solid lines, simpler predictions dashed.
+
+    Parameters
+    ----------
+    prediction : columns run, start, horizon, model (`run` or a simpler prediction), r_shape_index and distance_mm
+    """
+    columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
+    colours = run_colours(prediction["run"], runs)
+    # simpler predictions are the same for all runs
+    rows = prediction.assign(line=prediction["run"].where(prediction["model"] == "run", prediction["model"]))
+    rows = rows.drop_duplicates(["start", "line", "horizon"]).assign(week=lambda rows: rows["horizon"])
+    shades = run_colours([*colours, *rows["line"]])
+    simpler = dict(zip([name for name in shades if name not in colours], reversed(shades.values()), strict=False))
+    styles = {name: {"color": colour, "marker": ".", "linestyle": "--"} for name, colour in simpler.items()}
+    styles |= {name: {"color": colour, "marker": "o"} for name, colour in colours.items()}
+    titles = [f"{start}: {title}" for start in dict.fromkeys(rows["start"]) for title in columns.values()]
+    parts = [rows.assign(panel=rows["start"] + f": {title}", value=rows[name]) for name, title in columns.items()]
+    rows = pd.concat(parts)
+    layers = [Layer(rows[rows["line"] == name], style) for name, style in styles.items()]
+    layout: dict[str, Any] = {"per_row": 2, "panel_in": 2.4, "foot_in": 0.9, "sharex": True, "sharey": "col"}
+    figure, panels = weeks_chart(dict(zip(titles, titles, strict=True)), layers, rows["week"], **layout)
+    for axes in panels.values():
+        axes.set_xlabel("weeks after the start")
+    from_zero(list(panels.values())[1])
+    extra = [
+        Line2D([], [], color=colour, linestyle="--", label=SIMPLER_PREDICTIONS.get(name, plain(name)))
+        for name, colour in simpler.items()
+    ]
+    run_legend(figure, colours, extra=extra)
+    return figure
+
+
+@styled
+def displacement_chart(
+    displacement: pd.DataFrame, *, runs: Sequence[str] = (), published: Mapping[str, Any] | None = None
+) -> Figure:
+    """Draw the maximal and the mean displacement norm of all nodes per week.
+
+    Norms are divided by the weeks between output weeks. Runs are lines, published values grey.
+
+    Parameters
+    ----------
+    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
+    published
+        `displacement` has `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
+    """
+    named = runs_by_name(displacement)
+    colours, published_rows = run_colours(named["run"], runs), _published_norms(published)
+    markers = dict(zip(published_rows["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
+    rows = pd.concat([published_rows, named[named["nodes"] == "all"]])
+    rows["week"], duration = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
+    titles = {"max_mm": "maximal displacement, all nodes", "mean_mm": "mean displacement, all nodes"}
+    rows = pd.concat(rows.assign(panel=column, value=rows[column] / duration) for column in titles)
+    styles = {run: {"color": MUTED_COLOUR, "marker": marker, "linestyle": "--"} for run, marker in markers.items()}
+    styles |= {run: {"color": colour, "marker": "o"} for run, colour in colours.items()}
+    layers = [Layer(rows[rows["run"] == run], {"label": run, **style}) for run, style in styles.items()]
+    figure, panels = weeks_chart(titles, layers, [*rows["from_week"], *rows["to_week"]], per_row=2)
+    for axes in panels.values():
+        axes.set(ylabel="displacement (mm per week)", xlabel="gestational age (GW), middle of the interval")
+        from_zero(axes)
+    run_legend(figure, colours, extra=[Line2D([], [], label=run, **styles[run]) for run in markers])
+    return figure
+
+
+def _published_norms(published: Mapping[str, Any] | None) -> pd.DataFrame:
+    """Return published norms as a table like that of the study, with their sources as runs."""
+    columns = ["run", "from_week", "to_week", "max_mm", "mean_mm"]
+    if not published:
+        return pd.DataFrame(columns=columns)
+    weeks = np.array(published["displacement"]["from_weeks"], dtype=float)
+    tables = [
+        pd.DataFrame({**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1})[columns]
+        for row in published["displacement"]["rows"]
+    ]
+    return pd.concat(tables)
