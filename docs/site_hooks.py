@@ -2,6 +2,7 @@
 
 import posixpath
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,13 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that lie elsewhere in the checkout."""
+    """Add the pages that lie elsewhere in the checkout, and that of `tests/faults.yaml`."""
     for source, page in PAGES.items():
         files.append(File.generated(config, page, content=(CHECKOUT / source).read_text(encoding="utf-8")))
+    sys.path.insert(0, str(CHECKOUT / "tests"))
+    from reliability import page_of
+
+    files.append(File.generated(config, "reliability.md", content=page_of()))
     return files
 
 

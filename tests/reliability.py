@@ -82,20 +82,24 @@ class Collector:
                 self.tests[tried].setdefault(name, outcome)
 
 
-def page_of(tests):
-    """Return the page of all faults and promises with the worst outcome of the tests of each."""
+def page_of(tests=None):
+    """Return the page of all faults and promises; with `tests`, also the worst outcome of the tests of each."""
     known = listed()
-    outcomes = [outcome for found in tests.values() for outcome in found.values()]
-    counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in WORST_FIRST[::-1])
     lines = [
         "# Reliability",
         "",
         "What can go wrong, and the result for the user ([exit codes](questions.md)). Each row is tested.",
-        "An outcome is given if not all tests passed.",
-        "`./run pytest --reliability=docs/reliability.md` writes this page from `tests/faults.yaml`.",
-        "",
-        f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
     ]
+    if tests is None:
+        tests = {(kind, number): {"": "passed"} for kind, rows in known.items() for number in rows}
+    else:
+        outcomes = [outcome for found in tests.values() for outcome in found.values()]
+        counts = ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in WORST_FIRST[::-1])
+        lines += [
+            "An outcome is given if not all tests passed.",
+            "",
+            f"Run of {datetime.now(UTC):%Y-%m-%d}; tests by fault and promise: {counts}.",
+        ]
     section = None
     for number, (of, fault, gets) in known["fault"].items():
         if of != section:
