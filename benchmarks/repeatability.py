@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from gyriflow.compare.distances import aligned_distances
+from gyriflow.compare.comparison import aligned_distances
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
