@@ -143,7 +143,9 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
         if "displacement" in names:
             fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
         rates, positions = solved.growth.parameters, fields["positions"]
-        logs = None if growth is None else log_growth_at_vertices(positions, folding.inputs, growth) / steps
+        logs: Floats | None = None
+        if growth is not None:
+            logs = np.asarray(log_growth_at_vertices(positions, folding.inputs, growth) / steps)
         fields |= layer_fields(positions, folding.zones, rates, folding.maps, week, names, logs)
         write_frame(frame_path(folder, week), week, fields | pressure, elements)
     return replace(state, growth=None, growth_s=0.0)
