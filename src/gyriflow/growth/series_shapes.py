@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
 """Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
-MAX_OPENING_DRAWS, OPENED_MM = 4, 0.06
+MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
 """Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
 MAX_MISFIT_MM = 0.25
 """Mean distance of a body from the surface it is fitted to above which a warning is logged."""
