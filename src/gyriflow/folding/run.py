@@ -23,6 +23,7 @@ from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .output import (
     FRAMES,
+    GROWTH_SMOOTHING_MM,
     STEPS,
     SUMMARY,
     frame_path,
@@ -151,7 +152,8 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
         if growth is not None:
             logs = np.asarray(log_growth_at_vertices(positions, folding.inputs, growth) / steps)
         fields |= layer_fields(positions, folding.zones, rates, folding.maps, week, names, logs)
-        write_frame(frame_path(folder, week), week, fields | pressure, elements)
+        smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
+        write_frame(frame_path(folder, week), week, fields | pressure, elements, smoothing)
     return replace(state, growth=None, growth_s=0.0)
 
 
