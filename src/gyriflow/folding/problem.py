@@ -48,8 +48,8 @@ class NonlinearProblem:
     Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
     that differs between steps is set by `set_step`.
 
-    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is that of the polynomials that are integrated exactly; None takes what the elements' order
-    needs.
+    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is that
+    of the polynomials that are integrated exactly; None takes what the elements' order needs.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.
@@ -149,9 +149,10 @@ class NonlinearProblem:
         finite growth (Rodriguez et al. 1994) on the updated reference, per volume of the state without stress, since ψ
         is proportional to μ.
         """
-        self._volume = 1.0 if V is None else np.linalg.det(V)[..., None, None]
-        weight = mu if V is None else mu / self._volume[..., 0, 0]
-        H = G_inverse if V is None else V @ G_inverse
+        weight, H, self._volume = mu, G_inverse, np.ones((1, 1, 1, 1))
+        if V is not None:
+            self._volume = np.linalg.det(V)[..., None, None]
+            weight, H = mu / self._volume[..., 0, 0], V @ G_inverse
         set_at_points(self._weight, weight)
         set_at_points(self._H, H)
         if self._linear:
