@@ -48,8 +48,8 @@ class NonlinearProblem:
     Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
     that differs between steps is set by `set_step`.
 
-    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is that
-    of the polynomials that are integrated exactly; None takes what the elements' order needs.
+    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is
+    that of the polynomials that are integrated exactly; None takes what the elements' order needs.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.
