@@ -8,8 +8,8 @@ import pandas as pd
 EXPECTED = {
     ("reference", 27): {"area_cm2": 174.0, "volume_ml": 106.6, "r_shape_index": 0.455, "gain_shape_index": -0.020},
     ("reference", 29): {"area_cm2": 215.5, "volume_ml": 130.7, "r_shape_index": 0.274, "gain_shape_index": -0.092},
-    ("measured", 27): {"area_cm2": 182.2, "volume_ml": 125.6, "r_shape_index": 0.958, "gain_shape_index": 0.477},
-    ("measured", 29): {"area_cm2": 247.8, "volume_ml": 181.5, "r_shape_index": 0.957, "gain_shape_index": 0.602},
+    ("measured", 27): {"area_cm2": 182.7, "volume_ml": 125.6, "r_shape_index": 0.979, "gain_shape_index": 0.497},
+    ("measured", 29): {"area_cm2": 250.3, "volume_ml": 181.6, "r_shape_index": 0.979, "gain_shape_index": 0.625},
 }
 OBSERVED = {
     27: {"observed_area_cm2": 183.2, "observed_volume_ml": 125.8},

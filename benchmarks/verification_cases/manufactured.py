@@ -117,7 +117,7 @@ def solved(case: str, cells: int, comm: MPI.Comm = MPI.COMM_WORLD, order: int = 
     zones = Zones(facets, np.full(len(facets), CLAMPED), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
     domain = Domain(comm, mesh)
     has_stretch = case == STRETCHED
-    problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO), remembers_stress=has_stretch)
+    problem = NonlinearProblem(domain, zones, NeoHookean(POISSON_RATIO))
 
     side = SIDE_MM * 1e-3
     nodes, to_points = domain.local(domain.positions) / side, problem.points.interpolation.T

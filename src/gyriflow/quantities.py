@@ -91,7 +91,8 @@ POSITIVE_COLOURS, SIGNED_COLOURS = "YlGnBu", "RdBu_r"
 _BRAIN_MAPS = (
     VertexMap(
         "shape_index", "1", "shape index", "shapeIndex",
-        "Shape index, -1 in pits, -0.5 in sulci, 0.5 on gyri, 1 on caps", colours=SIGNED_COLOURS, limits=(-1.0, 1.0), ends="sulci −½, gyri +½", is_signed=True,
+        "Shape index, -1 in pits, -0.5 in sulci, 0.5 on gyri, 1 on caps", colours=SIGNED_COLOURS,
+        limits=(-1.0, 1.0), ends="sulci −½, gyri +½", is_signed=True,
     ),
     VertexMap(
         "curvedness", "1/mm", "curvedness", "curvedness",
@@ -109,7 +110,8 @@ _BRAIN_MAPS = (
     VertexMap(
         "sulcal_depth_mm", "mm", "sulcal depth", "sulc",
         "Minus the distance to the convex hull of the hemisphere: 0 on gyri and negative in sulci, "
-        "so larger on gyri as in HCP's files; FreeSurfer's have the opposite sign", export_sign=-1, colours=POSITIVE_COLOURS,
+        "so larger on gyri as in HCP's files; FreeSurfer's have the opposite sign",
+        export_sign=-1, colours=POSITIVE_COLOURS,
     ),
     VertexMap(
         "local_gyrification_index", "1", "local gyrification index", "localGyrificationIndex",
@@ -143,11 +145,13 @@ _DEVIATION_MAPS = (
     ),
     VertexMap(
         "log_area", "1", "logarithm of the area's ratio", "logArea",
-        "Logarithm of the real over the expected area, positive where the real one is larger", colours=SIGNED_COLOURS, is_signed=True,
+        "Logarithm of the real over the expected area, positive where the real one is larger",
+        colours=SIGNED_COLOURS, is_signed=True,
     ),
     VertexMap(
         "thickness_difference_mm", "mm", "difference of thickness", "thicknessDifference",
-        "Real less expected cortical thickness, positive where the real one is thicker", colours=SIGNED_COLOURS, is_signed=True,
+        "Real less expected cortical thickness, positive where the real one is thicker",
+        colours=SIGNED_COLOURS, is_signed=True,
     ),
 )  # fmt: skip
 _SIMULATION_MAPS = (

@@ -88,7 +88,7 @@ def folding_of(mesh, zones, **changes):
 
 def stretched_problem(zones, mesh):
     domain = Domain(COMM, mesh)
-    problem = NonlinearProblem(domain, zones, MATERIAL, remembers_stress=True)
+    problem = NonlinearProblem(domain, zones, MATERIAL)
     nodes, cells = len(domain.vertex_of_node), len(domain.cells)
     uniform = np.ones(nodes)
     up, V = np.tile([0.0, 0.0, 1.0], (cells, 1)), np.tile(STRETCH, (cells, 1, 1, 1))

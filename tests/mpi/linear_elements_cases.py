@@ -35,10 +35,10 @@ def test_energy_forces_and_stiffness_are_those_of_the_form_compiler(law, monkeyp
     u = smooth_displacement(domain)
     at = problem.residual(u)
 
-    Fe = (ufl.Identity(3) + ufl.grad(problem._u)) * problem._G_inverse
+    Fe = (ufl.Identity(3) + ufl.grad(problem._u)) * problem._H
     ratio = 2 * 1.45 / (3 * 0.1)
     dx = ufl.dx(metadata={"quadrature_degree": 1})
-    energy = law.energy_density(Fe, problem._mu, ratio * problem._mu) * dx
+    energy = law.energy_density(Fe, problem._weight, ratio * problem._weight) * dx
     residual = ufl.derivative(energy, problem._u)
     energy, residual, tangent = map(dolfinx.fem.form, (energy, residual, ufl.derivative(residual, problem._u)))
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -223,7 +224,7 @@ def test_elements_that_shrink_fast_are_counted_by_the_day():
         rows = after_steps(folding, replace(start, step_s=step_s), steps).rows
         assert {row["held_elements"] for row in rows} == {0}
         # linear in time, so that the loss of a day rises
-        losses = [1 - after["volume_ml"] / before["volume_ml"] for before, after in zip(rows, rows[1:], strict=False)]
+        losses = [1 - after["volume_ml"] / before["volume_ml"] for before, after in pairwise(rows)]
         fast = [loss > 0.1 * step_s / DAY_S for loss in losses]
         assert any(fast)
         assert not all(fast)

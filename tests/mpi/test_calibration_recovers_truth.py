@@ -7,13 +7,14 @@ from mpi4py import MPI
 from shapes import ellipsoid_mesh
 
 from gyriflow.compare.calibration import (
+    SURFACE_SCORES,
     calibrated_parameters,
     find_optimum,
     fit_surrogate,
     propose_runs,
-    size_score,
     sobol_design,
 )
+from gyriflow.compare.comparison import size_columns
 from gyriflow.folding.run import run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
@@ -53,7 +54,7 @@ def test_the_rate_of_a_simulated_brain_is_recovered(tmp_path):
             folded(mesh, values, tmp_path / f"run-{values['growth_rate_per_s']:.6g}")
             for values in design.to_dict("records")
         ]
-        return design.assign(score=[size_score(surface, real) for surface in surfaces])
+        return design.assign(score=[SURFACE_SCORES["size"][1](size_columns(surface, real)) for surface in surfaces])
 
     runs = scored(sobol_design(BOUNDS, 4, seed=0))
     for _ in range(2):

@@ -65,7 +65,7 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
     frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
     points = len(IntegrationPoints.exact_to_degree(mesh.order).weights)
-    values = 6 if parameters.stress_memory_gw > 0 else 1 if parameters.keeps_volume_only else 0
+    values = 6 if parameters.keeps_stretch else 0
     stretch = 8 * values * points * len(mesh.tets)
     # positions and two displacements
     checkpoint = 2 * (8 * 3 * 3 * len(mesh.vertices) + stretch)

@@ -22,7 +22,7 @@ from ..settings.varying import Maps
 
 SUBPACKAGES = ("folding", "mechanics", "geometry", "settings", "units")
 """Subpackages and modules with the code that determines the results of a run."""
-ARRAYS = ("positions", "last", "before_last", "stretch", "volume", "growth")
+ARRAYS = ("positions", "last", "before_last", "stretch", "growth")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,7 @@ class State:
     successes
         Accepted steps since the last halving.
     stretch
-        Elastic stretch (m, q, 6) at the end of the last step, if stress is remembered.
-    volume
-        Elastic volume ratio (m, q) at the end of the last step, if this alone is kept.
+        Elastic stretch (m, q, 6) at the end of the last step, if any of it is kept.
     correction
         Feedback of the last step to growth by sizes (`StepGrowth.correction`).
     growth, growth_s
@@ -61,7 +59,6 @@ class State:
     before_last_s: float = 0.0
     successes: int = 0
     stretch: Floats | None = None
-    volume: Floats | None = None
     correction: Sequence[float] | None = None
     growth: Floats | None = None
     growth_s: float = 0.0
@@ -92,7 +89,6 @@ class State:
         step_s: float,
         row: dict,
         stretch: Floats | None = None,
-        volume: Floats | None = None,
         correction: Sequence[float] | None = None,
         growth: Floats | None = None,
     ) -> "State":
@@ -110,7 +106,6 @@ class State:
             before_last_s=self.last_s,
             successes=self.successes + 1,
             stretch=stretch,
-            volume=volume,
             correction=correction,
             growth=growth,
             growth_s=self.growth_s + step_s,

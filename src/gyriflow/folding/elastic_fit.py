@@ -162,8 +162,10 @@ class ElasticFit:
         ratio = signed_volume(TriangleMesh(goal[self._used], boundary.faces)) / signed_volume(boundary)
         logs = log_stretch(self._gradients(goal), limit=MAX_LOG_STRETCH)
         # of the whole, and of nine elements in ten
-        strain = max(abs(math.log(max(ratio, 1e-3))), float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9))) / 3
-        steps = max(1, math.ceil(strain / STRAIN_PER_STEP))
+        mean_strain = (
+            max(abs(math.log(max(ratio, 1e-3))), float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9))) / 3
+        )
+        steps = max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
         lengths = np.full(len(self._used), SPRING_LENGTH_MM)
         for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left

@@ -1,4 +1,4 @@
-"""Energy, forces and stiffness of linear elements without stress memory, two to four times as fast as code by FFCx."""
+"""Energy, forces and stiffness of linear elements, two to four times as fast as code by FFCx."""
 
 from pathlib import Path
 
@@ -13,15 +13,15 @@ from ..mechanics.materials import Material
 from .compilation import compiled
 from .domain import Domain
 
-DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *G_inverse,
-                                 void *mu, void *forces, void *places, void *blocks);"""
+DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *H,
+                                 void *weight, void *forces, void *places, void *blocks);"""
 
 
 class LinearElements:
     """The local elements of a domain.
 
-    Attributes set by the user: their shear modulus `mu` (c, 1) in Pa, and the inverse growth tensor `G_inverse`
-    (c, 1, 3, 3) of the step.
+    Attributes set by the user: the `weight` (c, 1) in Pa and the tensor `H` (c, 1, 3, 3) of the step's energy
+    (`NonlinearProblem.set_step`).
     """
 
     def __init__(self, domain: Domain, material: Material) -> None:
@@ -29,8 +29,8 @@ class LinearElements:
         code = energy_code(material) + Path(__file__).with_suffix(".c").read_text()
         self._interface, self._code = compiled(domain.comm, DECLARATION, code)
         self._places: NDArray[np.int32] | None = None
-        self.mu: Floats
-        self.G_inverse: Floats
+        self.weight: Floats
+        self.H: Floats
 
     def assemble(self, u: Floats, forces: Floats | None = None, matrix: MatrixCSR | None = None) -> float:
         """Return the energy in J at displacements u (k, 3) in m; add to the given forces in N and matrix in N/m.
@@ -44,6 +44,6 @@ class LinearElements:
             # blocks below the diagonal are needed only if one of their nodes is a ghost
             needed = (columns >= rows) | (columns >= self._domain.n_owned) | (rows >= self._domain.n_owned)
             self._places = np.where(needed, places[rows, columns], -1)
-        arrays = cells, nodes, u, self.G_inverse, self.mu, forces, self._places, None if matrix is None else matrix.data
+        arrays = cells, nodes, u, self.H, self.weight, forces, self._places, None if matrix is None else matrix.data
         pointers = [self._interface.NULL if x is None else self._interface.from_buffer(x) for x in arrays]
         return float(self._code.assemble(len(cells), self._bulk_to_shear, *pointers))

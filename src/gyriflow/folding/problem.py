@@ -48,10 +48,8 @@ class NonlinearProblem:
     Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
     that differs between steps is set by `set_step`.
 
-    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. With `remembers_stress`
-    the mesh may be stretched elastically at the start of the step, with `keeps_volume` only in its volume.
-    `quadrature_degree` is that of the polynomials that are integrated exactly; None takes what the elements' order
-    needs.
+    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is
+    that of the polynomials that are integrated exactly; None takes what the elements' order needs.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.
@@ -65,8 +63,6 @@ class NonlinearProblem:
         *,
         penalty_pa_per_m: float = 0.0,
         quadrature_degree: int | None = None,
-        remembers_stress: bool = False,
-        keeps_volume: bool = False,
     ) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
@@ -76,32 +72,25 @@ class NonlinearProblem:
         self.points = IntegrationPoints.exact_to_degree(domain.order, quadrature_degree)
         # reference coordinates, and parts of the regular element's volume
         self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
-        self._mu, self._G_inverse = self._field_at_points(()), self._field_at_points((3, 3))
-        self._V = self._field_at_points((3, 3)) if remembers_stress else None
-        self._volume = self._field_at_points(()) if keeps_volume else None
+        self._weight, self._H = self._field_at_points(()), self._field_at_points((3, 3))
         self._undeformed = np.tile(np.eye(3), (len(domain.cells), len(self.points.weights), 1, 1))
-        # finite growth (Rodriguez et al. 1994) on the updated reference
         F = ufl.Identity(3) + ufl.grad(self._u)
-        Fe = F * (self._G_inverse if self._V is None else self._V * self._G_inverse)
+        Fe = F * self._H
         # a constant, so that another value needs no new form
-        moduli = self._mu, dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio) * self._mu
+        moduli = self._weight, dolfinx.fem.Constant(domain.mesh, material.bulk_to_shear_ratio) * self._weight
         self._tensors = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
-        dx = self._volume_measure()
         self._linear: LinearElements | None = None
-        if domain.order == 1 and len(self.points.weights) == 1 and not remembers_stress:
+        if domain.order == 1 and len(self.points.weights) == 1:
             # written by hand, instead of the form compiler's code
             self._linear, energy = LinearElements(domain, material), 0
-        elif self._V is None:
-            energy = material.energy_density(Fe, *moduli) * dx
-            if self._volume is not None:
-                energy = material.energy_density(Fe, *moduli) / self._volume * dx
         else:
-            # per volume of the state without stress
-            energy = material.energy_density(Fe, *moduli) / ufl.det(self._V) * dx
+            energy = material.energy_density(Fe, *moduli) * self._volume_measure()
         self._energy = energy + self._plane_energy(zones, penalty_pa_per_m) if penalty_pa_per_m else energy
 
-        (coupling,) = self._compiled(ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * dx)
+        (coupling,) = self._compiled(
+            ufl.inner(ufl.TrialFunction(domain.space), ufl.TestFunction(domain.space)) * self._volume_measure()
+        )
         fixed = domain.local(zones.fixed)[: domain.n_owned]
         self._fixed_owned = np.flatnonzero(fixed.ravel())
         first = 3 * domain.space.dofmap.index_map.local_range[0]
@@ -147,33 +136,27 @@ class NonlinearProblem:
         return dolfinx.fem.Function(dolfinx.fem.functionspace(self.domain.mesh, element))
 
     def set_step(
-        self,
-        mu: Floats,
-        G_inverse: Floats,
-        V: Floats | None = None,
-        part: NDArray[np.int64] | None = None,
-        volume: Floats | None = None,
+        self, mu: Floats, G_inverse: Floats, V: Floats | None = None, part: NDArray[np.int64] | None = None
     ) -> None:
         """Set the coefficients of a step, on the mesh as it is placed now.
 
         At the integration points of the local elements: the shear modulus (c, q) in Pa, the inverse (c, q, 3, 3) of the
-        growth tensor and, with stress memory, the elastic left stretch V (c, q, 3, 3) of the mesh, by default none; if
-        volume is kept, the elastic `volume` ratio (c, q) of the mesh instead, by default 1.
+        growth tensor and the elastic left stretch V (c, q, 3, 3) that the mesh has, by default none.
         `part` (n,) are numbers of the vertices' parts, by default the connected parts; in a free body the rigid motions
         of each part are removed.
+
+        The energy is the integral of ψ(F·H; w) over the mesh as it is placed, with H = V·G⁻¹ and w = μ/det V. That is
+        finite growth (Rodriguez et al. 1994) on the updated reference, per volume of the state without stress, since ψ
+        is proportional to μ.
         """
-        weights = mu
-        if self._volume is not None:
-            volume = np.ones_like(mu) if volume is None else volume
-            set_at_points(self._volume, volume)
-            # V = J^(1/3) I, as a part of the inverse growth; energies are per volume of the state without stress
-            G_inverse, weights = np.cbrt(volume)[..., None, None] * G_inverse, mu / volume
-        set_at_points(self._mu, mu)
-        set_at_points(self._G_inverse, G_inverse)
-        if self._V is not None:
-            set_at_points(self._V, self._undeformed if V is None else V)
+        weight, H, self._volume = mu, G_inverse, np.ones((1, 1, 1, 1))
+        if V is not None:
+            self._volume = np.linalg.det(V)[..., None, None]
+            weight, H = mu / self._volume[..., 0, 0], V @ G_inverse
+        set_at_points(self._weight, weight)
+        set_at_points(self._H, H)
         if self._linear:
-            self._linear.mu, self._linear.G_inverse = weights, G_inverse
+            self._linear.weight, self._linear.H = np.ascontiguousarray(weight), np.ascontiguousarray(H)
         self._tangent.elastic.forget()
         if self.free:
             self._tangent.motions = RigidMotions(self.domain, self.domain.part if part is None else part)
@@ -193,8 +176,7 @@ class NonlinearProblem:
     def evaluate(self, name: Literal["deformation", "elastic", "stress"], u: Floats) -> Floats:
         """Return (c, q, 3, 3) tensors at the integration points of the local elements; collective over the ranks.
 
-        `deformation` is the step's F, `elastic` its Fe = F·V·G⁻¹, and `stress` Cauchy's, in Pa, of the energy that is
-        minimised.
+        `deformation` is the step's F, `elastic` its Fe = F·V·G⁻¹, and `stress` Cauchy's, in Pa, of ψ(Fe; μ).
         """
         self._load(u)
         if name not in self._expressions:
@@ -202,7 +184,8 @@ class NonlinearProblem:
                 expression = dolfinx.fem.Expression(self._tensors[name], self._rule[0], jit_options=options)
             self._expressions[name] = expression
         cells = np.arange(len(self.domain.cells), dtype=np.int32)
-        return self._expressions[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
+        values = self._expressions[name].eval(self.domain.mesh, cells).reshape(len(cells), -1, 3, 3)
+        return values * self._volume if name == "stress" else values
 
     def _load(self, u: Floats) -> Floats:
         self._u.x.array[:] = u.ravel()

@@ -23,6 +23,7 @@ from ..units import MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
 from .output import (
     FRAMES,
+    GROWTH_SMOOTHING_MM,
     STEPS,
     SUMMARY,
     frame_path,
@@ -37,6 +38,9 @@ from .simulation import Folding, advance
 from .steering import missed_curves
 from .targets import missed_targets, shrinkage_note
 from .zones import Zones
+
+MAX_FLAT_SHARE = 0.001
+"""Share of flat elements at the end of a run above which their note is a warning."""
 
 
 def run(
@@ -93,8 +97,10 @@ def run(
         write_table(out / STEPS, pd.DataFrame(list(state.rows)))
         write_json(out / SUMMARY, summary)
         shutil.rmtree(folder)
-        if note := shrinkage_note(state.rows):
-            print_line(note)
+        quality, is_bad = quality_note(mesh, state.positions * MM_PER_M, reached)
+        for note, is_warning in ((shrinkage_note(state.rows), False), (quality, is_bad)):
+            if note:
+                (warn if is_warning else print_line)(note)
         if diverged is not None:
             warn(f"the run diverges and ends at GW {reached:.3f}: {diverged}")
         ended = f"folded to GW {reached:g} in {len(state.rows)} steps, {seconds:.0f} s"
@@ -123,8 +129,7 @@ def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_dive
             if rank == 0:
                 if arrived:
                     since = [row for row in state.rows if row["week"] > week_before]
-                    quality = quality_warning(folding, state, week)
-                    for warning in filter(None, (missed_curves(state.rows[-1]), *missed_targets(since), quality)):
+                    for warning in filter(None, (missed_curves(state.rows[-1]), *missed_targets(since))):
                         warn(warning)
                 write_checkpoint(folder / "state.h5", key, state)
                 report_step(state, p, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
@@ -143,9 +148,12 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
         if "displacement" in names:
             fields["displacement_mm"] = (state.positions - folding.start) * MM_PER_M
         rates, positions = solved.growth.parameters, fields["positions"]
-        logs = None if growth is None else log_growth_at_vertices(positions, folding.inputs, growth) / steps
+        logs: Floats | None = None
+        if growth is not None:
+            logs = np.asarray(log_growth_at_vertices(positions, folding.inputs, growth) / steps)
         fields |= layer_fields(positions, folding.zones, rates, folding.maps, week, names, logs)
-        write_frame(frame_path(folder, week), week, fields | pressure, elements)
+        smoothing = {} if logs is None else {"growth_smoothing_mm": GROWTH_SMOOTHING_MM}
+        write_frame(frame_path(folder, week), week, fields | pressure, elements, smoothing)
     return replace(state, growth=None, growth_s=0.0)
 
 
@@ -173,19 +181,17 @@ def low_radius_ratio(mesh: TetrahedralMesh, positions: Floats) -> float:
     return float(np.quantile(radius_ratios(TetrahedralMesh(positions, mesh.tets)), 0.01))
 
 
-def quality_warning(folding: Folding, state: State, week: float) -> str:
-    """Return a warning if elements have become flatter than a mesh may be at the start, else an empty text."""
-    before, ratios = (
-        radius_ratios(TetrahedralMesh(positions * MM_PER_M, folding.inputs.tets))
-        for positions in (folding.start, state.positions)
-    )
+def quality_note(mesh: TetrahedralMesh, positions: Floats, week: float) -> tuple[str, bool]:
+    """Return a note if elements are flatter than any may be at the start, else an empty text, and if they are many."""
+    before, ratios = (radius_ratios(TetrahedralMesh(places, mesh.tets)) for places in (mesh.vertices, positions))
     flat = int((ratios < min(MIN_RADIUS_RATIO, float(before.min()))).sum())
     if not flat:
-        return ""
-    return (
-        f"at GW {week:g} {flat} elements are flatter than a mesh may be at the start (radius ratio {ratios.min():.3f} "
-        f"of {MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
+        return "", False
+    text = (
+        f"at GW {week:g} {flat} of {len(ratios)} elements are flatter than a mesh may be at the start (radius ratio "
+        f"{ratios.min():.3f} of {MIN_RADIUS_RATIO:g}): stress and curvature are less accurate there"
     )
+    return text, flat > MAX_FLAT_SHARE * len(ratios)
 
 
 def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[State | None, str]:

@@ -60,8 +60,6 @@ class Folding:
             zones,
             MATERIALS[p.material](p.poisson_ratio),
             penalty_pa_per_m=p.contact.penalty_pa_per_m if p.contact.kind == "planes" else 0.0,
-            remembers_stress=p.stress_memory_gw > 0,
-            keeps_volume=p.keeps_volume_only,
         )
         # of all weeks, so that it does not depend on the end of the run
         stiffest = value_range(p.shear_modulus_cortex_pa, self.maps, *WEEK_RANGE)[1]
@@ -94,11 +92,9 @@ class Folding:
         positions = state.positions + displacement
         size = self.inputs.size(positions * MM_PER_M)
         thickness = value_at(self.parameters.thickness_mm, growth.start.week(self.parameters, 0.5), self.maps)
-        stretch = volume = None
-        if self.parameters.stress_memory_gw > 0:
+        stretch = None
+        if self.parameters.keeps_stretch:
             stretch = self.domain.gather_cells(packed(left_stretch(self.problem.evaluate("elastic", u))))
-        elif self.parameters.keeps_volume_only:
-            volume = self.domain.gather_cells(np.linalg.det(self.problem.evaluate("elastic", u)))
         row = {
             "step": len(state.rows) + 1,
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
@@ -113,7 +109,7 @@ class Folding:
         }
         self.solved = SolvedStep(u, step_s, growth)
         grown = self.grown(state, growth)
-        after = state.after(displacement, step_s, row, stretch, volume, growth.correction(size), grown)
+        after = state.after(displacement, step_s, row, stretch, growth.correction(size), grown)
         row["seconds"] = time.monotonic() - began
         return after
 
@@ -131,8 +127,7 @@ class Folding:
                 part = self.contact.join_touching(part)
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
-        volume = None if state.volume is None else state.volume[domain.tet_of_cell]
-        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part, volume)
+        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part)
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:

@@ -34,7 +34,7 @@ def relaxed(V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool =
     """
     if np.isinf(memory_gw):
         return V
-    left = float(np.exp(-step_gw / memory_gw))
+    left = float(np.exp(-step_gw / memory_gw)) if memory_gw else 0.0
     stretches = left_stretch(V, left)
     if keeps_volume:
         stretches = stretches * (np.linalg.det(V) ** ((1 - left) / 3))[..., None, None]

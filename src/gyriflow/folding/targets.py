@@ -1,8 +1,8 @@
 """Growth towards known shapes: in each step the growth that keeps the brain on a path through its targets.
 
 This is growth by inversion (as in Z. Wang et al. 2021): the map of growth is the result. docs/model.md has the
-equations. Each element takes the stretch of its own way along the path X*(t), so that growth is compatible: a body that touches
-nothing follows the path without stress. Feedback with a time constant corrects the misfit that contact leaves.
+equations. Each element takes the stretch of its own way along the path X*(t), so that growth is compatible: a body that
+touches nothing follows the path without stress. Feedback with a time constant corrects the misfit that contact leaves.
 """
 
 from collections.abc import Callable, Sequence
@@ -159,6 +159,6 @@ def shrinkage_note(rows: Sequence[dict[str, Any]]) -> str:
         return ""
     least = min(row["min_J"] for row in rows)
     return (
-        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of their volume in a day (least det F of "
-        f"a step {least:.2f}): an error of the registration, not of tissue"
+        f"up to {shrinking} elements lose more than {MAX_SHRINKAGE_PER_DAY:.0%} of their volume in a day (least det F "
+        f"of a step {least:.2f}): an error of the registration, not of tissue"
     )

@@ -4,6 +4,7 @@ Stated ages of an atlas are imprecise: volume may jump between two weeks and the
 than with the stated age, so a brain is used at the age of its size.
 """
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,10 @@ from scipy.optimize import isotonic_regression
 from ..geometry.triangles import Floats
 from .curves import Curve, fitted, rate, value
 
+log = logging.getLogger(__name__)
+
+MAX_AGE_ERROR_GW = 1.0
+"""Difference between stated age and age by size above which it is warned of."""
 MIN_SPACING_GW = 0.1
 """Smallest time between two brains of successive weeks."""
 
@@ -53,7 +58,9 @@ def ages_by_size(
     points = pd.DataFrame({"week": stated, "volume": volumes})
     if len(norm_ml):
         points = pd.concat([points, points.assign(volume=norm_ml).dropna()]).sort_values("week", kind="stable")
-    curve = fitted(points["week"].tolist(), points["volume"].tolist(), name="volume of the atlas").curve
+    curve = fitted(
+        points["week"].tolist(), points["volume"].tolist(), name="volume of the atlas", keeps_first=True
+    ).curve
     logs, sizes = np.log(curve.values), np.log(volumes)
     # the curve is flat where brains do not grow; beyond its ends ages follow its rate there, or its mean rate if higher
     inside = np.interp(sizes, logs + 1e-9 * np.arange(len(logs)), curve.weeks)
@@ -62,4 +69,8 @@ def ages_by_size(
     ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / end_rates[0], inside)
     ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / end_rates[1], ages)
     spacing = MIN_SPACING_GW * np.arange(len(ages))
-    return AtlasAges(stated, volumes, curve, isotonic_regression(ages - spacing).x + spacing)
+    ages = isotonic_regression(ages - spacing).x + spacing
+    for number in np.flatnonzero(np.abs(ages - stated) > MAX_AGE_ERROR_GW):
+        text = "the brain of the atlas at %g GW has the size of %.1f GW, and its shape is used at that age"
+        log.warning(text, stated[number], ages[number])
+    return AtlasAges(stated, volumes, curve, ages)

@@ -87,7 +87,7 @@ def _frames(surface: TriangleMesh, faces: Ints) -> Floats:
 
 
 def resample_by_size(
-    mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float], ages: AtlasAges, knots: Floats
+    mesh: TetrahedralMesh, atlas: Floats, weeks: Sequence[float] | Floats, ages: AtlasAges, knots: Floats
 ) -> Floats:
     """Return the (w, n, 3) positions of a mesh at w weeks, as an atlas that grows along its curve of volume.
 

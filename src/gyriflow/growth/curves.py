@@ -96,14 +96,16 @@ def fitted(
     name: str = "curve",
     degrees_of_freedom: float = DEGREES_OF_FREEDOM,
     may_shrink: bool = False,
+    keeps_first: bool = False,
 ) -> CurveFit:
     """Fit a smooth curve to measured weeks, robust against single outliers.
 
     The growth rate (derivative of the logarithm) is a quadratic spline, not negative unless `may_shrink`, with a
     penalty on its second differences (on its first ones below three degrees of freedom; P-splines, Eilers and Marx
     1996). The penalty leaves `degrees_of_freedom`, at most one less than the number of weeks. With at least twice as
-    many weeks, outliers lose their weight (Tukey's biweight, started from least absolute deviations). The standard
-    deviation is Bayesian (Wahba 1983), from the scatter of the weeks about the curve.
+    many weeks, outliers lose their weight (Tukey's biweight, started from least absolute deviations), but with
+    `keeps_first` not those of the first week, from which all growth is counted. The standard deviation is Bayesian
+    (Wahba 1983), from the scatter of the weeks about the curve.
 
     At least two different weeks and positive sizes are needed; several brains may share a week. InputError for other
     values, and if the sizes decrease without `may_shrink`.
@@ -116,6 +118,8 @@ def fitted(
     penalty = splines.penalty(*ends, KNOT_INTERVALS, order=2 if degrees >= 3 else 1)
     strength = splines.strength(design.T @ design, penalty, degrees, name)
     weights = _robust_weights(design, logs, penalty, strength, degrees, may_shrink)
+    if keeps_first:
+        weights[weeks_ == weeks_[0]] = 1.0
     coefficients = _solve(design, logs, weights, strength * penalty, may_shrink)
     if not may_shrink and coefficients[1:].max() < 1e-6:
         _refuse_shrinking(name, weeks_)

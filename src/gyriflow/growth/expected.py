@@ -69,7 +69,7 @@ def expected_positions(
     mesh: TetrahedralMesh,
     start_week: float,
     atlas: Floats,
-    atlas_weeks: Sequence[float],
+    atlas_weeks: Sequence[float] | Floats,
     weeks: Sequence[float],
     *,
     smoothing_mm: float = DIFFERENCE_SMOOTHING_MM,

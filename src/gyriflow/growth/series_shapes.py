@@ -11,7 +11,7 @@ from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces
 from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import match_surface, nearest_on, surface_distance, values_at
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh, area_cm2, vertex_areas, volume_ml
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area_cm2, vertex_areas, volume_ml
 from .carrying import carry_over_weeks
 from .fitting import PULL_MM, fit_onto_surface, points_below
 from .matched_surfaces import follow_surfaces
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
 """Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
-MAX_OPENING_DRAWS, OPENED_MM = 4, 0.06
+MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
 """Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
 MAX_MISFIT_MM = 0.25
 """Mean distance of a body from the surface it is fitted to above which a warning is logged."""
@@ -67,7 +67,7 @@ def with_stops(before: tuple[float, Floats], week: float, body: FittedBody) -> l
     return [*((at, shape, True) for at, shape in stops.items()), (week, body.positions_mm, False)]
 
 
-def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Floats, *, open_sulci: bool) -> None:
+def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints, *, open_sulci: bool) -> None:
     """Let a body follow a shape, and fit its boundary to a target; `used` are the vertices of the boundary.
 
     With `open_sulci` it is drawn several times, until it is close or stays as it is.
@@ -141,7 +141,7 @@ def follow_series(
 
 def _carried(
     boundary: TriangleMesh,
-    used: Floats,
+    used: Ints,
     shapes: Sequence[tuple[float, Floats, bool]],
     pairs: Sequence[Correspondence],
     surfaces: Sequence[TriangleMesh],

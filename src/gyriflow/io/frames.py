@@ -31,15 +31,20 @@ def group_name(week: float) -> str:
 
 
 def write_frame(
-    path: AnyPath, week: float, vertex_fields: Mapping[str, NDArray], cell_fields: Mapping[str, NDArray] | None = None
+    path: AnyPath,
+    week: float,
+    vertex_fields: Mapping[str, NDArray],
+    cell_fields: Mapping[str, NDArray] | None = None,
+    attributes: Mapping[str, float] | None = None,
 ) -> None:
     """Write the frame of a gestational week to a file of its own.
 
     Fields at the vertices are `positions` (n, 3) in mm and further arrays (n,) or (n, 3); those of the elements, in the
-    order of the run's mesh, are (m,), (m, 3) or (m, 9).
+    order of the run's mesh, are (m,), (m, 3) or (m, 9). `attributes` are numbers that hold for the whole frame.
     """
     with new_hdf5(path) as file:
         frame = file.create_group(group_name(week))
+        frame.attrs.update(attributes or {})
         for name, values in vertex_fields.items():
             frame[name] = values if name == POSITIONS else _single(values)
         for name, values in (cell_fields or {}).items():

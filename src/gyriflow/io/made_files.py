@@ -20,7 +20,7 @@ def making_files(folder: AnyPath, record: AnyPath, *subfolders: str) -> Iterator
     removed = {name for name in listed if not subfolders or name.partition("/")[0] in subfolders}
     for name in removed:
         (folder / name).unlink(missing_ok=True)
-        for parent in Path(name).parents[:-1]:
+        for parent in Path(name).parents:
             with suppress(OSError):  # of a folder with other files, or that is gone
                 (folder / parent).rmdir()
     others = set(files_below(folder))

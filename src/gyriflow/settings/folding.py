@@ -140,6 +140,11 @@ class FoldingSettings(Settings):
     """MPI ranks of a simulation."""
 
     @property
+    def keeps_stretch(self) -> bool:
+        """Whether elastic stretch, or a part of it, is kept between steps."""
+        return self.stress_memory_gw > 0 or self.keeps_volume_only
+
+    @property
     def keeps_volume_only(self) -> bool:
         """Whether only the elastic change of volume is kept between steps."""
         return self.relaxation == "shape" and self.stress_memory_gw == 0

@@ -42,7 +42,7 @@ def problem_of(law: type[Material], order: int) -> NonlinearProblem:
     mesh = quadratic(mesh) if order == 2 else mesh
     facets, _ = boundary_faces(mesh)
     zones = Zones(facets, np.full(len(facets), FREE), np.ones(len(mesh.vertices)), 0.0, (-1.0, 1.0))
-    return NonlinearProblem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45), remembers_stress=True)
+    return NonlinearProblem(Domain(MPI.COMM_SELF, mesh), zones, law(0.45))
 
 
 def outcomes(F, name, law=NeoHookean, stretch=None, dg=0.0, dr=0.0, normal=UP):

@@ -15,7 +15,7 @@ BODY = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
 
 def grown(week):
     """Return the body's vertices at a week: they move linearly and unevenly."""
-    x, y, z = BODY.vertices.T
+    x, y, _ = BODY.vertices.T
     return BODY.vertices * (1 + 0.04 * (week - 21)) + (week - 21) * np.stack([np.sin(y / 12), 0 * x, np.cos(x / 9)], 1)
 
 

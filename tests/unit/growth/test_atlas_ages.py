@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from facts import Facts
 from shapes import ellipsoid_mesh
 
 from gyriflow.growth.atlas_ages import MIN_SPACING_GW, ages_by_size
@@ -63,3 +64,17 @@ def test_shape_follows_the_ages_and_size_the_curve():
     assert ages.ages[4] > 26
     assert length(found[4]) < length(atlas[4]) - 0.01
     assert length(found[8]) == pytest.approx(length(atlas[8]), abs=0.01)
+
+
+def test_the_first_brain_keeps_its_weight_and_ages_far_from_the_stated_ones_are_said(caplog):
+    # CRL's volumes from 24 GW on: the first brain is far below the others
+    weeks = np.arange(24.0, 35.0)
+    volumes = [78.3, 109.1, 123.4, 129.9, 143.8, 158.8, 173.9, 193.9, 214.0, 226.2, 251.7]
+    found = ages_by_size(weeks, volumes)
+    assert found.ages[0] == pytest.approx(24.0, abs=1.0)
+    assert found.volume(26) == pytest.approx(volumes[2], rel=0.12)
+    volumes[5] *= 1.25
+    jumping = ages_by_size(weeks, volumes)
+    late = weeks[np.abs(jumping.ages - weeks) > 1.0]
+    assert [Facts(f"{week:g} GW") == caplog.text for week in late] == [True] * len(late)
+    assert len(late) > 0

@@ -328,7 +328,7 @@ def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(predi
     assert volumes / volumes[0] == pytest.approx(wanted / wanted[0], rel=0.04)
     assert set(found.baselines) == {"atlas", "atlas_deformed"}
     assert found.weeks == [22.3, 23.0, 24.0, 24.5, 25.0, 26.0]
-    boundary, used = boundary_surface(start)
+    boundary, _ = boundary_surface(start)
     own, deformed = (
         np.array([abs(signed_volume(TriangleMesh(at, boundary.faces))) / 1e3 for at in found.baselines[name]])
         for name in ("atlas", "atlas_deformed")

@@ -262,7 +262,7 @@ def test_intervals_are_around_the_run_and_observed_brains_are_stars():
     run, stars = axes.lines
     assert run.get_xydata().tolist() == [[22.0, 10.0], [24.0, 12.5], [27.5, 16.0]]
     assert (stars.get_marker(), stars.get_xydata()[1:].tolist()) == ("*", [[24.0, 12.0], [27.5, 18.5]])
-    assert {"run", "90 % interval", "observed brain"} <= words(figure)
+    assert {"run", "interval", "observed brain"} <= words(figure)
 
 
 def test_spectra_over_weeks_are_by_side_and_band_and_open_where_a_band_is_cut_off():

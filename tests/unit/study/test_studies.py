@@ -118,7 +118,11 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
 
 
 def test_folders_of_results_are_no_names_of_studies():
-    sources = [*ROOT.glob("workflow/rules/*.smk"), *ROOT.glob("src/gyriflow/study/*.py")]
+    sources = [
+        ROOT / "workflow/figures.yaml",
+        *ROOT.glob("workflow/rules/*.smk"),
+        *ROOT.glob("src/gyriflow/study/*.py"),
+    ]
     paths = [*(path.read_text() for path in sources), figure_log("rule", f"{STUDY}/metrics.png")]
     folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
     assert folders > {"logs", "figures", "calibration", "registration"}
