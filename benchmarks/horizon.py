@@ -70,7 +70,6 @@ def study(start: str, folders: dict[str, Path], weeks: range, edge_mm: float, en
             "mesher": "tetgen",
             "surface_edge_mm": edge_mm,
             "max_surface_distance_mm": 0.5,
-            # a coarse mesh of a detailed surface has flat elements
         },
         "folding": {"preset": "expected", "end_week": weeks[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
         "runs": {RUN: {"ensemble": ensemble}},

@@ -9,7 +9,6 @@ SIMPLER_PREDICTIONS = {
     "scaled": "start, scaled: no folding",
     "atlas": "the atlas' brain, scaled",
     "atlas_deformed": "the atlas' brain, deformed onto the start",
-    "displaced": "start, moved as the atlas",
     "target": "target shape of the run",
 }
 """Labels of the simpler predictions of a brain, by their names in the study's table."""
