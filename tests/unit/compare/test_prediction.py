@@ -31,7 +31,7 @@ def test_skill_is_against_the_best_baseline_the_target_among_them():
     )
     for row in (*first.values(), *second.values()):
         assert (row["skill_low"], row["skill_high"]) == pytest.approx((row["skill"],) * 2)
-    assert [first[name]["skill"] for name in ("run", "scaled", "atlas_deformed")] == pytest.approx([0.5, 0.0, -1.0])
+    assert [first[name]["skill"] for name in ("run", "scaled", "displaced")] == pytest.approx([0.5, 0.0, -1.0])
     assert [second[name]["skill"] for name in ("run", "target")] == pytest.approx([-1.0, 0.0])
 
 
@@ -53,11 +53,11 @@ def test_differences_from_the_atlas_are_paired():
 
 def test_simple_predictions_have_the_volume_of_the_target_or_are_taken_as_they_are():
     start, target = sphere(10.0), REAL
-    registered = {"atlas": sphere(12.0), "atlas_deformed": sphere(13.0)}
+    registered = {"atlas": sphere(12.0), "displaced": sphere(13.0)}
     models = simple_predictions(start, target, registered, None)
-    assert list(models) == ["scaled", "atlas", "atlas_deformed", "target"]
+    assert list(models) == ["scaled", "atlas", "displaced", "target"]
     assert models["target"] is target
-    assert models["atlas_deformed"] is registered["atlas_deformed"]
+    assert models["displaced"] is registered["displaced"]
     for name in ("scaled", "atlas"):
         assert signed_volume(models[name]) == pytest.approx(signed_volume(target))
     assert np.ptp(np.linalg.norm(models["atlas"].vertices, axis=1)) < 1e-9
