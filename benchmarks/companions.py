@@ -12,8 +12,8 @@ the observed surface (mm), after scaling to the observed volume and rigid alignm
 - smooth: the start, moved by the displacement to its target at this week smoothed along the surface, without mechanics;
 - random: folds of no brain. To the smooth displacement (of the first length) random folds are added with the root mean
   square along the normal and the mean squared wavenumber of what smoothing has removed. The body follows these shapes
-  week by week as it follows the targets. It is compared with the random shape, as the run is with the observed brain,
-  and with the observed brain.
+  from week to week of the table, as it follows the targets. It is compared with the observed brain, and with the random
+  shape, as the run is with the observed brain.
 
 The last line is one JSON object.
 """
@@ -44,8 +44,10 @@ from gyriflow.io.surfaces import read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.study.paths import FOLDING, MESH, PIAL, TARGETS
 
-FINEST_MM = 0.01
-"""Least length over which random folds are smoothed."""
+FINEST_MM, FINEST_TOL_MM = 0.01, 0.05
+"""Least length over which random folds are smoothed, and tolerance of this length."""
+TOLERANCE = 1e-5
+"""Relative tolerance of `diffuse`."""
 
 
 def main() -> None:
@@ -65,46 +67,45 @@ def main() -> None:
     start, used = boundary_surface(mesh)
     shapes = read_weekly_shapes(folder / TARGETS.format(brain=brain, origin="self"))
     targets = {float(shapes.weeks[i]): shapes.positions[i][used] for i in shapes.passed[1:]}
-    weeks = arguments.weeks or list(targets)
     runs = {"run": arguments.run, "uniform": arguments.uniform}
     noise = np.random.default_rng(arguments.seed).standard_normal(len(used))
     # remeshing loads PETSc without initialising it
     petsc4py.init()
     body, pieces = ElasticFit(mesh), linear_pieces(mesh)
     rows: list[dict[str, Any]] = []
-    for week in (week for week in targets if week <= max(weeks)):
+    for week in arguments.weeks or list(targets):
+        observed = read_surface(folder / PIAL["whole"].format(brain=arguments.observed.format(week=week)))
         target = TriangleMesh(targets[week], start.faces)
         moved = {f"smooth {length:g} mm": move_smoothly(start, target, length) for length in arguments.smoothing}
         smooth = next(iter(moved.values()))
         removed = np.sum((target.vertices - smooth.vertices) * vertex_normals(smooth), axis=1)
         folds = random_folds(smooth, removed, noise, arguments.smoothing[0])
         shape = TriangleMesh(smooth.vertices + folds[:, None] * vertex_normals(smooth), start.faces)
+        for name, run in runs.items():
+            if run:
+                places = read_positions(folder / FOLDING["frames"].format(run=run, brain=brain), week)
+                moved[name] = TriangleMesh(places[used], start.faces)
         extend = harmonic_continuation(body.positions_mm, pieces, used, CONTINUATION_TOL)
         places = body.positions_mm + extend(shape.vertices - body.boundary.vertices)
         fit_body(body, places, None, used, open_sulci=False)
-        if week not in weeks:
-            continue
-        observed = read_surface(folder / PIAL["whole"].format(brain=arguments.observed.format(week=week)))
-        for name, run in runs.items():
-            if run:
-                frames = folder / FOLDING["frames"].format(run=run, brain=brain)
-                rows.append(compare(week, name, read_positions(frames, week)[used], start, observed, "observed"))
-        for name, surface in {"start": start, **moved, "random": body.boundary}.items():
-            rows.append(compare(week, name, surface.vertices, start, observed, "observed"))
-        row = compare(week, "random", body.boundary.vertices, start, shape, "random")
-        for name, values in {"removed": removed, "added": folds}.items():
-            row[f"{name}_mm"], row[f"{name}_wavelength_mm"] = size_and_wavelength(smooth, values)
-        rows.append(row)
-        print(pd.DataFrame(rows[-1:]).to_string(index=False, float_format="%.3f"), flush=True)
+        row: dict[str, Any] = {"week": week}
+        for name, heights in {"removed": removed, "added": folds}.items():
+            row[f"{name}_mm"], row[f"{name}_wavelength_mm"] = size_and_wavelength(smooth, heights)
+        against = {"observed": (observed, {"start": start, **moved, "random": body.boundary})}
+        against["random"] = shape, {"random": body.boundary}
+        for goal, (surface, models) in against.items():
+            for name, values in compare(models, surface).items():
+                rows.append(row | {"shape": name, "against": goal} | values)
+                print(json.dumps(rows[-1]), flush=True)
     print(pd.DataFrame(rows).to_string(index=False, float_format="%.3f"))
     print(json.dumps({"rows": rows}))
 
 
 def move_smoothly(start: TriangleMesh, target: TriangleMesh, length_mm: float) -> TriangleMesh:
-    """Move a surface by the displacement to a target with the same vertices, smoothed along it, in the target's pose."""
+    """Move a surface, in the pose of a target with the same vertices, by the smoothed displacement to it."""
     pose = rigid_fit(start.vertices, target.vertices, vertex_areas(start))
     places = transform_points(start.vertices, pose)
-    smooth = places + diffuse(start.vertices, start.faces, target.vertices - places, length_mm)
+    smooth = places + diffuse(start.vertices, start.faces, target.vertices - places, length_mm, TOLERANCE)
     return TriangleMesh(smooth, start.faces)
 
 
@@ -118,13 +119,13 @@ def random_folds(surface: TriangleMesh, removed: Floats, noise: Floats, length_m
     white = noise / np.sqrt(vertex_areas(surface))
 
     def folds(finest_mm: float) -> Floats:
-        fine = diffuse(surface.vertices, surface.faces, white, finest_mm)
-        return fine - diffuse(surface.vertices, surface.faces, fine, length_mm)
+        fine = diffuse(surface.vertices, surface.faces, white, finest_mm, TOLERANCE)
+        return fine - diffuse(surface.vertices, surface.faces, fine, length_mm, TOLERANCE)
 
     def excess(finest_mm: float) -> float:
         return size_and_wavelength(surface, folds(finest_mm))[1] - wavelength_mm
 
-    heights = folds(brentq(excess, FINEST_MM, 4 * length_mm, xtol=0.01))
+    heights = folds(brentq(excess, FINEST_MM, 4 * length_mm, xtol=FINEST_TOL_MM))
     return heights * size_mm / size_and_wavelength(surface, heights)[0]
 
 
@@ -135,17 +136,17 @@ def size_and_wavelength(surface: TriangleMesh, heights: Floats) -> tuple[float, 
     return float(np.sqrt(square / vertex_areas(surface).sum())), float(2 * np.pi * np.sqrt(square / slope))
 
 
-def compare(
-    week: float, name: str, places: Floats, start: TriangleMesh, goal: TriangleMesh, against: str
-) -> dict[str, Any]:
-    """Compare a surface at (n, 3) places with another one, scaled to its volume and aligned."""
-    surface = scale_to_volume(TriangleMesh(places, start.faces), signed_volume(goal))
-    folds = prepare_for_comparison(goal, goal)
-    values, _ = interpolate_measures(prepare_for_comparison(surface, goal), folds)
-    distance, _, _ = nearest_on(goal.vertices, align(surface, goal))
-    r = correlation(folds.shape_index, values["shape_index"], folds.areas)
-    row: dict[str, Any] = {"week": week, "shape": name, "against": against, "r_shape_index": r}
-    return row | {"distance_mm": float(np.average(distance, weights=vertex_areas(goal)))}
+def compare(models: dict[str, TriangleMesh], goal: TriangleMesh) -> dict[str, dict[str, float]]:
+    """Compare surfaces with another one, scaled to its volume and aligned."""
+    folds, areas = prepare_for_comparison(goal, goal), vertex_areas(goal)
+    found = {}
+    for name, model in models.items():
+        surface = scale_to_volume(model, signed_volume(goal))
+        values, _ = interpolate_measures(prepare_for_comparison(surface, goal), folds)
+        distance, _, _ = nearest_on(goal.vertices, align(surface, goal))
+        r = correlation(folds.shape_index, values["shape_index"], folds.areas)
+        found[name] = {"r_shape_index": r, "distance_mm": float(np.average(distance, weights=areas))}
+    return found
 
 
 if __name__ == "__main__":
