@@ -20,8 +20,6 @@ rule calibration_design:
         scores=lambda w: CALIBRATED.scores_before(int(w.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_design.{{round}}.log",
     wildcard_constraints:
         round=r"\d+",
     params:
@@ -45,8 +43,6 @@ rule prepare_calibrated:
         params=PARAMETERS,
         regions=REGIONS["mesh"],
         data=REGIONS["data"],
-    log:
-        f"{RUN}/logs/prepare_calibrated.log",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
@@ -71,8 +67,6 @@ rule calibration_score:
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_score.{{run}}.log",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
@@ -93,8 +87,6 @@ rule calibration_tables:
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_tables.log",
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,

@@ -32,8 +32,6 @@ rule ensemble:
         summaries=lambda w: [member.file(FOLDING["summary"]) for member in ensemble_of(w)[1]],
     output:
         ENSEMBLE,
-    log:
-        f"{RUN}/logs/ensemble.log",
     script:
         "../scripts/ensemble.py"
 
@@ -84,7 +82,5 @@ rule growth_sd:
         ],
     output:
         GROWTH_SD,
-    log:
-        f"{RUN}/logs/growth_sd.log",
     script:
         "../scripts/growth_sd.py"

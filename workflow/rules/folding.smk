@@ -163,8 +163,6 @@ rule growth_maps:
         params=PARAMETERS,
     output:
         GROWTH_MAPS,
-    log:
-        f"{RUN}/logs/growth_maps.log",
     script:
         "../scripts/growth_maps.py"
 

@@ -6,8 +6,6 @@ rule tetrahedralise:
         PIAL["whole"],
     output:
         **MESH,
-    log:
-        f"{BRAIN}/logs/tetrahedralise.log",
     priority: 1
     resources:
         mem_mb=6000,
@@ -24,8 +22,6 @@ rule tetrahedralise:
 use rule tetrahedralise as path_mesh with:
     output:
         **PATH_MESH,
-    log:
-        f"{BRAIN}/logs/path_mesh.log",
     params:
         settings=PATH_MESH_SETTINGS.model_dump(exclude={"max_surface_distance_mm"}),
         gates=PATH_MESH_SETTINGS.gates,

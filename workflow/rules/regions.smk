@@ -11,8 +11,6 @@ rule given_regions:
         report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/given_regions.log",
     wildcard_constraints:
         brain=brains_with(regions_from="given"),
     params:
@@ -43,8 +41,6 @@ rule carried_regions:
         report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/carried_regions.log",
     wildcard_constraints:
         brain=brains_with(regions_from="carried"),
     params:
@@ -63,8 +59,6 @@ rule named_sulci:
         drawn=SULCI / "sulci.nii.gz",
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/named_sulci.log",
     wildcard_constraints:
         brain=brains_with(regions_from="named"),
     params:
@@ -82,8 +76,6 @@ rule simulated_regions:
         right=PIAL["right"],
     output:
         **region_files(f"{RUN}/metrics"),
-    log:
-        f"{RUN}/logs/simulated_regions.log",
     wildcard_constraints:
         brain=brains_with(has_regions=True),
     script:
@@ -103,8 +95,6 @@ rule region_metrics:
         right_maps=f"{PLACE}/right.shape.gii",
     output:
         f"{PLACE}/regions.csv",
-    log:
-        f"{PLACE}/logs/region_metrics.log",
     wildcard_constraints:
         where=one_of(where for where, row in study.all_measurements.items() if row.regions),
     params:
@@ -142,8 +132,6 @@ rule template_maps:
         maps=f"{PLACE}/{{side}}.shape.gii",
     output:
         TEMPLATE_MAPS,
-    log:
-        f"{PLACE}/logs/template_maps.{{side}}.log",
     wildcard_constraints:
         where=one_of(study.measurements),
     params:

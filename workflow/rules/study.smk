@@ -27,8 +27,6 @@ rule metrics_tables:
     output:
         **{name: f"{STUDY}/{name}.csv" for name in METRICS_TABLES},
         norms=f"{STUDY}/norms.json",
-    log:
-        f"{STUDY}/logs/metrics_tables.log",
     params:
         labelled=[(brain.id, brain.week, brain.sides, brain.labels.scheme) for brain in LABELLED],
         scans=study.scans,
@@ -53,8 +51,6 @@ rule run_tables:
         csv=f"{STUDY}/runs.csv",
         table=f"{STUDY}/runs.html",
         displacement=f"{STUDY}/displacement.csv",
-    log:
-        f"{STUDY}/logs/run_tables.log",
     params:
         folded=study.pairs,
         growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],

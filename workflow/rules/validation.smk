@@ -7,8 +7,6 @@ rule prepared_surfaces:
         start=PIAL["whole"],
     output:
         **PREPARED,
-    log:
-        f"{STUDY}/logs/prepared_surfaces.{{brain}}.{WEEK}.log",
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -30,8 +28,6 @@ rule validation:
         curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
     output:
         table=VALIDATION,
-    log:
-        f"{RUN}/logs/validation.log",
     params:
         start_week=lambda w: brain_of(w).week,
         series=lambda w: simulation_of(w).series,
@@ -55,8 +51,6 @@ rule prediction:
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         PREDICTION,
-    log:
-        f"{RUN}/logs/prediction.log",
     params:
         start_week=lambda w: brain_of(w).week,
         weeks=lambda w: list(simulation_of(w).observed),
@@ -77,8 +71,6 @@ rule atlas_brain:
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,
-    log:
-        f"{RUN}/logs/atlas_brain.{WEEK}.log",
     params:
         week=lambda w: float(w.week),
     script:
@@ -113,8 +105,6 @@ rule deviation:
         regions=lambda w: list(deviating(w)["expected"].regions.values()),
     output:
         **DEVIATION,
-    log:
-        f"{RUN}/logs/deviation.{WEEK}.log",
     params:
         sides=lambda w: brain_of(w).sides,
         labels=deviation_labels,
@@ -139,8 +129,6 @@ rule registration_ceiling:
     output:
         table=CEILING,
         carried=CARRIED_MESH,
-    log:
-        f"{STUDY}/logs/registration_ceiling.{{brain}}.log",
     resources:
         mem_mb=8000,
     params:
@@ -175,8 +163,6 @@ rule onset:
         correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         ONSET,
-    log:
-        f"{RUN}/logs/onset.log",
     params:
         sides=lambda w: brain_of(w).sides,
         radius_mm=CONFIG.metrics.curvature_radius_mm,
@@ -214,8 +200,6 @@ rule validation_tables:
         carried=[simulation.file(CARRIED_MESH) for simulation in study.validated_registered],
     output:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
-    log:
-        f"{STUDY}/logs/validation_tables.log",
     params:
         individuals=study.are_individuals(
             {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}

@@ -138,8 +138,9 @@ def one_of(names: Iterable[str]) -> str:
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
-def figure_log(rule: str, pattern: str) -> str:
-    """Return the log of a figure, named by its rule and the wildcards that are not in the folder."""
-    folder = next(place for place in (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT) if pattern.startswith(f"{place}/"))
+def log_of(rule: str, pattern: str) -> str:
+    """Return the log of a rule that makes a file: named by the rule and the wildcards that are not in the folder."""
+    folders = (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT, PLACE)
+    folder = next(place for place in folders if pattern.startswith(f"{place}/"))
     wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
     return f"{folder}/logs/{'.'.join([rule, *wildcards])}.log"

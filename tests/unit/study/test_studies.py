@@ -10,7 +10,7 @@ from facts import Facts
 from gyriflow.errors import InputError
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
-from gyriflow.study.paths import STUDY, figure_log
+from gyriflow.study.paths import STUDY, log_of
 
 ROOT = Path(__file__).parents[3]
 
@@ -119,7 +119,7 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
 
 def test_folders_of_results_are_no_names_of_studies():
     sources = [*ROOT.glob("workflow/rules/*.smk"), *ROOT.glob("src/gyriflow/study/*.py")]
-    paths = [*(path.read_text() for path in sources), figure_log("rule", f"{STUDY}/metrics.png")]
+    paths = [*(path.read_text() for path in sources), log_of("rule", f"{STUDY}/metrics.png")]
     folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
     assert folders > {"logs", "figures", "calibration", "registration"}
     # benchmark files are named like logs
