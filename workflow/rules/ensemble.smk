@@ -44,32 +44,12 @@ def rows_of_ensemble(wildcards):
 
 rule ensemble_maps:
     input:
-        surfaces=lambda w: [file for row in rows_of_ensemble(w) for file in row.hemispheres],
-        maps=lambda w: [file for row in rows_of_ensemble(w) for file in row.maps],
+        surfaces=lambda w: [row.parts[w.side] for row in rows_of_ensemble(w)],
+        maps=lambda w: [f"{row.folder}/{w.side}.shape.gii" for row in rows_of_ensemble(w)],
     output:
-        **ensemble_maps(*SIDES),
-    log:
-        f"{RUN}/logs/ensemble_maps.{WEEK}.log",
-    wildcard_constraints:
-        brain=brains_with(*SIDES),
-    params:
-        sides=lambda w: brain_of(w).sides,
+        ENSEMBLE_MAPS,
     script:
         "../scripts/ensemble_maps.py"
-
-
-use rule ensemble_maps as ensemble_maps_left with:
-    output:
-        **ensemble_maps("left"),
-    wildcard_constraints:
-        brain=brains_with("left"),
-
-
-use rule ensemble_maps as ensemble_maps_right with:
-    output:
-        **ensemble_maps("right"),
-    wildcard_constraints:
-        brain=brains_with("right"),
 
 
 rule growth_sd:

@@ -8,6 +8,7 @@ from .comparison_figures import comparison_figures
 from .paths import (
     BRAIN,
     ENSEMBLE,
+    ENSEMBLE_MAPS,
     FOLDING,
     GROWTH,
     GROWTH_MAPS,
@@ -18,7 +19,6 @@ from .paths import (
     REGIONS,
     STUDY,
     TARGETS,
-    ensemble_maps,
 )
 from .records import Brain, Simulation
 from .registry import (
@@ -425,7 +425,7 @@ SULCUS_PROBABILITY = Kind(
 def spread_figure(simulation: Simulation, kind: Kind, quantity: str) -> Figure:
     weeks = {}
     for row in simulation.measurements[1:]:
-        maps = [simulation.file(file, week=row.week) for file in ensemble_maps(*row.sides).values()]
+        maps = [simulation.file(ENSEMBLE_MAPS, week=row.week, side=side) for side in row.sides]
         weeks[row.week] = [list(pair) for pair in zip(row.hemispheres, maps, strict=True)]
     return Figure(kind, {"brains": {simulation.run: weeks}}, {"quantity": quantity}, simulation.names)
 

@@ -67,11 +67,6 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-def ensemble_maps(*sides: Side) -> dict[str, str]:
-    """Return the files with maps of an ensemble's spread at a week, by hemisphere."""
-    return {side: f"{RUN}/metrics/{WEEK}/{side}.ensemble.shape.gii" for side in sides}
-
-
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
@@ -121,6 +116,8 @@ PREPARED = {
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
 """The atlas' own brain beside a prediction: aligned with it, with its volume."""
+ENSEMBLE_MAPS = f"{RUN}/metrics/{WEEK}/{{side}}.ensemble.shape.gii"
+"""Maps of the spread of an ensemble on a hemisphere."""
 GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"
 """Standard deviation of the growth maps of an ensemble."""
 ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
