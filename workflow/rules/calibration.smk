@@ -33,16 +33,14 @@ rule calibration_design:
 
 rule prepare_calibrated:
     input:
+        **START_MESH,
         design=lambda w: CALIBRATED.design(w.run),
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
         maps=lambda w: simulation_of(w).maps,
-        mesh=MESH["mesh"],
-        data=MESH["data"],
         sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
     output:
+        **START_REGIONS,
         params=PARAMETERS,
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:

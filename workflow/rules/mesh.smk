@@ -1,6 +1,7 @@
 # Tetrahedral meshes of start brains.
 from gyriflow.running.path_store import PATH_MESH_SETTINGS
 
+
 rule tetrahedralise:
     input:
         PIAL["whole"],

@@ -6,9 +6,7 @@ from gyriflow.settings.atlas import SULCI
 rule given_regions:
     input:
         unpack(lambda w: CONFIG.metrics.regions[w.brain].files),
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
+        **POSED_SIDES,
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
@@ -34,11 +32,9 @@ def regions_to_carry(wildcards):
 rule carried_regions:
     input:
         unpack(regions_to_carry),
+        **POSED_SIDES,
         given_report=lambda w: region_pair(w)[0].report,
         correspondence=lambda w: study.series.correspondence(*region_pair(w)),
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
     wildcard_constraints:
@@ -51,10 +47,8 @@ rule carried_regions:
 
 rule named_sulci:
     input:
+        **POSED_SIDES,
         volume=lambda w: brain_of(w).registered.path,
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
         drawing=SULCI / "sulci.yaml",
         drawn=SULCI / "sulci.nii.gz",
     output:

@@ -96,8 +96,7 @@ def followers_of(wildcards):
 # shapes of a start brain's mesh in the later weeks of its own series, for runs that grow towards them
 rule targets:
     input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
+        **START_MESH,
         report=PIAL["report"],
         correspondences=lambda w: chain_of(w).correspondences,
         surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
@@ -162,8 +161,7 @@ def atlas_of(wildcards):
 # shapes that a start brain would have in later weeks if it grew as an atlas
 rule predicted_targets:
     input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
+        **START_MESH,
         path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path.brains[0].id),
         correspondence=lambda w: chain_of(w).correspondences,
         reports=lambda w: [PIAL["report"], atlas_of(w).report],

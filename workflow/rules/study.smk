@@ -59,26 +59,17 @@ rule run_tables:
 
 
 EXPORTED = study.exported
+EXPORTED_FILES = (
+    *("surfaces", "maps", "regions", "report", "white", "white_maps"),
+    *("template_maps", "volume"),
+)
 
 
 # a separate target
 rule export:
     input:
-        [
-            list(brain[kind].values())
-            for brain in EXPORTED
-            for kind in (
-                *("surfaces", "maps", "regions"),
-                *("white", "white_maps", "template_maps"),
-            )
-        ],
-        [brain["report"] for brain in EXPORTED],
-        [
-            path
-            for brain in EXPORTED
-            if (volume := brain["volume"])
-            for path in (volume["labels"].path, volume["surface"], volume["thickness"])
-        ],
+        files_in([[brain[kind] for kind in EXPORTED_FILES] for brain in EXPORTED]),
+        [brain["volume"]["labels"].path for brain in EXPORTED if brain["volume"]],
         long=rules.metrics_tables.output.metrics_long,
     output:
         # a file, since Snakemake writes its own file into an output folder

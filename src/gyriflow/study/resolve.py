@@ -271,22 +271,16 @@ def _compared_with(settings: ComparisonSettings, start: Brain, brains: Iterable[
 
 def _sweeps(
     config: Config,
-    swept: Iterable[Variant],
+    swept: Sequence[Variant],
     names: Mapping[str, str],
-    simulations: Iterable[Simulation],
+    simulations: Collection[Simulation],
     brains: Sequence[Brain],
 ) -> dict[str, Sweep]:
-    by_run: dict[str, list[Simulation]] = {}
-    for simulation in simulations:
-        by_run.setdefault(simulation.run, []).append(simulation)
-    members: dict[str, list[tuple[Simulation, Mapping[str, Any]]]] = {}
-    for name, run, values, _ in swept:
-        rows = [(simulation, values) for simulation in by_run.get(names[run], ())]
-        members.setdefault(name, []).extend(rows)
     sweeps = {}
-    for name, rows in members.items():
-        settings = config.studies[name]
-        observed = {simulation.start.id: _compared_with(settings, simulation.start, brains) for simulation, _ in rows}
-        if rows:
-            sweeps[name] = Sweep(name, settings.compare_week, tuple(rows), observed)
+    for name, settings in config.studies.items():
+        runs = [(names[run], values) for sweep, run, values, _ in swept if sweep == name]
+        members = [(simulation, values) for run, values in runs for simulation in simulations if simulation.run == run]
+        observed = {member.start.id: _compared_with(settings, member.start, brains) for member, _ in members}
+        if members:
+            sweeps[name] = Sweep(name, settings.compare_week, tuple(members), observed)
     return sweeps
