@@ -146,3 +146,16 @@ def test_folders_of_results_are_no_names_of_studies():
 )
 def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
     assert refusal(calibrate=CALIBRATION | change) == Facts(1, f"calibrate.{key}:", *facts)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "log"),
+    [
+        ("results/brains/{brain}/mesh/targets.{origin}.h5", "results/brains/{brain}/logs/rule.{origin}.log"),
+        ("results/study/{study}/members/{run}.csv", "results/study/{study}/logs/rule.{run}.log"),
+        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier}.{later}.log"),
+        ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
+    ],
+)
+def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(pattern, log):
+    assert log_of("rule", pattern) == log
