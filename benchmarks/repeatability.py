@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from gyriflow.compare.distances import aligned_distances
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.thickness import thickness_from_labels
 from gyriflow.compare.calibration import brain_scores, spectral_scores
+from gyriflow.compare.comparison import aligned_distances
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.poses import pose_from
 from gyriflow.geometry.triangles import TriangleMesh
