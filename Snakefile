@@ -58,7 +58,7 @@ rule all:
         rules.report.input,
 
 
-# every job runs in the environment and has a benchmark file beside its log
+# every job runs in the environment, and has a log and a benchmark file
 complete_rules(workflow.rules, ENVIRONMENT)
 rerun_on_code_changes(workflow.rules, Path(workflow.basedir, "workflow", "scripts"))
 if workflow.is_main_process:

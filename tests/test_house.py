@@ -160,15 +160,6 @@ def test_scripts_read_call_and_write():
     assert computed == []
 
 
-def test_every_rule_that_runs_something_has_a_log_and_the_environment():
-    text = "\n".join(path.read_text() for path in RULE_FILES)
-    rules = re.split(r"^ *(?:(?:use )?rule|checkpoint)\b.*:\n", text, flags=re.MULTILINE)
-    keywords = [re.findall(r"^ +(log|script|shell):", rule, flags=re.MULTILINE) for rule in rules]
-    running = [found for found in keywords if {"script", "shell"} & set(found)]
-    assert {tuple(sorted(found)) for found in running} == {("log", "script"), ("log", "shell")}
-    assert "complete_rules(workflow.rules, ENVIRONMENT)" in text
-
-
 def test_every_script_is_used_and_there():
     text = "\n".join(path.read_text() for path in RULE_FILES)
     assert set(re.findall(r"\.\./scripts/(\w+\.py)", text)) == {path.name for path in SCRIPTS}

@@ -20,8 +20,6 @@ rule calibration_design:
         scores=lambda w: CALIBRATED.scores_before(int(w.round)),
     output:
         f"{CALIBRATION}/round-{{round}}.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_design.{{round}}.log",
     wildcard_constraints:
         round=r"\d+",
     params:
@@ -35,18 +33,14 @@ rule calibration_design:
 
 rule prepare_calibrated:
     input:
+        **START_MESH,
         design=lambda w: CALIBRATED.design(w.run),
         base=lambda w: PARAMETERS.format(run=CONFIG.calibrate.base, brain=w.brain),
         maps=lambda w: simulation_of(w).maps,
-        mesh=MESH["mesh"],
-        data=MESH["data"],
         sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
     output:
+        **START_REGIONS,
         params=PARAMETERS,
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
-    log:
-        f"{RUN}/logs/prepare_calibrated.log",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
@@ -71,8 +65,6 @@ rule calibration_score:
         design=lambda w: CALIBRATED.design(w.run),
     output:
         f"{CALIBRATION}/scores/{{run}}.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_score.{{run}}.log",
     wildcard_constraints:
         run=one_of(CALIBRATED.rounds if CALIBRATED else []),
     params:
@@ -93,8 +85,6 @@ rule calibration_tables:
     output:
         runs=f"{CALIBRATION}/runs.csv",
         optimum=f"{CALIBRATION}/optimum.csv",
-    log:
-        f"{CALIBRATION}/logs/calibration_tables.log",
     params:
         bounds=lambda w: CONFIG.calibrate.parameters,
         seed=lambda w: CONFIG.calibrate.seed,

@@ -80,6 +80,12 @@ if RUNS:
 ENVIRONMENT = f"{workflow.basedir}/envs/gyriflow.yaml"
 
 
+# input files that several rules read together
+START_MESH = {name: MESH[name] for name in ("mesh", "data")}
+START_REGIONS = {"regions": REGIONS["mesh"], "data": REGIONS["data"]}
+POSED_SIDES = {**{side: PIAL[side] for side in SIDES}, "report": PIAL["report"]}
+
+
 def brain_of(wildcards):
     """Return the brain of the wildcards."""
     return study.brains[wildcards.brain]

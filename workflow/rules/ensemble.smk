@@ -32,8 +32,6 @@ rule ensemble:
         summaries=lambda w: [member.file(FOLDING["summary"]) for member in ensemble_of(w)[1]],
     output:
         ENSEMBLE,
-    log:
-        f"{RUN}/logs/ensemble.log",
     script:
         "../scripts/ensemble.py"
 
@@ -46,32 +44,12 @@ def rows_of_ensemble(wildcards):
 
 rule ensemble_maps:
     input:
-        surfaces=lambda w: [file for row in rows_of_ensemble(w) for file in row.hemispheres],
-        maps=lambda w: [file for row in rows_of_ensemble(w) for file in row.maps],
+        surfaces=lambda w: [row.parts[w.side] for row in rows_of_ensemble(w)],
+        maps=lambda w: [f"{row.folder}/{w.side}.shape.gii" for row in rows_of_ensemble(w)],
     output:
-        **ensemble_maps(*SIDES),
-    log:
-        f"{RUN}/logs/ensemble_maps.{WEEK}.log",
-    wildcard_constraints:
-        brain=brains_with(*SIDES),
-    params:
-        sides=lambda w: brain_of(w).sides,
+        ENSEMBLE_MAPS,
     script:
         "../scripts/ensemble_maps.py"
-
-
-use rule ensemble_maps as ensemble_maps_left with:
-    output:
-        **ensemble_maps("left"),
-    wildcard_constraints:
-        brain=brains_with("left"),
-
-
-use rule ensemble_maps as ensemble_maps_right with:
-    output:
-        **ensemble_maps("right"),
-    wildcard_constraints:
-        brain=brains_with("right"),
 
 
 rule growth_sd:
@@ -84,7 +62,5 @@ rule growth_sd:
         ],
     output:
         GROWTH_SD,
-    log:
-        f"{RUN}/logs/growth_sd.log",
     script:
         "../scripts/growth_sd.py"

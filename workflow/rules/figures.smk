@@ -21,8 +21,6 @@ for name, jobs in by_rule(FIGURES).items():
             lambda wildcards, drawn=drawn: files_in(list(map(inputs_of, drawn(wildcards)))),
         output:
             [file for kind in kinds for file in kind.outputs],
-        log:
-            figure_log(name, kinds[0].file),
         wildcard_constraints:
             **{key: one_of(dict.fromkeys(job[0].names[key] for job in jobs)) for key in jobs[0][0].wildcards},
         conda:

@@ -29,17 +29,15 @@ rule prepare:
         lambda w: [
             file for files in map_sources(w).values() for kind in ("map", "surface") for file in files[kind]
         ],
-        mesh=MESH["mesh"],
-        data=MESH["data"],
+        **START_MESH,
         surface=PIAL["report"],
         curves=lambda w: simulation_of(w).curves,
         targets=lambda w: simulation_of(w).targets,
         # the simulated brain has the hemispheres of its start brain
         sides=lambda w: [PIAL[side].format(brain=w.brain) for side in brain_of(w).sides],
     output:
+        **START_REGIONS,
         params=PARAMETERS,
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
     log:
         f"{RUN}/logs/prepare.log",
     wildcard_constraints:
@@ -57,10 +55,9 @@ rule prepare:
 
 use rule prepare as prepare_with_maps with:
     output:
+        **START_REGIONS,
         maps=MAPS,
         params=PARAMETERS,
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
     wildcard_constraints:
         run=prepared_runs(with_maps=True),
 
@@ -163,8 +160,6 @@ rule growth_maps:
         params=PARAMETERS,
     output:
         GROWTH_MAPS,
-    log:
-        f"{RUN}/logs/growth_maps.log",
     script:
         "../scripts/growth_maps.py"
 

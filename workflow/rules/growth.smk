@@ -11,8 +11,6 @@ rule growth_rates:
         thickness=expand(THICKNESS["summary"], brain=WITH_THICKNESS),
     output:
         **GROWTH,
-    log:
-        f"{STUDY}/logs/growth_rates.log",
     params:
         series=[series for series, _ in study.growth_brains],
         brains=[brain.id for _, brain in study.growth_brains],
@@ -28,8 +26,6 @@ rule growth_curves:
         GROWTH["areas"],
     output:
         **CURVES,
-    log:
-        f"{STUDY}/logs/growth_curves.log",
     script:
         "../scripts/growth_curves.py"
 

@@ -1,13 +1,12 @@
 # Tetrahedral meshes of start brains.
 from gyriflow.running.path_store import PATH_MESH_SETTINGS
 
+
 rule tetrahedralise:
     input:
         PIAL["whole"],
     output:
         **MESH,
-    log:
-        f"{BRAIN}/logs/tetrahedralise.log",
     priority: 1
     resources:
         mem_mb=6000,
@@ -24,8 +23,6 @@ rule tetrahedralise:
 use rule tetrahedralise as path_mesh with:
     output:
         **PATH_MESH,
-    log:
-        f"{BRAIN}/logs/path_mesh.log",
     params:
         settings=PATH_MESH_SETTINGS.model_dump(exclude={"max_surface_distance_mm"}),
         gates=PATH_MESH_SETTINGS.gates,

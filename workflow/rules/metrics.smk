@@ -29,9 +29,8 @@ rule measure:
 # also writes the surfaces: the facets of the start brain's hemispheres
 rule measure_simulated:
     input:
+        **START_REGIONS,
         frames=FOLDING["frames"],
-        regions=REGIONS["mesh"],
-        data=REGIONS["data"],
     output:
         **folded_of(*SIDES),
         **measures_in(f"{RUN}/metrics/{WEEK}", *SIDES),

@@ -29,8 +29,6 @@ rule brain_figures:
         small=f"{BRAIN}/figures/small.png",
         small_pdf=f"{BRAIN}/figures/small.pdf",
         row=f"{BRAIN}/quality.json",
-    log:
-        f"{BRAIN}/logs/brain_figures.log",
     params:
         white_files=lambda w: brain_of(w).config.white_files,
         labels=lambda w: brain_of(w).labels,
@@ -46,8 +44,6 @@ rule quality_table:
         expand(rules.brain_figures.output.row, brain=study.brains),
     output:
         f"{STUDY}/quality.csv",
-    log:
-        f"{STUDY}/logs/quality_table.log",
     params:
         refused=[
             *(quality_columns(name) | {"cause": cause, "page": None} for name, cause in REFUSED.items()),

@@ -6,13 +6,9 @@ from gyriflow.settings.atlas import SULCI
 rule given_regions:
     input:
         unpack(lambda w: CONFIG.metrics.regions[w.brain].files),
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
+        **POSED_SIDES,
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/given_regions.log",
     wildcard_constraints:
         brain=brains_with(regions_from="given"),
     params:
@@ -36,15 +32,11 @@ def regions_to_carry(wildcards):
 rule carried_regions:
     input:
         unpack(regions_to_carry),
+        **POSED_SIDES,
         given_report=lambda w: region_pair(w)[0].report,
         correspondence=lambda w: study.series.correspondence(*region_pair(w)),
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/carried_regions.log",
     wildcard_constraints:
         brain=brains_with(regions_from="carried"),
     params:
@@ -55,16 +47,12 @@ rule carried_regions:
 
 rule named_sulci:
     input:
+        **POSED_SIDES,
         volume=lambda w: brain_of(w).registered.path,
-        left=PIAL["left"],
-        right=PIAL["right"],
-        report=PIAL["report"],
         drawing=SULCI / "sulci.yaml",
         drawn=SULCI / "sulci.nii.gz",
     output:
         **region_files(f"{BRAIN}/metrics"),
-    log:
-        f"{BRAIN}/logs/named_sulci.log",
     wildcard_constraints:
         brain=brains_with(regions_from="named"),
     params:
@@ -82,8 +70,6 @@ rule simulated_regions:
         right=PIAL["right"],
     output:
         **region_files(f"{RUN}/metrics"),
-    log:
-        f"{RUN}/logs/simulated_regions.log",
     wildcard_constraints:
         brain=brains_with(has_regions=True),
     script:
@@ -103,8 +89,6 @@ rule region_metrics:
         right_maps=f"{PLACE}/right.shape.gii",
     output:
         f"{PLACE}/regions.csv",
-    log:
-        f"{PLACE}/logs/region_metrics.log",
     wildcard_constraints:
         where=one_of(where for where, row in study.all_measurements.items() if row.regions),
     params:
@@ -142,8 +126,6 @@ rule template_maps:
         maps=f"{PLACE}/{{side}}.shape.gii",
     output:
         TEMPLATE_MAPS,
-    log:
-        f"{PLACE}/logs/template_maps.{{side}}.log",
     wildcard_constraints:
         where=one_of(study.measurements),
     params:

@@ -27,8 +27,6 @@ rule filled_labels:
         similar=lambda w: similar_thickness(brain_of(w)),
     output:
         FILLED_LABELS,
-    log:
-        f"{BRAIN}/logs/filled_labels.log",
     params:
         white=lambda w: brain_of(w).config.white_files,
     script:
@@ -46,8 +44,6 @@ rule register:
         images=lambda w: [brain.config.image for brain in pair_of(w) if brain.config.image],
     output:
         REGISTERED,
-    log:
-        f"{STUDY}/logs/register.{{earlier}}.{{later}}.log",
     wildcard_constraints:
         smoothing=r"\d\.\d+",
         seed=r"\d+",
@@ -66,8 +62,6 @@ rule register:
 use rule register as register_varied with:
     output:
         VARIED_REGISTRATION,
-    log:
-        f"{STUDY}/logs/register.{{earlier}}.{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.log",
 
 
 # the original surfaces with all their vertices, in the pose of the mesh
@@ -77,8 +71,6 @@ rule match_surfaces:
         reports=lambda w: [brain.report for brain in pair_of(w)],
     output:
         MATCHED,
-    log:
-        f"{STUDY}/logs/match_surfaces.{{earlier}}.{{later}}.log",
     params:
         files=lambda w: [brain.config.files for brain in pair_of(w)],
     script:
@@ -104,16 +96,13 @@ def followers_of(wildcards):
 # shapes of a start brain's mesh in the later weeks of its own series, for runs that grow towards them
 rule targets:
     input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
+        **START_MESH,
         report=PIAL["report"],
         correspondences=lambda w: chain_of(w).correspondences,
         surfaces=lambda w: [brain.pial for brain in chain_of(w).later],
         reports=lambda w: [brain.report for brain in chain_of(w).later],
     output:
         TARGETS,
-    log:
-        f"{BRAIN}/logs/targets.{{origin}}.log",
     wildcard_constraints:
         origin=origins("self"),
     priority: 1
@@ -153,8 +142,6 @@ use rule targets as atlas_path with:
         unpack(path_inputs),
     output:
         ATLAS_PATH,
-    log:
-        f"{BRAIN}/logs/atlas_path.log",
     wildcard_constraints:
         brain=one_of(PATHS),
     resources:
@@ -174,8 +161,7 @@ def atlas_of(wildcards):
 # shapes that a start brain would have in later weeks if it grew as an atlas
 rule predicted_targets:
     input:
-        mesh=MESH["mesh"],
-        data=MESH["data"],
+        **START_MESH,
         path=lambda w: ATLAS_PATH.format(brain=chain_of(w).path.brains[0].id),
         correspondence=lambda w: chain_of(w).correspondences,
         reports=lambda w: [PIAL["report"], atlas_of(w).report],

@@ -38,8 +38,6 @@ rule study_records:
         methods=f"{REPORT}/methods.rst",
         # the configuration with the paths of its files
         config=f"{REPORT}/config.yaml",
-    log:
-        f"{STUDY}/logs/study_records.log",
     params:
         config=USED_SETTINGS,
         # also refused brains
@@ -128,8 +126,6 @@ rule html_report:
         report=f"{REPORT}/report.html",
         brains=expand(f"{REPORT}/brains/{{brain}}.html", brain=study.brains),
         view=f"{REPORT}/surfaces.json",
-    log:
-        f"{REPORT}/logs/html_report.log",
     params:
         figures=ON_PAGE[None],
         brain_figures={brain: ON_PAGE[brain] for brain in study.brains},

@@ -34,8 +34,6 @@ rule compare_member:
     output:
         table=COMPARED_MEMBER,
         coefficients=MEMBER_COEFFICIENTS,
-    log:
-        f"{SWEEP}/logs/compare_member.{{run}}.{{brain}}.log",
     params:
         real=lambda w: {real.id: real.population for real in study.sweeps[w.study].observed[w.brain]},
         population=lambda w: brain_of(w).population,
@@ -56,8 +54,6 @@ rule study_tables:
         members=f"{SWEEP}/members.csv",
         comparison=f"{SWEEP}/comparison.csv",
         nearest=f"{SWEEP}/nearest.csv",
-    log:
-        f"{SWEEP}/logs/study_tables.log",
     params:
         members=lambda w: [
             {"run": simulation.run, "subject": simulation.start.id, "values": dict(values)}
@@ -91,8 +87,6 @@ rule replication:
         csv=f"{STUDY}/replication.csv",
         page=f"{STUDY}/replication.html",
         nearest=f"{STUDY}/paper_nearest.csv",
-    log:
-        f"{STUDY}/logs/replication.log",
     params:
         studies={
             name: {"varied": list(asked.vary), "week": asked.compare_week}

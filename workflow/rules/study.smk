@@ -27,8 +27,6 @@ rule metrics_tables:
     output:
         **{name: f"{STUDY}/{name}.csv" for name in METRICS_TABLES},
         norms=f"{STUDY}/norms.json",
-    log:
-        f"{STUDY}/logs/metrics_tables.log",
     params:
         labelled=[(brain.id, brain.week, brain.sides, brain.labels.scheme) for brain in LABELLED],
         scans=study.scans,
@@ -53,8 +51,6 @@ rule run_tables:
         csv=f"{STUDY}/runs.csv",
         table=f"{STUDY}/runs.html",
         displacement=f"{STUDY}/displacement.csv",
-    log:
-        f"{STUDY}/logs/run_tables.log",
     params:
         folded=study.pairs,
         growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],
@@ -63,26 +59,17 @@ rule run_tables:
 
 
 EXPORTED = study.exported
+EXPORTED_FILES = (
+    *("surfaces", "maps", "regions", "report", "white", "white_maps"),
+    *("template_maps", "volume"),
+)
 
 
 # a separate target
 rule export:
     input:
-        [
-            list(brain[kind].values())
-            for brain in EXPORTED
-            for kind in (
-                *("surfaces", "maps", "regions"),
-                *("white", "white_maps", "template_maps"),
-            )
-        ],
-        [brain["report"] for brain in EXPORTED],
-        [
-            path
-            for brain in EXPORTED
-            if (volume := brain["volume"])
-            for path in (volume["labels"].path, volume["surface"], volume["thickness"])
-        ],
+        files_in([[brain[kind] for kind in EXPORTED_FILES] for brain in EXPORTED]),
+        [brain["volume"]["labels"].path for brain in EXPORTED if brain["volume"]],
         long=rules.metrics_tables.output.metrics_long,
     output:
         # a file, since Snakemake writes its own file into an output folder

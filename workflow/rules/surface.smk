@@ -40,8 +40,6 @@ def pial_settings(wildcards):
 rule shape:
     output:
         SHAPE,
-    log:
-        f"{BRAIN}/logs/shape.log",
     wildcard_constraints:
         brain=brains_with(source="shape"),
     params:

@@ -7,8 +7,6 @@ rule prepared_surfaces:
         start=PIAL["whole"],
     output:
         **PREPARED,
-    log:
-        f"{STUDY}/logs/prepared_surfaces.{{brain}}.{WEEK}.log",
     params:
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
@@ -20,65 +18,65 @@ def prepared_files(start, weeks):
     return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in PREPARED.items()}
 
 
+def compared_files(wildcards):
+    """Return the surfaces of a run and those that they are compared with, by kind, one per week."""
+    run = simulation_of(wildcards)
+    return {
+        **prepared_files(wildcards.brain, run.observed),
+        "simulated": [run.at(week).parts["whole"] for week in run.observed],
+        "whole": [real.pial for real in run.observed.values()],
+    }
+
+
+# of both rules that compare a run
+COMPARED = {
+    "start_week": lambda w: brain_of(w).week,
+    "weeks": lambda w: list(simulation_of(w).observed),
+    "observed": lambda w: [brain.id for brain in simulation_of(w).observed.values()],
+    "kind": lambda w: simulation_of(w).kind,
+    "curvature_radius_mm": CONFIG.metrics.curvature_radius_mm,
+}
+
+
 rule validation:
     input:
-        unpack(lambda w: prepared_files(w.brain, simulation_of(w).observed)),
-        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).observed],
-        whole=lambda w: [real.pial for real in simulation_of(w).observed.values()],
+        unpack(compared_files),
         params=PARAMETERS,
         # reference for the errors of runs that follow no curve
         curves=lambda w: (CURVES["curves"] if simulation_of(w).series else []),
     output:
         table=VALIDATION,
-    log:
-        f"{RUN}/logs/validation.log",
     params:
-        start_week=lambda w: brain_of(w).week,
+        **COMPARED,
         series=lambda w: simulation_of(w).series,
-        weeks=lambda w: list(simulation_of(w).observed),
         run=lambda w: w.run,
-        observed=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
-        kind=lambda w: simulation_of(w).kind,
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/validation.py"
 
 
 rule prediction:
     input:
-        unpack(lambda w: prepared_files(w.brain, simulation_of(w).observed)),
-        simulated=lambda w: [simulation_of(w).at(week).parts["whole"] for week in simulation_of(w).observed],
-        whole=lambda w: [real.pial for real in simulation_of(w).observed.values()],
+        unpack(compared_files),
+        **START_MESH,
         atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
-        mesh=MESH["mesh"],
-        data=MESH["data"],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         PREDICTION,
-    log:
-        f"{RUN}/logs/prediction.log",
     params:
-        start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: list(simulation_of(w).observed),
-        observed=lambda w: [brain.id for brain in simulation_of(w).observed.values()],
-        kind=lambda w: simulation_of(w).kind,
+        **COMPARED,
         atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
         of_atlas=lambda w: simulation_of(w).is_atlas_prediction,
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
         "../scripts/prediction.py"
 
 
 rule atlas_brain:
     input:
+        **START_MESH,
         predicted=lambda w: simulation_of(w).at(float(w.week)).parts["whole"],
-        mesh=MESH["mesh"],
-        data=MESH["data"],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
         ATLAS_BRAIN,
-    log:
-        f"{RUN}/logs/atlas_brain.{WEEK}.log",
     params:
         week=lambda w: float(w.week),
     script:
@@ -113,8 +111,6 @@ rule deviation:
         regions=lambda w: list(deviating(w)["expected"].regions.values()),
     output:
         **DEVIATION,
-    log:
-        f"{RUN}/logs/deviation.{WEEK}.log",
     params:
         sides=lambda w: brain_of(w).sides,
         labels=deviation_labels,
@@ -131,16 +127,13 @@ def ceiling_weeks(brain):
 rule registration_ceiling:
     input:
         unpack(lambda w: prepared_files(w.brain, ceiling_weeks(w.brain))),
+        **START_MESH,
         whole=lambda w: [study.references[w.brain, week][0].pial for week in ceiling_weeks(w.brain)],
-        mesh=MESH["mesh"],
-        data=MESH["data"],
         report=PIAL["report"],
         correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         table=CEILING,
         carried=CARRIED_MESH,
-    log:
-        f"{STUDY}/logs/registration_ceiling.{{brain}}.log",
     resources:
         mem_mb=8000,
     params:
@@ -175,8 +168,6 @@ rule onset:
         correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
     output:
         ONSET,
-    log:
-        f"{RUN}/logs/onset.log",
     params:
         sides=lambda w: brain_of(w).sides,
         radius_mm=CONFIG.metrics.curvature_radius_mm,
@@ -214,8 +205,6 @@ rule validation_tables:
         carried=[simulation.file(CARRIED_MESH) for simulation in study.validated_registered],
     output:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
-    log:
-        f"{STUDY}/logs/validation_tables.log",
     params:
         individuals=study.are_individuals(
             {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}

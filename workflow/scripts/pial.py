@@ -4,13 +4,7 @@ from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_shape, fro
 from gyriflow.anatomy.thickness import thickness_from_labels, thickness_from_white
 from gyriflow.io.downloads import require_checksums
 from gyriflow.io.files import write_json
-from gyriflow.io.surfaces import (
-    read_hemispheres,
-    read_pose,
-    read_surface,
-    write_brain,
-    write_vertex_maps,
-)
+from gyriflow.io.surfaces import read_hemispheres, read_pose, read_surface, write_brain, write_vertex_maps
 from gyriflow.step import step
 
 output, params = snakemake.output, snakemake.params

@@ -2,13 +2,7 @@
 
 from gyriflow.anatomy.thickness import white_from_labels, white_from_surfaces
 from gyriflow.io.files import write_table
-from gyriflow.io.surfaces import (
-    STRUCTURES,
-    read_pose,
-    read_surface,
-    write_surface,
-    write_vertex_maps,
-)
+from gyriflow.io.surfaces import STRUCTURES, read_pose, read_surface, write_surface, write_vertex_maps
 from gyriflow.metrics.measure import measure_white
 from gyriflow.settings.terms import SIDES
 from gyriflow.step import step

@@ -16,6 +16,7 @@ from unittest.mock import patch
 from ..code_hash import code_hash
 from ..io.files import files_below, sha256_of
 from ..shipped import SHIPPED
+from ..study.paths import log_of
 
 REMOVED = (".csv", ".html", ".png", ".pdf")
 DATE_TOL_S = 0.001
@@ -37,12 +38,18 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
 
 
 def complete_rules(rules: Iterable[Any], environment: str) -> None:
-    """Give rules that name no environment the common one, and a benchmark file named like their log.
+    """Give rules a log (see `log_of`), and rules that name no environment the common one and a benchmark file.
 
     For Snakemake's software deployment with conda, `environment` is the path of the environment's file.
     """
+    from snakemake.io import strip_wildcard_constraints
+
     for rule in rules:
-        if (rule.script or rule.shellcmd) and not rule.conda_env:
+        runs = rule.script or rule.shellcmd
+        if runs and not rule.log:
+            rule.log_modifier = rule.output_modifier
+            rule.set_log(log_of(rule.name, strip_wildcard_constraints(rule.output[0])))
+        if runs and not rule.conda_env:
             rule.conda_env, rule.benchmark_modifier = environment, rule.log_modifier
             rule.benchmark = rule.log[0].replace("/logs/", "/benchmarks/").removesuffix(".log") + ".tsv"
 

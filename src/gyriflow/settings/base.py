@@ -135,13 +135,8 @@ def validated[Kind: BaseModel](kind: type[Kind], raw: Any, where: str) -> Kind:
 
 def line(path: Key, text: str) -> str:
     """Return a problem as a line, such as `brains[0].week: Field required`."""
-    return f"{dotted(path)}: {text}"
-
-
-def dotted(path: Key) -> str:
-    """Return the path of a key as it is written, such as `brains[0].week`."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.removeprefix(".")
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return f"{key.removeprefix('.')}: {text}"
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:

@@ -13,16 +13,7 @@ from .base import KeyProblem, Settings, line, refused, validated
 from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
-from .varying import (
-    Maps,
-    Varying,
-    VaryingNumber,
-    bounds_of,
-    map_of,
-    require_bounds,
-    value_range,
-    varying,
-)
+from .varying import Maps, Varying, VaryingNumber, bounds_of, map_of, require_bounds, value_range, varying
 from .weeks import EndWeek, Week
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ..settings.weeks import TENTHS, WeekNotation, read_week
@@ -83,7 +83,7 @@ class TableAge:
 class ScanAge:
     """The age of a scan in weeks with its source and columns, or None with the cause.
 
-    `named` is its text if it is from a name.
+    `named` is its text if it is from a name. `values` are the other values of the scan in tables by column.
     """
 
     week: float | None
@@ -91,6 +91,7 @@ class ScanAge:
     cause: str = ""
     columns: frozenset[str] = frozenset()
     named: str = ""
+    values: Mapping[str, str] = field(default_factory=dict)
 
 
 def column_key(name: str) -> str:

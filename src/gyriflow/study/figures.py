@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
-from .paths import DEVIATION, FOLDING, MESH, PUBLISHED, ensemble_maps
+from .paths import DEVIATION, ENSEMBLE_MAPS, FOLDING, MESH, PUBLISHED
 from .records import Brain, Measurement, Simulation, Sweep
 from .registry import (
     Arguments,
@@ -157,7 +157,7 @@ def position_spread_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for simulation in study.with_ensemble:
         weeks = {}
         for row in simulation.measurements[1:]:
-            maps = [simulation.file(file, week=row.week) for file in ensemble_maps(*row.sides).values()]
+            maps = [simulation.file(ENSEMBLE_MAPS, week=row.week, side=side) for side in row.sides]
             weeks[row.week] = [list(pair) for pair in zip(row.hemispheres, maps, strict=True)]
         yield Figure(kind, simulation.names, {"brains": {simulation.run: weeks}})
 

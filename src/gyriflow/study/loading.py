@@ -19,22 +19,11 @@ from .participants import participants_brains
 
 
 def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool = False) -> Config:
-    """Return the validated configuration, with input files as absolute paths.
+    """Return the validated configuration, as read from YAML, with input files as absolute paths.
 
-    Parameters
-    ----------
-    raw
-        The configuration as read from YAML.
-    base_dir
-        Folder of the configuration file, for relative paths.
-    keep_going
-        Whether rows of `participants` without age or data are left out, as `Config.left_out`; else they are problems.
-
-    Raises
-    ------
-    InputError
-        With all problems of single keys, or if there are none all problems between keys; each with its key, the value
-        found and the values allowed.
+    Paths are relative to the folder `base_dir` of the configuration. With `keep_going`, rows of `participants` without
+    age or data are left out (`Config.left_out`); else they are problems. InputError with all problems of single keys,
+    or if there are none all problems between keys; each with its key, the value found and the values allowed.
     """
     folder = Path(base_dir)
     plain = _plain(raw)

@@ -103,14 +103,6 @@ class Table:
         return f"{problems[0]}; {columns}" if len(problems) == len(self.ages) else ""
 
 
-@dataclass(frozen=True)
-class ScanFacts:
-    """The age of a scan in tables, and its other values by column."""
-
-    age: ScanAge
-    values: Mapping[str, str]
-
-
 def read_table_of_scans(path: Path) -> Table:
     """Return a table of participants or sessions; InputError if it cannot be read or has no ids.
 
@@ -215,8 +207,8 @@ class ScanTables:
 
     def facts(
         self, subject: str, session: str | None, is_only_scan: bool = True, place: Path | None = None
-    ) -> ScanFacts | None:
-        """Return the age and values of a scan in the tables for a file, or None if they have no row of its subject.
+    ) -> ScanAge | None:
+        """Return a scan's age and values in the tables for a file, or None if they have no row of its subject.
 
         A row without a session is of a subject's only scan.
         """
@@ -230,7 +222,8 @@ class ScanTables:
             (session,) = sessions
         elif session is None and sessions:
             rows = ", ".join(f"{row.place} ({row.session})" for _, row in own if row.session is not None)
-            return _unknown(f"its name has no session; found {rows}; expected ses-… in the name, as in session_id")
+            cause = f"its name has no session; found {rows}; expected ses-… in the name, as in session_id"
+            return ScanAge(None, cause=cause)
         is_only_scan &= len({*sessions, session} - {None}) < 2
         ages: list[TableAge] = []
         values: dict[str, str] = {}
@@ -238,7 +231,7 @@ class ScanTables:
             rows_of_scan = [(table, row) for table, row in own if row.session == label]
             for table in self.tables:
                 if difference := _difference([row for owner, row in rows_of_scan if owner is table]):
-                    return _unknown(difference)
+                    return ScanAge(None, cause=difference)
             is_shared = label != session and not is_only_scan
             ages += [replace(age, is_shared=is_shared) for table, row in rows_of_scan for age in table.ages_in(row)]
             values |= {key: text for _, row in rows_of_scan for key, text in row.values.items()}
@@ -246,10 +239,10 @@ class ScanTables:
         # a table that cannot be read may have the age of exactly this scan
         is_certain = age.week is not None and any(age.has_session for age in ages)
         if unread := [table for table in unread if table.subject or not is_certain]:
-            return _unknown(unread[0].problem)
+            return ScanAge(None, cause=unread[0].problem)
         if age.week is None and not age.cause:
-            return _unknown(_missing_age(own, ages, session, sessions))
-        return ScanFacts(age, {key: text for key, text in values.items() if key not in age.columns})
+            return ScanAge(None, cause=_missing_age(own, ages, session, sessions))
+        return replace(age, values={key: text for key, text in values.items() if key not in age.columns})
 
 
 def _applies(table: Table, place: Path | None) -> bool:
@@ -262,10 +255,6 @@ def ambiguity_of(texts: Iterable[str]) -> str:
         choice = "--decimal-weeks or --weeks-days (in a configuration, participants.ages: decimal or days)"
         return f"ages such as {', '.join(examples)} may be decimals, or weeks and days; choose {choice}"
     return ""
-
-
-def _unknown(cause: str) -> ScanFacts:
-    return ScanFacts(ScanAge(None, cause=cause), {})
 
 
 def _missing_age(
@@ -326,11 +315,11 @@ def participants_brains(
             facts = tables.facts(subject, session, len(sessions) < 2)
             assert facts is not None
             entry, problem = _entry(scan, name, session, facts, settings.columns, path.parent)
-            if problem := facts.age.cause or problem:
-                left_out[scan] = {"week": facts.age.week, "cause": f"{path}: {scan}: {problem}"}
+            if problem := facts.cause or problem:
+                left_out[scan] = {"week": facts.week, "cause": f"{path}: {scan}: {problem}"}
             else:
                 entries.append(entry)
-                sources[scan] = facts.age.source
+                sources[scan] = facts.source
     by_files: dict[str, list[dict[str, Any]]] = {}
     for entry in entries:
         by_files.setdefault(repr([entry["subject"], *(entry.get(key) for key in SOURCES)]), []).append(entry)
@@ -370,7 +359,7 @@ def covariates(values: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def _entry(
-    scan: str, name: str, session: str | None, facts: ScanFacts, columns: Mapping[str, str], folder: Path
+    scan: str, name: str, session: str | None, facts: ScanAge, columns: Mapping[str, str], folder: Path
 ) -> tuple[dict[str, Any], str]:
     names = {"id": scan, "subject": name, "session": f"ses-{session}" if session else "n/a"}
     added = {
@@ -379,7 +368,7 @@ def _entry(
     # after the table's columns, and without replacing them
     texts = {**facts.values, **added, **facts.values}
     values = {key: text for key, text in texts.items() if not is_missing(text)}
-    entry: dict[str, Any] = {"id": scan, "week": facts.age.week, "subject": name, **covariates(values)}
+    entry: dict[str, Any] = {"id": scan, "week": facts.week, "subject": name, **covariates(values)}
     if FILES in values:
         files, side = [part.strip() for part in values[FILES].split(";")], values.get(SIDE)
         limit, expected = (2, "at most a left and a right hemisphere") if side is None else (1, "the file of this side")

@@ -67,11 +67,6 @@ def region_files(folder: str) -> dict[str, str]:
     return {f"{side}_regions": f"{folder}/{side}.regions.label.gii" for side in SIDES}
 
 
-def ensemble_maps(*sides: Side) -> dict[str, str]:
-    """Return the files with maps of an ensemble's spread at a week, by hemisphere."""
-    return {side: f"{RUN}/metrics/{WEEK}/{side}.ensemble.shape.gii" for side in sides}
-
-
 SHAPE = f"{BRAIN}/surface/shape.surf.gii"
 PIAL = pial_of(*SIDES)
 THICKNESS = {
@@ -121,6 +116,8 @@ PREPARED = {
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
 """The atlas' own brain beside a prediction: aligned with it, with its volume."""
+ENSEMBLE_MAPS = f"{RUN}/metrics/{WEEK}/{{side}}.ensemble.shape.gii"
+"""Maps of the spread of an ensemble on a hemisphere."""
 GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"
 """Standard deviation of the growth maps of an ensemble."""
 ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
@@ -138,8 +135,9 @@ def one_of(names: Iterable[str]) -> str:
     return "|".join(map(re.escape, names)) or r"(?!)"
 
 
-def figure_log(rule: str, pattern: str) -> str:
-    """Return the log of a figure, named by its rule and the wildcards that are not in the folder."""
-    folder = next(place for place in (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT) if pattern.startswith(f"{place}/"))
+def log_of(rule: str, pattern: str) -> str:
+    """Return the log of a rule that makes a file: named by the rule and the wildcards that are not in the folder."""
+    folders = (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT, PLACE)
+    folder = next(place for place in folders if pattern.startswith(f"{place}/"))
     wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
     return f"{folder}/logs/{'.'.join([rule, *wildcards])}.log"

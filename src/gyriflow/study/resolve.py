@@ -145,8 +145,34 @@ def _simulations(
     """
     simulations: dict[tuple[str, str], Simulation] = {}
 
-    def add(run: str, start: Brain, settings: Run, weeks: Iterable[float], member_of: str | None = None) -> Simulation:
-        simulation = _simulation(config, run, start, settings, weeks, member_of, series, chains, brains)
+    def add(run: str, start: Brain, settings: Run, weeks: Sequence[float], member_of: str | None = None) -> Simulation:
+        """Add a simulation, unless there is one of that name, with the brains that it is compared with."""
+        # the run is also compared with brains of other subjects if it grows towards them
+        targets = [brain for brain in chains[start.id, "self"].later if brain.sides == start.sides]
+        candidates = list(dict.fromkeys([*start.comparable(brains), *targets]))
+        candidates.sort(key=lambda brain: brain.subject != start.subject)
+        by_week = {week: tuple(brain for brain in candidates if brain.week == week) for week in weeks[1:]}
+        measured = {
+            week: [brain for brain in same_week if not brain.config.synthetic] for week, same_week in by_week.items()
+        }
+        scans = [brain for brain in brains if start.config.subject is not None and brain.subject == start.subject]
+        later = {brain for brain in (*candidates, *scans) if brain.week > start.week}
+        growth = settings.growth
+        is_atlas_prediction = growth.shapes == "atlas" and later.isdisjoint(chains[start.id, "atlas"].later)
+        simulation = Simulation(
+            run=run,
+            start=start,
+            settings=settings,
+            weeks=tuple(weeks),
+            series=series.for_sizes(start),
+            base=config.calibrate.base if config.calibrate and run in config.calibrate.runs else run,
+            member_of=member_of,
+            observed_brains={week: same_week for week, same_week in by_week.items() if same_week},
+            observed={week: found[0] for week, found in measured.items() if found and not start.config.synthetic},
+            kind="explained" if not is_atlas_prediction and (growth.shapes or growth.follows_sizes) else "predicted",
+            is_atlas_prediction=is_atlas_prediction,
+            has_regions=start.has_regions and run in config.runs,
+        )
         return simulations.setdefault((run, start.id), simulation)
 
     predicted = {start for name, start, run in folded if name in config.runs and run.growth.shapes == "atlas"}
@@ -235,52 +261,6 @@ def _missing_brains(name: str, start: Brain, run: Run, series: Series, chains: C
     return InputError(text, found=available, expected=expected, remedy=remedy)
 
 
-def _simulation(
-    config: Config,
-    run: str,
-    start: Brain,
-    settings: Run,
-    weeks: Iterable[float],
-    member_of: str | None,
-    series: Series,
-    chains: Chains,
-    brains: Sequence[Brain],
-) -> Simulation:
-    """Return a simulation with the brains that it is compared with."""
-    weeks = tuple(weeks)
-    # the run is also compared with brains of other subjects if it grows towards them
-    targets = [brain for brain in chains[start.id, "self"].later if brain.sides == start.sides]
-    candidates = list(dict.fromkeys([*start.comparable(brains), *targets]))
-    candidates.sort(key=lambda brain: brain.subject != start.subject)
-    by_week = {week: tuple(brain for brain in candidates if brain.week == week) for week in weeks[1:]}
-    observed_brains = {week: same_week for week, same_week in by_week.items() if same_week}
-    observed = {
-        week: not_synthetic[0]
-        for week, same_week in observed_brains.items()
-        if (not_synthetic := [brain for brain in same_week if not brain.config.synthetic])
-    }
-    scans = [brain for brain in brains if start.config.subject is not None and brain.subject == start.subject]
-    growth_brains = chains[start.id, "atlas"].later
-    growth = settings.growth
-    is_atlas_prediction = growth.shapes == "atlas" and not any(
-        brain.week > start.week for brain in (*candidates, *scans) if brain in growth_brains
-    )
-    return Simulation(
-        run=run,
-        start=start,
-        settings=settings,
-        weeks=weeks,
-        series=series.for_sizes(start),
-        base=config.calibrate.base if config.calibrate and run in config.calibrate.runs else run,
-        member_of=member_of,
-        observed_brains=observed_brains,
-        observed={} if start.config.synthetic else observed,
-        kind="explained" if not is_atlas_prediction and (growth.shapes or growth.follows_sizes) else "predicted",
-        is_atlas_prediction=is_atlas_prediction,
-        has_regions=start.has_regions and run in config.runs,
-    )
-
-
 def _compared_with(settings: ComparisonSettings, start: Brain, brains: Iterable[Brain]) -> tuple[Brain, ...]:
     if settings.compare_with is not None:
         return tuple(brain for brain in brains if brain.id in settings.compare_with)
@@ -291,22 +271,16 @@ def _compared_with(settings: ComparisonSettings, start: Brain, brains: Iterable[
 
 def _sweeps(
     config: Config,
-    swept: Iterable[Variant],
+    swept: Sequence[Variant],
     names: Mapping[str, str],
-    simulations: Iterable[Simulation],
+    simulations: Collection[Simulation],
     brains: Sequence[Brain],
 ) -> dict[str, Sweep]:
-    by_run: dict[str, list[Simulation]] = {}
-    for simulation in simulations:
-        by_run.setdefault(simulation.run, []).append(simulation)
-    members: dict[str, list[tuple[Simulation, Mapping[str, Any]]]] = {}
-    for name, run, values, _ in swept:
-        rows = [(simulation, values) for simulation in by_run.get(names[run], ())]
-        members.setdefault(name, []).extend(rows)
     sweeps = {}
-    for name, rows in members.items():
-        settings = config.studies[name]
-        observed = {simulation.start.id: _compared_with(settings, simulation.start, brains) for simulation, _ in rows}
-        if rows:
-            sweeps[name] = Sweep(name, settings.compare_week, tuple(rows), observed)
+    for name, settings in config.studies.items():
+        runs = [(names[run], values) for sweep, run, values, _ in swept if sweep == name]
+        members = [(simulation, values) for run, values in runs for simulation in simulations if simulation.run == run]
+        observed = {member.start.id: _compared_with(settings, member.start, brains) for member, _ in members}
+        if members:
+            sweeps[name] = Sweep(name, settings.compare_week, tuple(members), observed)
     return sweeps

@@ -222,7 +222,7 @@ def member_chain(
     """Return the chain of a member of a run's ensemble. InputError if it is that of the run."""
     end, varied = settings.end_week, (variation.registration_smoothing, variation.seed)
     if settings.growth.shapes == "self":
-        chain = _chain("self", _own_chain(start, end, series), series, varied, varied)
+        chain = _chain("self", _own_chain(start, end, series), series, varied)
         if chain.later and chain == _chain("self", chain.brains, series):
             raise InputError(
                 f"the members of the ensemble of run {run} would be equal: the surfaces of "
@@ -249,24 +249,11 @@ def member_chain(
     )
 
 
-def _chain(
-    origin: Origin,
-    brains: Sequence[Brain],
-    series: Series,
-    first_variation: tuple[float, int] = UNVARIED,
-    later_variation: tuple[float, int] = UNVARIED,
-) -> Chain:
-    """Return a chain, with smoothing and seed of its first registration and of the later ones."""
+def _chain(origin: Origin, brains: Sequence[Brain], series: Series, variation: tuple[float, int] = UNVARIED) -> Chain:
+    """Return a chain, with smoothing and seed of its registrations."""
     pairs = list(pairwise(brains))
-    variations = [first_variation, *[later_variation] * (len(pairs) - 1)][: len(pairs)]
-    return Chain(
-        origin=origin,
-        brains=tuple(brains),
-        correspondences=tuple(
-            series.correspondence(*pair, variation) for pair, variation in zip(pairs, variations, strict=True)
-        ),
-        posed=tuple(series.posed(*pair) for pair in pairs),
-    )
+    correspondences = tuple(series.correspondence(*pair, variation) for pair in pairs)
+    return Chain(origin, tuple(brains), correspondences, tuple(series.posed(*pair) for pair in pairs))
 
 
 def _covers(brains: Iterable[Brain], week: float, end: float) -> bool:

@@ -1,5 +1,7 @@
 """Intervals of a run from the members of its ensemble, and maps of their spread."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -133,9 +135,10 @@ def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path)
             mesh = sphere(radius * (1 + more), 2)
             write_surface(tmp_path / f"{name}.{side}.surf.gii", mesh)
             write_vertex_maps(tmp_path / f"{name}.{side}.shape.gii", {"shape_index": np.full(len(mesh.vertices), -0.5)})
-    files = [f"{name}.{side}" for name in surfaces for side in ("left", "right")]
-    inputs = {"surfaces": [f"{file}.surf.gii" for file in files], "maps": [f"{file}.shape.gii" for file in files]}
-    outputs = {side: f"{side}.ensemble.shape.gii" for side in ("left", "right")}
-    run_script("ensemble_maps.py", tmp_path, inputs, outputs, {"sides": ("left", "right")})
-    spreads = [read_vertex_maps(tmp_path / file)["position_sd_mm"].mean() for file in outputs.values()]
+    spreads = []
+    for side in ("left", "right"):
+        files = [f"{name}.{side}" for name in surfaces]
+        inputs = {"surfaces": [f"{file}.surf.gii" for file in files], "maps": [f"{file}.shape.gii" for file in files]}
+        run_script("ensemble_maps.py", tmp_path, inputs, {0: "spread.shape.gii"}, wildcards=SimpleNamespace(side=side))
+        spreads.append(read_vertex_maps(tmp_path / "spread.shape.gii")["position_sd_mm"].mean())
     assert spreads == pytest.approx([np.sqrt(2), 11 * np.sqrt(2)], rel=1e-3)

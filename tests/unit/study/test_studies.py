@@ -10,7 +10,7 @@ from facts import Facts
 from gyriflow.errors import InputError
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
-from gyriflow.study.paths import STUDY, figure_log
+from gyriflow.study.paths import STUDY, log_of
 
 ROOT = Path(__file__).parents[3]
 
@@ -123,7 +123,7 @@ def test_folders_of_results_are_no_names_of_studies():
         *ROOT.glob("workflow/rules/*.smk"),
         *ROOT.glob("src/gyriflow/study/*.py"),
     ]
-    paths = [*(path.read_text() for path in sources), figure_log("rule", f"{STUDY}/metrics.png")]
+    paths = [*(path.read_text() for path in sources), log_of("rule", f"{STUDY}/metrics.png")]
     folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
     assert folders > {"logs", "figures", "calibration", "registration"}
     # benchmark files are named like logs
@@ -150,3 +150,16 @@ def test_folders_of_results_are_no_names_of_studies():
 )
 def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
     assert refusal(calibrate=CALIBRATION | change) == Facts(1, f"calibrate.{key}:", *facts)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "log"),
+    [
+        ("results/brains/{brain}/mesh/targets.{origin}.h5", "results/brains/{brain}/logs/rule.{origin}.log"),
+        ("results/study/{study}/members/{run}.csv", "results/study/{study}/logs/rule.{run}.log"),
+        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier}.{later}.log"),
+        ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
+    ],
+)
+def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(pattern, log):
+    assert log_of("rule", pattern) == log
