@@ -1,5 +1,7 @@
 """Predict time, memory and disk space of simulations, within a factor of two."""
 
+from bisect import bisect_left
+from collections.abc import Sequence
 from math import ceil, prod
 from typing import NamedTuple
 
@@ -9,6 +11,7 @@ from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
 from ..study.records import Brain, Simulation
+from ..study.series import Chain
 from ..units import ML_PER_MM3, SECONDS_PER_GW
 
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
@@ -16,8 +19,14 @@ ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 SECONDS_PER_ELEMENT_AND_STEP = {1: 12e-6, 2: 48e-6}
 """By element order; fitted to runs of 156 k and 500 k linear elements and 28 to 126 steps, within a factor of 1.3. A
 quadratic element counts as the eight linear elements with the same nodes."""
+SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
+"""With linear elements that grow towards shapes."""
+SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 9e-5
+"""For a mesh to follow the brains of its own series: targets, or an atlas' path."""
+PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
+"""To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 SECONDS_PER_JOB = 5.0
-"""Mean duration of the jobs other than simulations, in the demo."""
+"""Mean duration of the other jobs, in the demo."""
 ERROR_FACTOR = 2.0
 """Factor by which predictions may be wrong."""
 MIN_MIB, MIN_MINUTES, MIN_SURFACE_MIB = 2000, 60, 4000
@@ -50,7 +59,22 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     )
     # positions and fields of each output week, by a quarter as many nodes
     disk = ((run.end_week - week) / run.output_every_gw + 1) * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
-    return Needs(SECONDS_PER_ELEMENT_AND_STEP[mesh.order] * elements * steps, memory, disk)
+    follows_shapes = simulation.shapes and mesh.order == 1
+    rate = SHAPES_SECONDS_PER_ELEMENT_AND_STEP if follows_shapes else SECONDS_PER_ELEMENT_AND_STEP[mesh.order]
+    return Needs(rate * elements * steps, memory, disk)
+
+
+def series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
+    """Predict the time in which a mesh of the first week follows its own series to the last."""
+    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(weeks[0], mesh) * (weeks[-1] - weeks[0])
+
+
+def prediction_seconds(chain: Chain, end_week: float, mesh: MeshSettings) -> float:
+    """Predict the time to predict a start's shapes along an atlas' path, which ends two of its weeks after the end."""
+    start = chain.weeks[0]
+    later = [week for week in (chain.path or chain).weeks if week > start]
+    weeks = max(later[: bisect_left(later, end_week) + 2], default=start) - start
+    return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(start, mesh) * weeks
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
