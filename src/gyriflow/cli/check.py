@@ -8,6 +8,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, chdir
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -20,18 +21,9 @@ from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
-from ..running.cost import (
-    ERROR_FACTOR,
-    MIN_SURFACE_MIB,
-    SECONDS_PER_JOB,
-    prediction_seconds,
-    series_seconds,
-    simulation_needs,
-    surface_memory_mib,
-)
+from ..running.cost import ERROR_FACTOR, FOLDINGS, MIN_SURFACE_MIB, job_seconds, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
-from ..running.path_store import PATH_MESH_SETTINGS
 from ..running.provenance import recorded_version
 from ..running.status import format_duration
 from ..settings.base import folder_of
@@ -42,7 +34,6 @@ from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
-from ..study.paths import ATLAS_PATH, PATH_MESH, TARGETS
 from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
 from ..version import version
@@ -55,7 +46,6 @@ THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1):
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
 CODE_ONLY = re.compile(r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing exclusive>)* $")
 """End of Snakemake's reason to run a job again whose code has changed and nothing else of its parameters."""
-FOLDINGS = ("simulate", "simulate_member")
 
 
 class PlannedJob(NamedTuple):
@@ -66,6 +56,7 @@ class PlannedJob(NamedTuple):
     threads: int
     reason: str
     inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
 
 
 def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
@@ -155,8 +146,9 @@ def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = 
     def take(record: logging.LogRecord) -> bool:
         job = vars(record)
         if job.get("event") == "job_info" and job["output"]:
+            files = job["input"] or (), job["output"]
             names = dict(job["wildcards"] or {})
-            jobs.append(PlannedJob(job["rule_name"], names, job["threads"], job["reason"], job["input"] or ()))
+            jobs.append(PlannedJob(job["rule_name"], names, job["threads"], job["reason"], *files))
         return show or record.levelno >= logging.ERROR
 
     logger = logging.getLogger("snakemake.logging")
@@ -261,53 +253,34 @@ def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Itera
         yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
 
-def _shapes_seconds(jobs: Sequence[PlannedJob], study: Study) -> dict[str, float]:
-    """Predict the time of each job that makes shapes to grow towards, by its file; none for a path that is kept."""
-    seconds: dict[str, float] = {}
-    for rule, names, _, _, inputs in jobs:
-        if rule == "atlas_path":
-            paths = [chain.path for chain in study.chains.values() if chain.path]
-            weeks = next(path.weeks for path in paths if path.brains[0].id == names["brain"])
-            is_made = PATH_MESH["mesh"].format(**names) in inputs
-            seconds[ATLAS_PATH.format(**names)] = series_seconds(weeks, PATH_MESH_SETTINGS) if is_made else 0.0
-        elif rule in ("targets", "predicted_targets"):
-            file, chain = TARGETS.format(**names), study.chains[names["brain"], names["origin"]]
-            end = max(simulation.weeks[-1] for simulation in study.simulations.values() if simulation.targets == file)
-            is_predicted, mesh = rule == "predicted_targets", study.config.mesh
-            seconds[file] = prediction_seconds(chain, end, mesh) if is_predicted else series_seconds(chain.weeks, mesh)
-    return seconds
-
-
 def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
-    simulations = [
-        (job, study.simulations[job.wildcards["run"], job.wildcards["brain"]]) for job in jobs if job.rule in FOLDINGS
+    seconds = [job_seconds(study, job.rule, job.wildcards, job.inputs) for job in jobs]
+    made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
+
+    @cache
+    def end_s(number: int) -> float:
+        before = (end_s(made_by[file]) for file in jobs[number].inputs if file in made_by)
+        return max(before, default=0.0) + seconds[number] / min(jobs[number].threads, cores)
+
+    foldings = [job for job in jobs if job.rule in FOLDINGS]
+    needs = [
+        simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh)
+        for job in foldings
     ]
-    foldings = [(job, simulation_needs(simulation, study.config.mesh)) for job, simulation in simulations]
-    shapes_s = _shapes_seconds(jobs, study)
-    folding_s = sum(needs.seconds for _, needs in foldings)
-    other_s = SECONDS_PER_JOB * (len(jobs) - len(foldings) - len(shapes_s)) + sum(shapes_s.values())
-    # path, targets and folding wait for each other, and shapes are made on one core
-    longest_s = max(shapes_s.values(), default=0.0)
-    for (job, simulation), (_, needs) in zip(simulations, foldings, strict=True):
-        files = {simulation.targets} if isinstance(simulation.targets, str) else set()
-        if simulation.chain and (path := study.chains[simulation.start.id, simulation.chain].path):
-            files.add(ATLAS_PATH.format(brain=path.brains[0].id))
-        before_s = sum(shapes_s.get(file, 0.0) for file in files)
-        longest_s = max(longest_s, before_s + needs.seconds / min(job.threads, cores))
-    seconds = max((folding_s + other_s) / cores, longest_s)
-    hours = (folding_s + other_s) / 3600
-    for brain in (job.wildcards["brain"] for job in jobs if job.rule == "atlas_path"):
-        atlas, made_s = study.atlases.get(brain), shapes_s[ATLAS_PATH.format(brain=brain)]
-        of = f"path of {f'the atlas {atlas.name}' if atlas else f'the series from {brain}'}"
-        made = f"has to be made, about {format_duration(made_s)}{', once for all studies' if atlas else ''}"
-        yield f"{of}: {made if made_s else 'is kept from an earlier study'}", False
+    for job, path_s in zip(jobs, seconds, strict=True):
+        if job.rule == "atlas_path":
+            brain, atlas = job.wildcards["brain"], study.atlases.get(job.wildcards["brain"])
+            made = f"has to be made, about {format_duration(path_s)}{', once for all studies' if atlas else ''}"
+            yield f"path of {atlas.name if atlas else brain}: {made if path_s else 'kept from an earlier study'}", False
+    hours = sum(seconds) / 3600
+    wall_s = max(sum(seconds) / cores, *map(end_s, range(len(jobs))))
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield f"time    about {format_duration(seconds)} on {on}, within a factor of {ERROR_FACTOR:g}", False
-    share = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
+    yield f"time    about {format_duration(wall_s)} on {on}, within a factor of {ERROR_FACTOR:g}", False
+    share = f", {sum(each.seconds for each in needs) / sum(seconds):.0%} of them for folding" if foldings else ""
     yield f"work    about {hours:.2g} core hours{share}", False
-    at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
-    memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
-    disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
+    at_once = max(cores // max((job.threads for job in foldings), default=1), 1)
+    memory = sum(sorted((each.memory_mib for each in needs), reverse=True)[:at_once])
+    disk = sum(each.disk_mib for each in needs) + len(jobs)
     # the memory of this machine does not limit a cluster
     here = cores <= available_cores()
     yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, available_memory_mib() if here else None)

@@ -59,9 +59,8 @@ UNSET = "CHOOSE"
 class FoundBrain:
     """A recognised scan: its entry of `brains`, the source of its age, and reasons why it cannot be used.
 
-    `problem` is about its files, `contradiction` about its age; `notes` are values to fill in. It `is_unreadable` if
-    files are damaged or missing, `is_template` if its folder is that of a template. `fits` is the result of
-    `scheme_fits` for its labels, `named_age` the text of an age that is from its name.
+    `problem` is about its files, `contradiction` about its age (`named_age`: as in its name); `notes` are values to
+    fill in. It `is_unreadable` if files are damaged or missing. `fits` is from `scheme_fits`.
     """
 
     entry: dict[str, Any]
@@ -103,16 +102,6 @@ class _Candidate:
     source: dict[str, Any]
     space: str = ""
     problem: str = ""
-
-    def label(self, entity: str) -> str | None:
-        return _label(self.file, entity)
-
-    @property
-    def data_set(self) -> Path:
-        """The data set that a subject's folder is in."""
-        parts = self.file.parts
-        before = next((number for number, part in enumerate(parts) if part.startswith("sub-")), 0)
-        return data_set_of(Path(*parts[:before]))
 
     @property
     def scan(self) -> str:
@@ -163,12 +152,7 @@ def recognise(
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
     found: dict[str, list[_Candidate]] = defaultdict(list)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for candidate in (
-        *_hemispheres(files),
-        *_whole_surfaces(files),
-        *_volumes(files, unreadable),
-        *_folders(unreadable),
-    ):
+    for candidate in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files, unreadable)):
         if fnmatch(str(candidate.file), pattern):
             found[candidate.scan].append(candidate)
     # sessions without labels or surfaces count
@@ -180,7 +164,7 @@ def recognise(
     selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
     selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
     for entity, labels in selected.items():
-        existing = {candidate.label(entity) for group in found.values() for candidate in group}
+        existing = {_label(candidate.file, entity) for group in found.values() for candidate in group}
         if absent := sorted(labels - existing):
             problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
             names = ", ".join(sorted(f"{entity}-{label}" for label in existing if label)[:20]) or "none"
@@ -189,7 +173,7 @@ def recognise(
     unused: dict[str, str] = {}
     brains: list[FoundBrain] = []
     for name, group in found.items():
-        if not any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
+        if not any(labels and _label(group[0].file, entity) not in labels for entity, labels in selected.items()):
             brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
     # templates among subjects are not scans
     if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (0, len(brains)):
@@ -211,9 +195,8 @@ def recognise(
 def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
     expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
     names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + ["\n  …"] * (len(reasons) > 10)
-    return InputError(
-        "no brain was recognised", path=folder, found=f"{len(reasons)} files{''.join(names)}\n", expected=expected
-    )
+    found = f"{len(reasons)} files{''.join(names)}\n"
+    return InputError("no brain was recognised", path=folder, found=found, expected=expected)
 
 
 def _rejection(file: Path) -> str:
@@ -240,7 +223,8 @@ def _brains_of_scan(
         else:
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
-    data_sets = sorted({str(candidate.data_set) for candidate in group})
+    above = (re.match(r"(?:(.*?)/)?sub-", candidate.file.as_posix()) for candidate in group)
+    data_sets = sorted({str(data_set_of(Path(match[1] or "" if match else ""))) for match in above})
     for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
@@ -358,9 +342,6 @@ def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[_Can
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
             yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
-
-
-def _folders(unreadable: Sequence[Path]) -> Iterator[_Candidate]:
     for folder in unreadable:
         yield _Candidate(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
 
@@ -368,7 +349,7 @@ def _folders(unreadable: Sequence[Path]) -> Iterator[_Candidate]:
 def _found_brain(
     folder: Path, candidate: _Candidate, tables: ScanTables, sessions_of: Mapping[str | None, set[str | None]]
 ) -> FoundBrain:
-    subject, session = candidate.label("sub"), candidate.label("ses")
+    subject, session = _label(candidate.file, "sub"), _label(candidate.file, "ses")
     owners = _owners(candidate, tables) if subject is None else [subject]
     facts, cause = None, ""
     if len(owners) > 1:
@@ -450,16 +431,11 @@ def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
 
 def _similar_ids(subject: str, tables: ScanTables, *, only_similar: bool = False) -> str:
     """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
-    ids = tables.ids
-    similar = [f"{name} ({ids[name]})" for name in ids if _plain_id(name) == _plain_id(subject)]
-    found = ", ".join(similar or ([] if only_similar else [*list(ids)[:5], "…"]))
-    return (
-        f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if ids and found else ""
-    )
-
-
-def _plain_id(name: str) -> str:
-    return re.sub(r"(?<!\d)0+(?=\d)", "", name.lower())
+    plain, *plain_ids = (re.sub(r"(?<!\d)0+(?=\d)", "", name.lower()) for name in (subject, *tables.ids))
+    named = zip(tables.ids.items(), plain_ids, strict=True)
+    similar = [f"{name} ({table})" for (name, table), plain_id in named if plain_id == plain]
+    found = ", ".join(similar or ([] if only_similar or not tables.ids else [*list(tables.ids)[:5], "…"]))
+    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if found else ""
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:

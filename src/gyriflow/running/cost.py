@@ -1,7 +1,7 @@
 """Predict time, memory and disk space of simulations, within a factor of two."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import ceil, prod
 from typing import NamedTuple
 
@@ -10,10 +10,14 @@ from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
+from ..study.paths import PATH_MESH, TARGETS
 from ..study.records import Brain, Simulation
-from ..study.series import Chain
+from ..study.study import Study
 from ..units import ML_PER_MM3, SECONDS_PER_GW
+from .path_store import PATH_MESH_SETTINGS
 
+FOLDINGS = ("simulate", "simulate_member")
+"""Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 """Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
 SECONDS_PER_ELEMENT_AND_STEP = {1: 12e-6, 2: 48e-6}
@@ -64,17 +68,30 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     return Needs(rate * elements * steps, memory, disk)
 
 
-def series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
-    """Predict the time in which a mesh of the first week follows its own series to the last."""
-    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(weeks[0], mesh) * (weeks[-1] - weeks[0])
-
-
-def prediction_seconds(chain: Chain, end_week: float, mesh: MeshSettings) -> float:
-    """Predict the time to predict a start's shapes along an atlas' path, which ends two of its weeks after the end."""
-    start = chain.weeks[0]
-    later = [week for week in (chain.path or chain).weeks if week > start]
-    weeks = max(later[: bisect_left(later, end_week) + 2], default=start) - start
+def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str], inputs: Collection[str] = ()) -> float:
+    """Predict the time of a job on one core; 0 for an atlas' path without a mesh among its inputs, which is kept."""
+    mesh, brain = study.config.mesh, wildcards.get("brain", "")
+    if rule in FOLDINGS:
+        return simulation_needs(study.simulations[wildcards["run"], brain], mesh).seconds
+    if rule == "atlas_path":
+        if PATH_MESH["mesh"].format(brain=brain) not in inputs:
+            return 0.0
+        paths = (chain.path for chain in study.chains.values() if chain.path)
+        return _series_seconds(next(path.weeks for path in paths if path.brains[0].id == brain), PATH_MESH_SETTINGS)
+    if rule not in ("targets", "predicted_targets"):
+        return SECONDS_PER_JOB
+    chain, file = study.chains[brain, wildcards["origin"]], TARGETS.format(**wildcards)
+    if chain.path is None:
+        return _series_seconds(chain.weeks, mesh)
+    end = max(simulation.weeks[-1] for simulation in study.simulations.values() if simulation.targets == file)
+    start, later = chain.weeks[0], [week for week in chain.path.weeks if week > chain.weeks[0]]
+    # it ends two weeks of the atlas after the end
+    weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
     return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(start, mesh) * weeks
+
+
+def _series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
+    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(weeks[0], mesh) * (weeks[-1] - weeks[0])
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:

@@ -317,10 +317,14 @@ def test_a_prediction_takes_the_time_of_its_atlas_path_its_shapes_and_its_foldin
     expected = {"preset": "expected", "end_week": 25}
     growth = {"brains": {"x": [f"x{week}" for week in weeks]}}
     study = resolve(load(STUDY | {"brains": brains, "folding": expected, "growth": growth, "runs": {"p": {}}}))
-    reason, mesh = "Missing output files: x", study.config.mesh
-    path = checking.PlannedJob("atlas_path", {"brain": "x22"}, 1, reason, ["results/brains/x22/path/brain.xdmf"])
-    targets = checking.PlannedJob("predicted_targets", {"brain": "a", "origin": "atlas"}, 1, reason)
-    folding = checking.PlannedJob("simulate", {"run": "p", "brain": "a"}, 2, reason)
+    mesh, reason = study.config.mesh, "Missing output files: x"
+    made = "results/brains/x22/path/shapes.h5", "results/brains/a/mesh/targets.atlas.h5"
+    needed = ["results/brains/x22/path/brain.xdmf"]
+    path = checking.PlannedJob("atlas_path", {"brain": "x22"}, 1, reason, needed, made[:1])
+    targets = checking.PlannedJob(
+        "predicted_targets", {"brain": "a", "origin": "atlas"}, 1, reason, ["x.xdmf", *made[:1]], made[1:]
+    )
+    folding = checking.PlannedJob("simulate", {"run": "p", "brain": "a"}, 2, reason, made[1:])
     simulation = study.simulations["p", "a"]
     steps = 2 * 7 * 86400 / simulation.settings.step_s
     folding_s = 6e-6 * linear_elements(23, mesh) * steps
