@@ -168,8 +168,8 @@ def _contents(study: Study) -> str:
     runs = list(study.config.runs)
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
     brains, folded = len(study.brains), len(study.run_simulations)
-    parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
-    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
+    simulations = f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"
+    parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
     parts += [f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")

@@ -1,6 +1,7 @@
 """Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
 
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
@@ -76,9 +77,9 @@ def write_configuration(
         notes += [f"week: {brain.age_source}"] if brain.age_source else []
         lines.append(f"  {'-' if brain in usable else '# -'} {text}" + "".join(f"  # {note}" for note in notes) + "\n")
     # the start is a brain with later scans of its subject or atlas, if any
-    by_subject = _by_subject(usable).values()
-    series = next((scans for scans in by_subject if len(_weeks(scans)) > 1), usable)
-    weeks, several = _weeks(series), series is not usable
+    several = _series(usable)
+    series = several[0] if several else usable
+    weeks = _weeks(series)
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
     measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
     # an id may look like a number, which YAML writes in quotes
@@ -159,8 +160,7 @@ def write_prediction(
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
-    sides = entry.get("hemispheres", {})
-    names = ", ".join(f"{side} {path}" for side, path in sides.items()) or files[0]
+    names = ", ".join(f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()) or files[0]
     yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 
@@ -171,10 +171,7 @@ def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def store_options(path: Path, options: dict[str, Any]) -> None:
-    """Store the options of a call for a part of a BIDS data set.
-
-    Participants and sessions of earlier calls are added to those of this call.
-    """
+    """Store the options of a call for a part of a BIDS data set; earlier participants and sessions are added."""
     earlier = read_json(path) if path.is_file() else options
     stored = dict(options)
     for key in ("participants", "sessions"):
@@ -200,20 +197,17 @@ def write_bids(
     if not brains:
         causes = _causes(found.brains) or "no files named sub-…"
         choice = "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz'."
-        raise InputError(
-            "no scan can be used", path=folder, found=causes, remedy=choice if "keep one" in causes else None
-        )
+        remedy = choice if "keep one" in causes else None
+        raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
-    followed = [scans for scans in _by_subject(brains).values() if len(_weeks(scans)) > 1]
-    starts = [scans[0].entry["id"] for scans in followed]
-    can_measure = fold and bool(followed) and all(_have_shapes(scans, folder) for scans in followed)
-    weeks = _weeks(brains)
     further = read_keys(Path(settings)) if settings else {}
-    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
     text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
     if fold:
-        text |= {"start": starts or youngest, "runs": runs, **further}
+        followed, weeks = _series(brains), _weeks(brains)
+        can_measure = followed and all(_have_shapes(scans, folder) for scans in followed)
+        runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
+        text |= {"start": [scans[0].entry["id"] for scans in followed] or youngest, "runs": runs, **further}
         text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (further.get("folding") or {})
     else:
         text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
@@ -226,11 +220,12 @@ def write_bids(
     return [brain.entry["id"] for brain in brains]
 
 
-def _by_subject(brains: Sequence[FoundBrain]) -> dict[str, list[FoundBrain]]:
-    scans: dict[str, list[FoundBrain]] = {}
+def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:
+    """Return the scans of each subject or atlas that has several weeks."""
+    scans: dict[str, list[FoundBrain]] = defaultdict(list)
     for brain in brains:
-        scans.setdefault(brain.entry.get("subject", ""), []).append(brain)
-    return scans
+        scans[brain.entry.get("subject", "")].append(brain)
+    return [group for group in scans.values() if len(_weeks(group)) > 1]
 
 
 def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
@@ -263,10 +258,10 @@ def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
 
 
 def _absolute(value: object, folder: Path) -> object:
+    """Return an entry with absolute paths of files in a folder."""
     if isinstance(value, dict):
         return {key: _absolute(item, folder) for key, item in value.items()}
     if isinstance(value, list):
         return [_absolute(item, folder) for item in value]
-    if isinstance(value, str) and (folder / value).is_file():
-        return str(own_name(folder / value))
-    return value
+    is_file = isinstance(value, str) and (folder / value).is_file()
+    return str(own_name(folder / str(value))) if is_file else value
