@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import yaml
@@ -22,36 +23,10 @@ from ..study.loading import load
 from ..study.series import unmatched_reason
 from .recognition import UNSET, FoundBrain, FoundScans, recognise_brain
 
-HEAD = f"""\
-# yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
-# Written by `gyriflow init` from the files of this folder. Every key has a default; paths are relative to this file.
-# All keys with their units: {SHIPPED / "config" / "README.md"}
-
-brains:
-"""
-REST = """\
-
-# The brain to fold: an id, a list of ids, or all.
-start: {start}
-
-folding:
-  end_week: {end}   # last week of the simulation [GW]
-
-# Runs by name, each with what differs from `folding`; `measured` lets growth follow the brains above.
-runs:
-  reference: {{}}{measured}
-"""
-MEASURED_RUN = """
-  measured: {preset: measured}"""
+TEMPLATES = SHIPPED / "config" / "templates"
 BIDS_OPTIONS = "bids.json"
 BIDS_HEAD = "# Written by `gyriflow bids`, which replaces it.\n"
 SHIPPED_ATLAS = "spina-bifida"
-QUICK: dict[str, Any] = {
-    "surface": {"edge_length_mm": 1.2},
-    "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": 0.67, "max_surface_distance_mm": 0.5},
-    "folding": {"step_s": 86400, "thickness_mm": 2.5},
-}
-"""Settings of a quick prediction: the mesh of the demo, and a cortex thick enough for it."""
 
 
 def write_configuration(
@@ -59,9 +34,8 @@ def write_configuration(
 ) -> Path | None:
     """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
 
-    By default, one of them is folded, and values may be left to fill in. With `force`, an existing configuration is
-    kept under another name, which is returned. InputError if no scan can be used, or if the configuration already
-    exists and `force` is not set.
+    By default, one of them is folded, and values may be left to fill in. InputError if no scan can be used or if the
+    configuration exists, unless `force` is set: then it gets another name, which is returned.
     """
     if path.exists() and not force:
         raise InputError("already exists", path=path, remedy="Choose another file with --output, or add --force.")
@@ -81,14 +55,19 @@ def write_configuration(
     series = several[0] if several else usable
     weeks = _weeks(series)
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
-    # an id may look like a number, which YAML writes in quotes
-    start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
-    rest = "" if only_measured else REST.format(start=start, end=end, measured=measured_run)
-    text = HEAD + "".join(lines) + rest
+    text = _from_template("brains", config=SHIPPED / "config", brains="".join(lines).rstrip())
+    if not only_measured:
+        # an id may look like a number, which YAML writes in quotes
+        start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
+        measured_run = "\n  measured: {preset: measured}" if several and _have_shapes(series, folder) else ""
+        text += _from_template("folding", start=start, end=end, measured=measured_run)
     kept = _keep_other(path, text)
     write_text(path, text)
     return kept
+
+
+def _from_template(name: str, **values: object) -> str:
+    return Template(read_text(TEMPLATES / f"{name}.yaml")).substitute(values)
 
 
 def _keep_other(path: Path, text: str) -> Path | None:
@@ -127,10 +106,9 @@ def write_prediction(
 ) -> Iterator[str]:
     """Write a configuration that folds a brain by the growth of an atlas; yield lines about it.
 
-    `files` are its label volume or pial surfaces, perhaps with `white` surfaces; `weeks` are the week of the brain and
-    the week to predict; `folder` has the atlas' files; `accepted` is whether its licence is accepted; `ensemble` is a
-    number of members. Paths are relative to the working directory of this process. InputError if anything is missing,
-    or if the configuration at `shown_path` exists with different content and `force` is not set.
+    `files` are its label volume or pial surfaces; `weeks` are the week of the brain and the week to predict; `folder`
+    has the atlas' files; `accepted` is about its licence. InputError if anything is missing, or if the configuration at
+    `shown_path` exists with different content and `force` is not set.
     """
     if atlas is None:
         yield (
@@ -146,7 +124,7 @@ def write_prediction(
     settings = validated(AtlasSettings, keys, "--atlas").located(Path.cwd())
     series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted)
     section = settings.model_dump(exclude_defaults=True) | series
-    more = QUICK if quick else {"folding": {}}
+    more = read_keys(TEMPLATES / "quick.yaml") if quick else {"folding": {}}
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
     config = {"brains": [entry], "atlas": section, "start": entry["id"], **more, "folding": folding}
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
