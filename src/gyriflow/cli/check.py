@@ -7,7 +7,7 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, chdir
+from contextlib import ExitStack, chdir, contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +17,7 @@ from typing import NamedTuple
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, read_cerebrum
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
-from ..errors import GyriflowError, InputError
+from ..errors import GyriflowError
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
@@ -38,7 +38,7 @@ from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
 from ..version import version
 from .init import commented_scans
-from .recognition import scheme_fits
+from .recognition import require_fit, scheme_fits
 from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
@@ -60,14 +60,9 @@ class PlannedJob(NamedTuple):
 
 
 def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
-    """Yield lines on a study and its files, and on what would run up to some stages, each with whether it is a problem.
-
-    InputError for a configuration that is not valid, with all its problems.
-    """
-    file = path.absolute()
-    with _working_in(directory):
-        config = load(read_keys(file), folder_of(file))
-        study, problems = resolve(config), list(input_problems(config))
+    """Yield lines on a study, its files and what would run up to some stages, each with whether it is a problem."""
+    with _read_study(path, directory) as study:
+        config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
         without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
@@ -92,9 +87,12 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
 
-def _working_in(directory: Path) -> chdir:
-    # paths of a configuration may be relative to the working directory
-    return chdir(directory if directory.is_dir() else Path())
+@contextmanager
+def _read_study(path: Path, directory: Path) -> Iterator[Study]:
+    """Read a study in its working directory, since paths of a configuration may be relative to that."""
+    file = path.absolute()
+    with chdir(directory if directory.is_dir() else Path()):
+        yield resolve(load(read_keys(file), folder_of(file)))
 
 
 def work_of(
@@ -117,9 +115,8 @@ def work_of(
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     if study is None:
-        file = path.absolute()
-        with _working_in(directory):
-            study = resolve(load(read_keys(file), folder_of(file)))
+        with _read_study(path, directory) as read:
+            study = read
     yield from _needs(jobs, study, directory, cores)
 
 
@@ -137,10 +134,7 @@ def _why(reason: str, directory: Path) -> str:
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Return the jobs that Snakemake would run, without targets; with `show` it lists them on the terminal.
-
-    Ends the program with Snakemake's exit code if it fails.
-    """
+    """Return the jobs that Snakemake would run, without targets, or exit with its code; `show` lists them, too."""
     jobs = []
 
     def take(record: logging.LogRecord) -> bool:
@@ -244,10 +238,7 @@ def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Itera
     cerebrum = read_cerebrum(read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
     if whole and (doubts := list(scheme_contradictions(layout_of(read.labels), scheme))):
-        fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
-        if fitting:
-            problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme.name}"
-            raise InputError(problem, path=volume, found="; ".join(doubts))
+        require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
         yield from doubts
     if whole:
         yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
@@ -289,11 +280,9 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
-    if there_mib is None:
-        yield f"{name:<7} about {_gib(mib)}, for the foldings that run at the same time", False
-    else:
-        bad = mib > there_mib
-        yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} available{', which is too little' if bad else ''}", bad
+    bad = there_mib is not None and mib > there_mib
+    here = ", for the foldings that run at the same time" if there_mib is None else f"; {_gib(there_mib)} available"
+    yield f"{name:<7} about {_gib(mib)}{here}{', which is too little' if bad else ''}", bad
 
 
 def _gib(mib: float) -> str:
