@@ -7,7 +7,8 @@ import shutil
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, chdir
+from contextlib import ExitStack, chdir, contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -16,11 +17,11 @@ from typing import NamedTuple
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, read_cerebrum
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
-from ..errors import GyriflowError, InputError
+from ..errors import GyriflowError
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
-from ..running.cost import ERROR_FACTOR, MIN_SURFACE_MIB, SECONDS_PER_JOB, simulation_needs, surface_memory_mib
+from ..running.cost import ERROR_FACTOR, FOLDINGS, MIN_SURFACE_MIB, job_seconds, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
 from ..running.provenance import recorded_version
@@ -37,7 +38,7 @@ from ..study.resolve import label_scheme, resolve
 from ..study.study import Study
 from ..version import version
 from .init import commented_scans
-from .recognition import scheme_fits
+from .recognition import require_fit, scheme_fits
 from .scans import ScanRow, scan_lines
 
 NAMED_RUNS = 6
@@ -45,7 +46,6 @@ THROUGH_CORTEX = {("pytetwild", 1): 0.95, ("pytetwild", 2): 0.39, ("tetgen", 1):
 """Elements through a cortex as thick as `mesh.surface_edge_mm`, by mesher and order, as found on the shipped brains."""
 CODE_ONLY = re.compile(r"before: ('code \w+',?|<nothing exclusive>)* now: ('code \w+',?|<nothing exclusive>)* $")
 """End of Snakemake's reason to run a job again whose code has changed and nothing else of its parameters."""
-FOLDINGS = ("simulate", "simulate_member")
 
 
 class PlannedJob(NamedTuple):
@@ -55,17 +55,14 @@ class PlannedJob(NamedTuple):
     wildcards: dict[str, str]
     threads: int
     reason: str
+    inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
 
 
 def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
-    """Yield lines on a study and its files, and on what would run up to some stages, each with whether it is a problem.
-
-    InputError for a configuration that is not valid, with all its problems.
-    """
-    file = path.absolute()
-    with _working_in(directory):
-        config = load(read_keys(file), folder_of(file))
-        study, problems = resolve(config), list(input_problems(config))
+    """Yield lines on a study, its files and what would run up to some stages, each with whether it is a problem."""
+    with _read_study(path, directory) as study:
+        config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
         without_unit = sum(read_header(volume).unit == "unknown" for volume in volumes) if valid else 0
@@ -90,9 +87,12 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
 
 
-def _working_in(directory: Path) -> chdir:
-    # paths of a configuration may be relative to the working directory
-    return chdir(directory if directory.is_dir() else Path())
+@contextmanager
+def _read_study(path: Path, directory: Path) -> Iterator[Study]:
+    """Read a study in its working directory, since paths of a configuration may be relative to that."""
+    file = path.absolute()
+    with chdir(directory if directory.is_dir() else Path()):
+        yield resolve(load(read_keys(file), folder_of(file)))
 
 
 def work_of(
@@ -115,9 +115,8 @@ def work_of(
         words = ", ".join(rule if number == 1 else f"{rule}×{number}" for rule, number in rules.items())
         yield fill(f"{reason}: {words}", width=100, initial_indent="  ", subsequent_indent="    "), False
     if study is None:
-        file = path.absolute()
-        with _working_in(directory):
-            study = resolve(load(read_keys(file), folder_of(file)))
+        with _read_study(path, directory) as read:
+            study = read
     yield from _needs(jobs, study, directory, cores)
 
 
@@ -135,16 +134,15 @@ def _why(reason: str, directory: Path) -> str:
 
 
 def plan(config: Path, directory: Path, further: Sequence[str], *, show: bool = False) -> list[PlannedJob]:
-    """Return the jobs that Snakemake would run, without targets; with `show` it lists them on the terminal.
-
-    Ends the program with Snakemake's exit code if it fails.
-    """
+    """Return the jobs that Snakemake would run, without targets, or exit with its code; `show` lists them, too."""
     jobs = []
 
     def take(record: logging.LogRecord) -> bool:
         job = vars(record)
         if job.get("event") == "job_info" and job["output"]:
-            jobs.append(PlannedJob(job["rule_name"], dict(job["wildcards"] or {}), job["threads"], job["reason"]))
+            files = job["input"] or (), job["output"]
+            names = dict(job["wildcards"] or {})
+            jobs.append(PlannedJob(job["rule_name"], names, job["threads"], job["reason"], *files))
         return show or record.levelno >= logging.ERROR
 
     logger = logging.getLogger("snakemake.logging")
@@ -164,8 +162,8 @@ def _contents(study: Study) -> str:
     runs = list(study.config.runs)
     names = [*runs[:NAMED_RUNS], *(["…"] if len(runs) > NAMED_RUNS else [])]
     brains, folded = len(study.brains), len(study.run_simulations)
-    parts = [f"{brains} brain{'s' if brains > 1 else ''}"]
-    parts += [f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"]
+    simulations = f"{folded} simulation{'s' if folded > 1 else ''} ({', '.join(names)})" if folded else "measured only"
+    parts = [f"{brains} brain{'s' if brains > 1 else ''}", simulations]
     parts += [f"{len(sweep.members)} of study {name}" for name, sweep in study.sweeps.items()]
     if study.calibration is not None:
         parts.append(f"{len(study.calibration.rounds)} of the calibration")
@@ -240,33 +238,40 @@ def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Itera
     cerebrum = read_cerebrum(read.labels, read.affine, scheme, MIN_CORTEX_OUTSIDE if whole else 0.0)
     yield from cerebrum.warnings
     if whole and (doubts := list(scheme_contradictions(layout_of(read.labels), scheme))):
-        fitting = [name for name, against in scheme_fits(read.labels).items() if not against]
-        if fitting:
-            problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme.name}"
-            raise InputError(problem, path=volume, found="; ".join(doubts))
+        require_fit(scheme_fits(read.labels), scheme.name, volume, "; ".join(doubts))
         yield from doubts
     if whole:
         yield from require_plausible_size(cerebrum.volume_mm3, brain.week)
 
 
 def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
-    foldings = [
-        (job, simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh))
-        for job in jobs
-        if job.rule in FOLDINGS
+    seconds = [job_seconds(study, job.rule, job.wildcards, job.inputs) for job in jobs]
+    made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
+
+    @cache
+    def end_s(number: int) -> float:
+        before = (end_s(made_by[file]) for file in jobs[number].inputs if file in made_by)
+        return max(before, default=0.0) + seconds[number] / min(jobs[number].threads, cores)
+
+    foldings = [job for job in jobs if job.rule in FOLDINGS]
+    needs = [
+        simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh)
+        for job in foldings
     ]
-    folding_s = sum(needs.seconds for _, needs in foldings)
-    other_s = SECONDS_PER_JOB * (len(jobs) - len(foldings))
-    longest_s = max((needs.seconds / min(job.threads, cores) for job, needs in foldings), default=0.0)
-    seconds = max((folding_s + other_s) / cores, longest_s)
-    hours = (folding_s + other_s) / 3600
+    for job, path_s in zip(jobs, seconds, strict=True):
+        if job.rule == "atlas_path":
+            brain, atlas = job.wildcards["brain"], study.atlases.get(job.wildcards["brain"])
+            made = f"has to be made, about {format_duration(path_s)}{', once for all studies' if atlas else ''}"
+            yield f"path of {atlas.name if atlas else brain}: {made if path_s else 'kept from an earlier study'}", False
+    hours = sum(seconds) / 3600
+    wall_s = max(sum(seconds) / cores, *map(end_s, range(len(jobs))))
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
-    yield f"time    about {format_duration(seconds)} on {on}, within a factor of {ERROR_FACTOR:g}", False
-    share = f", {folding_s / 3600 / hours:.0%} of them for folding" if foldings else ""
+    yield f"time    about {format_duration(wall_s)} on {on}, within a factor of {ERROR_FACTOR:g}", False
+    share = f", {sum(each.seconds for each in needs) / sum(seconds):.0%} of them for folding" if foldings else ""
     yield f"work    about {hours:.2g} core hours{share}", False
-    at_once = max(cores // max((job.threads for job, _ in foldings), default=1), 1)
-    memory = sum(sorted((needs.memory_mib for _, needs in foldings), reverse=True)[:at_once])
-    disk = sum(needs.disk_mib for _, needs in foldings) + len(jobs)
+    at_once = max(cores // max((job.threads for job in foldings), default=1), 1)
+    memory = sum(sorted((each.memory_mib for each in needs), reverse=True)[:at_once])
+    disk = sum(each.disk_mib for each in needs) + len(jobs)
     # the memory of this machine does not limit a cluster
     here = cores <= available_cores()
     yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, available_memory_mib() if here else None)
@@ -275,11 +280,9 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:
-    if there_mib is None:
-        yield f"{name:<7} about {_gib(mib)}, for the foldings that run at the same time", False
-    else:
-        bad = mib > there_mib
-        yield f"{name:<7} about {_gib(mib)}; {_gib(there_mib)} available{', which is too little' if bad else ''}", bad
+    bad = there_mib is not None and mib > there_mib
+    here = ", for the foldings that run at the same time" if there_mib is None else f"; {_gib(there_mib)} available"
+    yield f"{name:<7} about {_gib(mib)}{here}{', which is too little' if bad else ''}", bad
 
 
 def _gib(mib: float) -> str:

@@ -217,8 +217,11 @@ def run(
 
     CONFIG is gyriflow.yaml by default. Further arguments go to Snakemake, such as `--profile profiles/slurm`.
     """
-    named = bool(further) and _is_config(further[0])
-    config = _find_config(Path(further[0]) if named else None, directory)
+    first = further[0] if further else ""
+    # other arguments are options and results
+    is_file = Path(first).is_file() and not first.startswith(("-", "results/"))
+    named = is_file or first.lower().endswith((".yaml", ".yml", ".json"))
+    config = _find_config(Path(first) if named else None, directory)
     # an option of one value stands before the targets
     options = ["--verbose"] if verbose else []
     # a cluster is limited by its profile, not by the cores of this machine
@@ -226,12 +229,6 @@ def run(
     if not (default and any(argument.partition("=")[0] in REMOTE_OPTIONS for argument in further)):
         options += ["--cores", str(cores)]
     sys.exit(_run(config, directory, cores, dry_run, options, *stages, *further[int(named) :]))
-
-
-def _is_config(argument: str) -> bool:
-    # other arguments are options and results
-    is_file = Path(argument).is_file() and not argument.startswith(("-", "results/"))
-    return is_file or argument.lower().endswith((".yaml", ".yml", ".json"))
 
 
 def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list[str], *targets: str) -> int:

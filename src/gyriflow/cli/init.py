@@ -1,9 +1,11 @@
 """Write the first configuration of a study: from a folder's brains, for one prediction, or for a BIDS data set."""
 
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import yaml
@@ -21,36 +23,10 @@ from ..study.loading import load
 from ..study.series import unmatched_reason
 from .recognition import UNSET, FoundBrain, FoundScans, recognise_brain
 
-HEAD = f"""\
-# yaml-language-server: $schema={SHIPPED / "config" / "schema.json"}
-# Written by `gyriflow init` from the files of this folder. Every key has a default; paths are relative to this file.
-# All keys with their units: {SHIPPED / "config" / "README.md"}
-
-brains:
-"""
-REST = """\
-
-# The brain to fold: an id, a list of ids, or all.
-start: {start}
-
-folding:
-  end_week: {end}   # last week of the simulation [GW]
-
-# Runs by name, each with what differs from `folding`; `measured` lets growth follow the brains above.
-runs:
-  reference: {{}}{measured}
-"""
-MEASURED_RUN = """
-  measured: {preset: measured}"""
+TEMPLATES = SHIPPED / "config" / "templates"
 BIDS_OPTIONS = "bids.json"
 BIDS_HEAD = "# Written by `gyriflow bids`, which replaces it.\n"
 SHIPPED_ATLAS = "spina-bifida"
-QUICK: dict[str, Any] = {
-    "surface": {"edge_length_mm": 1.2},
-    "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": 0.67, "max_surface_distance_mm": 0.5},
-    "folding": {"step_s": 86400, "thickness_mm": 2.5},
-}
-"""Settings of a quick prediction: the mesh of the demo, and a cortex thick enough for it."""
 
 
 def write_configuration(
@@ -58,9 +34,8 @@ def write_configuration(
 ) -> Path | None:
     """Write a configuration for the scans of a folder. Scans that cannot be used are comments in it, with the cause.
 
-    By default, one of them is folded, and values may be left to fill in. With `force`, an existing configuration is
-    kept under another name, which is returned. InputError if no scan can be used, or if the configuration already
-    exists and `force` is not set.
+    By default, one of them is folded, and values may be left to fill in. InputError if no scan can be used or if the
+    configuration exists, unless `force` is set: then it gets another name, which is returned.
     """
     if path.exists() and not force:
         raise InputError("already exists", path=path, remedy="Choose another file with --output, or add --force.")
@@ -76,18 +51,23 @@ def write_configuration(
         notes += [f"week: {brain.age_source}"] if brain.age_source else []
         lines.append(f"  {'-' if brain in usable else '# -'} {text}" + "".join(f"  # {note}" for note in notes) + "\n")
     # the start is a brain with later scans of its subject or atlas, if any
-    by_subject = _by_subject(usable).values()
-    series = next((scans for scans in by_subject if len(_weeks(scans)) > 1), usable)
-    weeks, several = _weeks(series), series is not usable
+    several = _series(usable)
+    series = several[0] if several else usable
+    weeks = _weeks(series)
     end = f"{weeks[-1] if several else weeks[0] + 1:g}" if weeks else UNSET
-    measured_run = MEASURED_RUN if several and not only_measured and _have_shapes(series, folder) else ""
-    # an id may look like a number, which YAML writes in quotes
-    start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
-    rest = "" if only_measured else REST.format(start=start, end=end, measured=measured_run)
-    text = HEAD + "".join(lines) + rest
+    text = _from_template("brains", config=SHIPPED / "config", brains="".join(lines).rstrip())
+    if not only_measured:
+        # an id may look like a number, which YAML writes in quotes
+        start = yaml.safe_dump(series[0].entry["id"]).splitlines()[0]
+        measured_run = "\n  measured: {preset: measured}" if several and _have_shapes(series, folder) else ""
+        text += _from_template("folding", start=start, end=end, measured=measured_run)
     kept = _keep_other(path, text)
     write_text(path, text)
     return kept
+
+
+def _from_template(name: str, **values: object) -> str:
+    return Template(read_text(TEMPLATES / f"{name}.yaml")).substitute(values)
 
 
 def _keep_other(path: Path, text: str) -> Path | None:
@@ -126,10 +106,9 @@ def write_prediction(
 ) -> Iterator[str]:
     """Write a configuration that folds a brain by the growth of an atlas; yield lines about it.
 
-    `files` are its label volume or pial surfaces, perhaps with `white` surfaces; `weeks` are the week of the brain and
-    the week to predict; `folder` has the atlas' files; `accepted` is whether its licence is accepted; `ensemble` is a
-    number of members. Paths are relative to the working directory of this process. InputError if anything is missing,
-    or if the configuration at `shown_path` exists with different content and `force` is not set.
+    `files` are its label volume or pial surfaces; `weeks` are the week of the brain and the week to predict; `folder`
+    has the atlas' files; `accepted` is about its licence. InputError if anything is missing, or if the configuration at
+    `shown_path` exists with different content and `force` is not set.
     """
     if atlas is None:
         yield (
@@ -145,7 +124,7 @@ def write_prediction(
     settings = validated(AtlasSettings, keys, "--atlas").located(Path.cwd())
     series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted)
     section = settings.model_dump(exclude_defaults=True) | series
-    more = QUICK if quick else {"folding": {}}
+    more = read_keys(TEMPLATES / "quick.yaml") if quick else {"folding": {}}
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
     config = {"brains": [entry], "atlas": section, "start": entry["id"], **more, "folding": folding}
     config["runs"] = {"predicted": {"ensemble": ensemble} if ensemble else {}}
@@ -159,8 +138,7 @@ def write_prediction(
     write_text(path, text)
     span = f"{weeks[0]:g} to {weeks[1]:g} GW by {settings.name}, {series['series']}"
     given = entry.get("scheme", f"pial{' and white' if white else ''} surfaces")
-    sides = entry.get("hemispheres", {})
-    names = ", ".join(f"{side} {path}" for side, path in sides.items()) or files[0]
+    names = ", ".join(f"{side} {path}" for side, path in entry.get("hemispheres", {}).items()) or files[0]
     yield f"{entry['id']}: {names} ({given}), {span}; configuration: {shown_path}"
 
 
@@ -171,10 +149,7 @@ def with_earlier_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def store_options(path: Path, options: dict[str, Any]) -> None:
-    """Store the options of a call for a part of a BIDS data set.
-
-    Participants and sessions of earlier calls are added to those of this call.
-    """
+    """Store the options of a call for a part of a BIDS data set; earlier participants and sessions are added."""
     earlier = read_json(path) if path.is_file() else options
     stored = dict(options)
     for key in ("participants", "sessions"):
@@ -200,20 +175,17 @@ def write_bids(
     if not brains:
         causes = _causes(found.brains) or "no files named sub-…"
         choice = "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz'."
-        raise InputError(
-            "no scan can be used", path=folder, found=causes, remedy=choice if "keep one" in causes else None
-        )
+        remedy = choice if "keep one" in causes else None
+        raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
-    followed = [scans for scans in _by_subject(brains).values() if len(_weeks(scans)) > 1]
-    starts = [scans[0].entry["id"] for scans in followed]
-    can_measure = fold and bool(followed) and all(_have_shapes(scans, folder) for scans in followed)
-    weeks = _weeks(brains)
     further = read_keys(Path(settings)) if settings else {}
-    runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
     text: dict[str, Any] = {"brains": [_absolute(brain.entry, folder) for brain in brains]}
     if fold:
-        text |= {"start": starts or youngest, "runs": runs, **further}
+        followed, weeks = _series(brains), _weeks(brains)
+        can_measure = followed and all(_have_shapes(scans, folder) for scans in followed)
+        runs: dict[str, Any] = {"reference": {}} | ({"measured": {"preset": "measured"}} if can_measure else {})
+        text |= {"start": [scans[0].entry["id"] for scans in followed] or youngest, "runs": runs, **further}
         text["folding"] = {"end_week": max(max(weeks), min(weeks) + 1)} | (further.get("folding") or {})
     else:
         text |= {key: value for key, value in further.items() if key not in FOLDING_SECTIONS}
@@ -226,11 +198,12 @@ def write_bids(
     return [brain.entry["id"] for brain in brains]
 
 
-def _by_subject(brains: Sequence[FoundBrain]) -> dict[str, list[FoundBrain]]:
-    scans: dict[str, list[FoundBrain]] = {}
+def _series(brains: Sequence[FoundBrain]) -> list[list[FoundBrain]]:
+    """Return the scans of each subject or atlas that has several weeks."""
+    scans: dict[str, list[FoundBrain]] = defaultdict(list)
     for brain in brains:
-        scans.setdefault(brain.entry.get("subject", ""), []).append(brain)
-    return scans
+        scans[brain.entry.get("subject", "")].append(brain)
+    return [group for group in scans.values() if len(_weeks(group)) > 1]
 
 
 def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
@@ -263,10 +236,10 @@ def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:
 
 
 def _absolute(value: object, folder: Path) -> object:
+    """Return an entry with absolute paths of files in a folder."""
     if isinstance(value, dict):
         return {key: _absolute(item, folder) for key, item in value.items()}
     if isinstance(value, list):
         return [_absolute(item, folder) for item in value]
-    if isinstance(value, str) and (folder / value).is_file():
-        return str(own_name(folder / value))
-    return value
+    is_file = isinstance(value, str) and (folder / value).is_file()
+    return str(own_name(folder / str(value))) if is_file else value

@@ -1,7 +1,8 @@
 """Open each file that a study names once, say what it holds, and find what a run would refuse minutes later."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +70,9 @@ def input_facts(study: Study) -> Iterator[str]:
     for brain in study.config.brains:
         for path in (*brain.files, *brain.white_files.values(), *filter(None, [brain.image])):
             owners.setdefault(path, []).append(brain.id)
-    for name, regions in _given_regions(study).items():
-        for path in regions.files.values():
-            owners.setdefault(path, []).append(f"regions of {name}")
-    for run, name, value in _maps(study):
-        for path in (*files_of(value.map), *files_of(value.surface)):
-            owners.setdefault(path, []).append(f"{name} of {run}")
+    for owner, files, _ in _other_files(study):
+        for path in files:
+            owners.setdefault(path, []).append(owner)
     for path, names in owners.items():
         # problems are those of `check_brain_files` and `check_other_files`; files of atlases may be missing yet
         if Path(path).is_file():
@@ -150,28 +148,27 @@ def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
 
 def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:
     """Yield each problem of files of regions and maps: whose it is, the text, and True."""
-    for owner, regions in _given_regions(study).items():
-        try:
-            _check_regions(regions, study.brains[owner].config if owner in study.brains else None)
-        except InputError as error:
-            yield f"regions of {owner}", str(error), True
     seen = set()
-    for run, name, value in _maps(study):
-        try:
-            if (files := (name, str(value.map), str(value.surface))) not in seen:
-                seen.add(files)
-                _check_map(name, value)
-        except InputError as error:
-            yield f"{name} of run {run}", str(error), True
+    for owner, files, check in _other_files(study):
+        # runs may share a map
+        if (key := (owner.partition(" of ")[0], *files)) not in seen:
+            seen.add(key)
+            try:
+                check()
+            except InputError as error:
+                yield owner, str(error), True
 
 
-def _given_regions(study: Study) -> Mapping[str, GivenRegions]:
-    return {} if isinstance(study.config.metrics.regions, str) else study.config.metrics.regions
-
-
-def _maps(study: Study) -> Iterator[tuple[str, str, Any]]:
+def _other_files(study: Study) -> Iterator[tuple[str, list[str], Callable[[], None]]]:
+    """Yield whose each group of files of regions and maps is, the files, and the function that checks them."""
+    regions = study.config.metrics.regions
+    for name, given in ({} if isinstance(regions, str) else regions).items():
+        brain = study.brains[name].config if name in study.brains else None
+        yield f"regions of {name}", [*given.files.values()], partial(_check_regions, given, brain)
     for simulation in study.run_simulations:
-        yield from ((simulation.run, name, value) for name, value in simulation.mapped.items())
+        for name, value in simulation.mapped.items():
+            files = [*files_of(value.map), *files_of(value.surface)]
+            yield f"{name} of run {simulation.run}", files, partial(_check_map, name, value)
 
 
 def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:

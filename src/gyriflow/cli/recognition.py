@@ -13,7 +13,7 @@ import numpy as np
 from ..anatomy.labels import cerebrum_mask
 from ..anatomy.layout import layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume
+from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
@@ -57,16 +57,18 @@ UNSET = "CHOOSE"
 
 @dataclass
 class FoundBrain:
-    """A recognised scan: its entry of `brains`, the source of its age, and reasons why it cannot be used.
+    """A recognised scan: the file that names it, its entry of `brains`, and reasons why it cannot be used.
 
-    `problem` is about its files, `contradiction` about its age; `notes` are values to fill in. It `is_unreadable` if
-    files are damaged or missing, `is_template` if its folder is that of a template. `fits` is the result of
-    `scheme_fits` for its labels, `named_age` the text of an age that is from its name.
+    `space` is "" for the subject's own. `problem` is about its files, `contradiction` about its age (`named_age`: as in
+    its name); `notes` are values to fill in. It `is_unreadable` if files are damaged or missing. `fits` is from
+    `scheme_fits`.
     """
 
+    file: Path
     entry: dict[str, Any]
-    age_source: str = ""
+    space: str = ""
     problem: str = ""
+    age_source: str = ""
     is_unreadable: bool = False
     contradiction: str = ""
     notes: list[str] = field(default_factory=list)
@@ -93,30 +95,6 @@ class FoundScans:
 
     brains: list[FoundBrain]
     unused: dict[str, str]
-
-
-@dataclass
-class _Candidate:
-    """Files that may be a scan: the one that names it, their keys in an entry, and their space ("": the subject's)."""
-
-    file: Path
-    source: dict[str, Any]
-    space: str = ""
-    problem: str = ""
-
-    def label(self, entity: str) -> str | None:
-        return _label(self.file, entity)
-
-    @property
-    def data_set(self) -> Path:
-        """The data set that a subject's folder is in."""
-        parts = self.file.parts
-        before = next((number for number, part in enumerate(parts) if part.startswith("sub-")), 0)
-        return data_set_of(Path(*parts[:before]))
-
-    @property
-    def scan(self) -> str:
-        return _scan_of(self.file)
 
 
 def _labels(file: Path, entity: str) -> list[str]:
@@ -161,16 +139,11 @@ def recognise(
     own += [results.parent / "resources" for results in own]
     files = [file for file in paths if not any(map(file.is_relative_to, own))]
     tables = ScanTables([folder / file for file in files if TABLE_NAME.fullmatch(file.name)], notation)
-    found: dict[str, list[_Candidate]] = defaultdict(list)
+    found: dict[str, list[FoundBrain]] = defaultdict(list)
     unreadable = [file for file in files if (folder / file).is_dir()]
-    for candidate in (
-        *_hemispheres(files),
-        *_whole_surfaces(files),
-        *_volumes(files, unreadable),
-        *_folders(unreadable),
-    ):
-        if fnmatch(str(candidate.file), pattern):
-            found[candidate.scan].append(candidate)
+    for brain in (*_hemispheres(files), *_whole_surfaces(files), *_volumes(files, unreadable)):
+        if fnmatch(str(brain.file), pattern):
+            found[_scan_of(brain.file)].append(brain)
     # sessions without labels or surfaces count
     sessions_of: dict[str | None, set[str | None]] = defaultdict(set)
     for file in files:
@@ -180,7 +153,7 @@ def recognise(
     selected = {"sub": {label.removeprefix("sub-") for label in participants or ()}}
     selected["ses"] = {label.removeprefix("ses-") for label in sessions or ()}
     for entity, labels in selected.items():
-        existing = {candidate.label(entity) for group in found.values() for candidate in group}
+        existing = {_label(brain.file, entity) for group in found.values() for brain in group}
         if absent := sorted(labels - existing):
             problem = f"has no scan of {', '.join(f'{entity}-{label}' for label in absent)}"
             names = ", ".join(sorted(f"{entity}-{label}" for label in existing if label)[:20]) or "none"
@@ -189,7 +162,7 @@ def recognise(
     unused: dict[str, str] = {}
     brains: list[FoundBrain] = []
     for name, group in found.items():
-        if not any(labels and group[0].label(entity) not in labels for entity, labels in selected.items()):
+        if not any(labels and _label(group[0].file, entity) not in labels for entity, labels in selected.items()):
             brains += _brains_of_scan(folder, name, group, tables, sessions_of, unused)
     # templates among subjects are not scans
     if len(own_scans := [brain for brain in brains if not brain.is_template]) not in (0, len(brains)):
@@ -211,9 +184,8 @@ def recognise(
 def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
     expected = "tissue label volumes (.nii.gz), or surfaces with left and right or pial in their names"
     names = [f"\n  {file}: {reason}" for file, reason in list(reasons.items())[:10]] + ["\n  …"] * (len(reasons) > 10)
-    return InputError(
-        "no brain was recognised", path=folder, found=f"{len(reasons)} files{''.join(names)}\n", expected=expected
-    )
+    found = f"{len(reasons)} files{''.join(names)}\n"
+    return InputError("no brain was recognised", path=folder, found=found, expected=expected)
 
 
 def _rejection(file: Path) -> str:
@@ -226,21 +198,22 @@ def _rejection(file: Path) -> str:
 def _brains_of_scan(
     folder: Path,
     name: str,
-    group: Sequence[_Candidate],
+    group: Sequence[FoundBrain],
     tables: ScanTables,
     sessions_of: Mapping[str | None, set[str | None]],
     unused: dict[str, str],
 ) -> list[FoundBrain]:
     """Return a brain for each file of a scan that may be used; of several, one must be kept. Add to the `unused`."""
     brains = []
-    for candidate in _preferred_files(group, unused):
-        brain = _found_brain(folder, candidate, tables, sessions_of)
-        if brain.is_unreadable and "pial" in brain.entry and not LAYER_NAME.search(candidate.file.name):
+    for brain in _preferred_files(group, unused):
+        _complete(brain, folder, tables, sessions_of)
+        if brain.is_unreadable and "pial" in brain.entry and not LAYER_NAME.search(brain.file.name):
             unused[brain.files] = brain.problem
         else:
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
-    data_sets = sorted({str(candidate.data_set) for candidate in group})
+    above = (re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix()) for brain in group)
+    data_sets = sorted({str(data_set_of(Path(match[1] or "" if match else ""))) for match in above})
     for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
@@ -253,18 +226,18 @@ def _brains_of_scan(
     return brains
 
 
-def _preferred_files(group: Sequence[_Candidate], unused: dict[str, str]) -> list[_Candidate]:
+def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
     """Return the files of a scan in the subject's own space, else the resampled ones, else all; add to the `unused`."""
-    native = [candidate for candidate in group if not candidate.space]
-    resampled = [candidate for candidate in group if candidate.space == RESAMPLED]
+    native = [brain for brain in group if not brain.space]
+    resampled = [brain for brain in group if brain.space == RESAMPLED]
     preferred = native or resampled or list(group)
     # volumes of FreeSurfer subjects that have surfaces, too
-    volumes = {candidate.file.parents[1] / "mri" for candidate in preferred if candidate.file.parent.name == "surf"}
-    preferred = [candidate for candidate in preferred if candidate.file.parent not in volumes]
-    for candidate in group:
-        if candidate not in preferred:
-            reason = f"in the space {candidate.space}" if candidate.space else "a volume of a subject with surfaces"
-            unused[str(candidate.file)] = RESAMPLED if candidate.space == RESAMPLED else reason
+    volumes = {brain.file.parents[1] / "mri" for brain in preferred if brain.file.parent.name == "surf"}
+    preferred = [brain for brain in preferred if brain.file.parent not in volumes]
+    for brain in group:
+        if brain not in preferred:
+            reason = f"in the space {brain.space}" if brain.space else "a volume of a subject with surfaces"
+            unused[str(brain.file)] = RESAMPLED if brain.space == RESAMPLED else reason
     return preferred
 
 
@@ -289,7 +262,7 @@ def _space(file: Path, *, is_surface: bool) -> str:
     return space[1] if space and space[1].lower() not in NATIVE_SPACES else ""
 
 
-def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
+def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
     surfaces: dict[tuple[str, str], dict[Side, Path]] = {}
     files_of: dict[str, dict[Side, Path]] = defaultdict(dict)
     existing = set(files)
@@ -327,7 +300,7 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[_Candidate]:
             problem = f"has one white surface; found {next(iter(white.values()))}; expected both or none"
         elif white:
             source["white"] = [str(white[side]) for side in SIDES]
-        yield _Candidate(file, source, _space(file, is_surface=True), problem)
+        yield FoundBrain(file, source, _space(file, is_surface=True), problem)
 
 
 def _may_be_brain(name: str) -> bool:
@@ -336,16 +309,16 @@ def _may_be_brain(name: str) -> bool:
     return not (NO_BRAIN_NAME.search(name) or name.lower().endswith((".gii", ".gii.gz")))
 
 
-def _whole_surfaces(files: Sequence[Path]) -> Iterator[_Candidate]:
+def _whole_surfaces(files: Sequence[Path]) -> Iterator[FoundBrain]:
     for file in files:
         name = file.name.lower()
         layer = LAYER_NAME.search(name)
         if name.endswith(SURFACE_SUFFIXES) and (layer or _may_be_brain(name)) and not SIDE_NAME.search(name):
             problem = "a white surface alone; a pial one is needed" if layer and layer[2] else ""
-            yield _Candidate(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
+            yield FoundBrain(file, {"pial": str(file)}, _space(file, is_surface=True), problem)
 
 
-def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[_Candidate]:
+def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[FoundBrain]:
     volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
@@ -353,69 +326,66 @@ def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[_Can
             images[file.parent].append(str(file))
     for file in files:
         if ENTITY.fullmatch(file.name) and file not in unreadable:
-            yield _Candidate(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
+            yield FoundBrain(file, {"labels": str(file)}, "", "is a link to a folder that is not there")
     for file in volumes:
         if LABEL_NAME.match(file.name):
             image = {"image": images[file.parent][0]} if len(images[file.parent]) == 1 else {}
-            yield _Candidate(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
-
-
-def _folders(unreadable: Sequence[Path]) -> Iterator[_Candidate]:
+            yield FoundBrain(file, {"labels": str(file), "scheme": UNSET} | image, _space(file, is_surface=False))
     for folder in unreadable:
-        yield _Candidate(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
+        yield FoundBrain(folder, {"labels": str(folder)}, "", "is a folder that cannot be read: permission denied")
 
 
-def _found_brain(
-    folder: Path, candidate: _Candidate, tables: ScanTables, sessions_of: Mapping[str | None, set[str | None]]
-) -> FoundBrain:
-    subject, session = candidate.label("sub"), candidate.label("ses")
-    owners = _owners(candidate, tables) if subject is None else [subject]
+def _complete(
+    brain: FoundBrain, folder: Path, tables: ScanTables, sessions_of: Mapping[str | None, set[str | None]]
+) -> None:
+    """Add the age, the subject and its other values to a scan, read its files, and add why it cannot be used."""
+    scan, subject, session = _scan_of(brain.file), _label(brain.file, "sub"), _label(brain.file, "ses")
+    owners = _owners(brain.file, tables) if subject is None else [subject]
     facts, cause = None, ""
     if len(owners) > 1:
         cause = f"several rows may be of this scan: found {', '.join(owners)}; expected one id in its path"
     elif owners:
         is_only_scan = subject is None or len(sessions_of[subject]) < 2
-        facts = tables.facts(owners[0], session, is_only_scan, folder / candidate.file)
+        facts = tables.facts(owners[0], session, is_only_scan, folder / brain.file)
         cause = "" if facts or subject is None else _similar_ids(subject, tables)
     else:
-        cause = _similar_ids(candidate.scan, tables, only_similar=True)
-    age, named = facts or ScanAge(None, cause=cause), week_in_name(candidate.file.parts, tables.notation)
+        cause = _similar_ids(scan, tables, only_similar=True)
+    age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(brain.file.parts, tables.notation)
     if age.week is not None and named.week is not None and not _agree(age.week, named.week):
         age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
     elif age.week is None and not age.cause:
         age = named
-    entry: dict[str, Any] = {"id": candidate.scan, "week": UNSET if age.week is None else age.week}
+    entry: dict[str, Any] = {"id": scan, "week": UNSET if age.week is None else age.week}
     entry |= {"subject": f"sub-{subject}" if subject else owners[0]} if owners else {}
-    entry |= (covariates(facts.values) if facts else {}) | candidate.source
-    brain = FoundBrain(entry, age.source, candidate.problem, named_age=age.named)
+    brain.entry = entry | (covariates(facts.values) if facts else {}) | brain.entry
+    brain.age_source, brain.named_age = age.source, age.named
     if age.week is None:
         brain.contradiction = age.cause
         brain.notes += [] if age.cause else ["week: neither its name nor a table gives the week"]
-    labels = {entity: _labels(candidate.file, entity) for entity in ("ses", "sub")}
+    labels = {entity: _labels(brain.file, entity) for entity in ("ses", "sub")}
     if names := [f"{entity}-{label}" for entity in labels for label in labels[entity] if len(labels[entity]) > 1]:
         brain.problem = f"its path names several scans: found {', '.join(names)}; expected one"
     elif not all(re.fullmatch("[A-Za-z0-9-]+", label) for label in (*labels["sub"], *labels["ses"])):
-        brain.problem = f"has other characters than letters and digits in {candidate.scan}"
-    elif candidate.space and candidate.space != RESAMPLED:
-        brain.is_template = any(TEMPLATE_FOLDER.fullmatch(part) for part in candidate.file.parts)
-        brain.problem = f"is in the space {candidate.space}; expected the subject's own"
-    elif candidate.space:
+        brain.problem = f"has other characters than letters and digits in {scan}"
+    elif brain.space and brain.space != RESAMPLED:
+        brain.is_template = any(TEMPLATE_FOLDER.fullmatch(part) for part in brain.file.parts)
+        brain.problem = f"is in the space {brain.space}; expected the subject's own"
+    elif brain.space:
         brain.warnings.append("a surface on a template's mesh is used, since no native one was found")
     if brain.problem:
-        return brain
+        return
     try:
-        if "labels" in candidate.source:
-            brain.fits = scheme_fits(read_label_volume(folder / candidate.file, cropped=True).labels)
-        elif "pial" in candidate.source:
-            _require_brain(folder / candidate.file)
+        if "labels" in brain.entry:
+            brain.fits = scheme_fits(read_label_volume(folder / brain.file, cropped=True).labels)
+        elif "pial" in brain.entry:
+            _require_brain(folder / brain.file)
         else:
-            for path in (folder / file for file in (*brain.files.split(", "), *candidate.source.get("white", ()))):
+            for path in (folder / file for file in (*brain.files.split(", "), *brain.entry.get("white", ()))):
                 with reading(path, "a surface"), path.open("rb") as file:
                     if not file.read(1):
                         raise InputError("is empty", path=path, expected="a surface")
     except InputError as error:
         brain.problem, brain.is_unreadable = str(error), True
-    return brain
 
 
 def _require_brain(path: Path, *, whole: bool = False) -> None:
@@ -439,27 +409,22 @@ def _agree(week: float, named: float) -> bool:
     return abs(week - named) <= MAX_DIFFERENCE_WEEKS or (named.is_integer() and -0.5 <= week - named < 1.0)
 
 
-def _owners(candidate: _Candidate, tables: ScanTables) -> list[str]:
+def _owners(file: Path, tables: ScanTables) -> list[str]:
     """Return the subjects of tables whose ids are whole parts of a path without `sub-`: of the name or of a folder."""
-    parts = re.split(r"[._]", candidate.file.name)
-    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {candidate.scan}
+    parts = re.split(r"[._]", file.name)
+    beginnings = {"_".join(parts[:number]) for number in range(1, len(parts) + 1)} | {_scan_of(file)}
     in_name = [subject for subject in tables.ids if subject in beginnings]
-    in_folders = [subject for subject in tables.ids if subject in candidate.file.parts[:-1]]
+    in_folders = [subject for subject in tables.ids if subject in file.parts[:-1]]
     return [max(in_name, key=len)] if in_name else in_folders
 
 
 def _similar_ids(subject: str, tables: ScanTables, *, only_similar: bool = False) -> str:
     """Return which ids tables have instead of a subject's: those that differ in zeros or case, else the first five."""
-    ids = tables.ids
-    similar = [f"{name} ({ids[name]})" for name in ids if _plain_id(name) == _plain_id(subject)]
-    found = ", ".join(similar or ([] if only_similar else [*list(ids)[:5], "…"]))
-    return (
-        f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if ids and found else ""
-    )
-
-
-def _plain_id(name: str) -> str:
-    return re.sub(r"(?<!\d)0+(?=\d)", "", name.lower())
+    plain, *plain_ids = (re.sub(r"(?<!\d)0+(?=\d)", "", name.lower()) for name in (subject, *tables.ids))
+    named = zip(tables.ids.items(), plain_ids, strict=True)
+    similar = [f"{name} ({table})" for (name, table), plain_id in named if plain_id == plain]
+    found = ", ".join(similar or ([] if only_similar or not tables.ids else [*list(tables.ids)[:5], "…"]))
+    return f"no table has its id; found {found}; expected {subject}, with the same zeros and case" if found else ""
 
 
 def scheme_fits(labels: np.ndarray) -> dict[str, str]:
@@ -474,6 +439,14 @@ def scheme_fits(labels: np.ndarray) -> dict[str, str]:
             except InputError as error:
                 causes[name] = str(error).partition(";")[0]
     return causes
+
+
+def require_fit(fits: Mapping[str, str], scheme: str, path: str | Path, found: str) -> None:
+    """Raise InputError if other schemes fit the labels of a file, and this one does not."""
+    fitting = [name for name, against in fits.items() if not against]
+    if fitting and scheme not in fitting:
+        problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
+        raise InputError(problem, path=path, found=found)
 
 
 def recognise_brain(files: Sequence[Path], white: Sequence[Path], scheme: str | None) -> dict[str, Any]:
@@ -514,10 +487,9 @@ def _in_order(files: Sequence[Path], layer: str) -> list[Path]:
 
     InputError if a name says another layer, or if it is one hemisphere, both are of one side, or there are more.
     """
-    sides: list[Side | None] = []
+    sides = [side_in_name(file.name) for file in files]
     for file in files:
-        side, named = SIDE_NAME.search(file.name), LAYER_NAME.search(FREESURFER_INPUT.sub("", file.name))
-        sides.append(None if side is None else "left" if side[1] else "right")
+        named = LAYER_NAME.search(FREESURFER_INPUT.sub("", file.name))
         if named and bool(named[1]) != (layer == "pial"):
             problem = f"is named as a {'pial' if named[1] else 'white'} surface"
             remedy = "Give pial surfaces first, and white ones each after --white."
@@ -538,11 +510,9 @@ def recognise_labels(file: Path, scheme: str | None) -> dict[str, Any]:
         raise InputError(f"--scheme: found {scheme!r}; {did_you_mean(str(scheme), SCHEMES)}")
     entry = {"id": _scan_of(file), "labels": str(file), "scheme": UNSET}
     fits = scheme_fits(read_label_volume(file, cropped=True).labels)
-    fitting = [name for name, against in fits.items() if not against]
-    if scheme and fitting and scheme not in fitting:
-        problem = f"has labels arranged like those of {' or '.join(fitting)}, not like those of {scheme}"
-        raise InputError(problem, path=file, found=fits.get(scheme) or "labels that are not in it")
-    brain = FoundBrain(entry, fits=fits)
+    if scheme:
+        require_fit(fits, scheme, file, fits.get(scheme) or "labels that are not in it")
+    brain = FoundBrain(file, entry, fits=fits)
     choose_schemes([brain], scheme)
     if brain.notes:
         raise InputError("has labels of an unknown scheme", path=file, found=brain.notes[0], remedy="Name --scheme")

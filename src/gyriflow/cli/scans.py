@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from tabulate import tabulate
+
 from ..io.files import read_table
 from .recognition import UNSET, FoundScans
 
@@ -28,11 +30,10 @@ class ScanRow(NamedTuple):
 def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
     """Yield the lines of a table of scans, and at the end how many of them can be used."""
     rows = list(scans)
-    table: list[Sequence[str]] = [HEADINGS, *([str(text) for text in row[: len(HEADINGS)]] for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]
-    yield lines[0]
-    for line, row in zip(lines[1:], rows, strict=True):
+    table = tabulate([row[:6] for row in rows], headers=HEADINGS, tablefmt="plain", disable_numparse=True)
+    heading, *lines = table.splitlines()
+    yield heading
+    for line, row in zip(lines, rows, strict=True):
         yield line
         yield from (f"    {' '.join(reason.split())}" for reason in row.reasons)
     counts = Counter(row.verdict for row in rows)
@@ -56,13 +57,12 @@ def found_rows(found: FoundScans, verdicts: Mapping[str, tuple[str, str]]) -> It
     for brain in found.brains:
         week, scheme = brain.entry["week"], brain.entry.get("scheme", UNSET)
         reasons = [*brain.causes, *brain.warnings]
-        verdict = "not read" if brain.is_unreadable else "refused" if brain.problem or brain.contradiction else "ok"
-        verdict = "fill in" if verdict == "ok" and brain.notes else verdict
-        if verdict == "ok" and brain.entry["id"] in verdicts:
-            verdict, cause = verdicts[brain.entry["id"]]
+        if brain.causes:
+            is_refused = brain.problem or brain.contradiction
+            verdict = "not read" if brain.is_unreadable else "refused" if is_refused else "fill in"
+        else:
+            verdict, cause = verdicts.get(brain.entry["id"], ("warning" if brain.warnings else "ok", ""))
             reasons += [cause] if cause else []
-        elif verdict == "ok" and brain.warnings:
-            verdict = "warning"
         data = ", ".join(file.rpartition("/")[2] for file in brain.files.split(", "))
         age, scheme = "–" if week == UNSET else f"{week:g}", "–" if scheme == UNSET else scheme
         yield ScanRow(brain.entry["id"], age, brain.age_source or "–", data, scheme, verdict, reasons)

@@ -1,5 +1,7 @@
 """Predict time, memory and disk space of simulations, within a factor of two."""
 
+from bisect import bisect_left
+from collections.abc import Collection, Mapping, Sequence
 from math import ceil, prod
 from typing import NamedTuple
 
@@ -8,16 +10,27 @@ from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
+from ..study.paths import PATH_MESH, TARGETS
 from ..study.records import Brain, Simulation
+from ..study.study import Study
 from ..units import ML_PER_MM3, SECONDS_PER_GW
+from .path_store import PATH_MESH_SETTINGS
 
+FOLDINGS = ("simulate", "simulate_member")
+"""Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 """Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
 SECONDS_PER_ELEMENT_AND_STEP = {1: 12e-6, 2: 48e-6}
 """By element order; fitted to runs of 156 k and 500 k linear elements and 28 to 126 steps, within a factor of 1.3. A
 quadratic element counts as the eight linear elements with the same nodes."""
+SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
+"""With linear elements that grow towards shapes."""
+SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 9e-5
+"""For a mesh to follow the brains of its own series: targets, or an atlas' path."""
+PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
+"""To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 SECONDS_PER_JOB = 5.0
-"""Mean duration of the jobs other than simulations, in the demo."""
+"""Mean duration of the other jobs, in the demo."""
 ERROR_FACTOR = 2.0
 """Factor by which predictions may be wrong."""
 MIN_MIB, MIN_MINUTES, MIN_SURFACE_MIB = 2000, 60, 4000
@@ -50,7 +63,35 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     )
     # positions and fields of each output week, by a quarter as many nodes
     disk = ((run.end_week - week) / run.output_every_gw + 1) * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
-    return Needs(SECONDS_PER_ELEMENT_AND_STEP[mesh.order] * elements * steps, memory, disk)
+    follows_shapes = simulation.shapes and mesh.order == 1
+    rate = SHAPES_SECONDS_PER_ELEMENT_AND_STEP if follows_shapes else SECONDS_PER_ELEMENT_AND_STEP[mesh.order]
+    return Needs(rate * elements * steps, memory, disk)
+
+
+def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str], inputs: Collection[str] = ()) -> float:
+    """Predict the time of a job on one core; 0 for an atlas' path without a mesh among its inputs, which is kept."""
+    mesh, brain = study.config.mesh, wildcards.get("brain", "")
+    if rule in FOLDINGS:
+        return simulation_needs(study.simulations[wildcards["run"], brain], mesh).seconds
+    if rule == "atlas_path":
+        if PATH_MESH["mesh"].format(brain=brain) not in inputs:
+            return 0.0
+        paths = (chain.path for chain in study.chains.values() if chain.path)
+        return _series_seconds(next(path.weeks for path in paths if path.brains[0].id == brain), PATH_MESH_SETTINGS)
+    if rule not in ("targets", "predicted_targets"):
+        return SECONDS_PER_JOB
+    chain, file = study.chains[brain, wildcards["origin"]], TARGETS.format(**wildcards)
+    if chain.path is None:
+        return _series_seconds(chain.weeks, mesh)
+    end = max(simulation.weeks[-1] for simulation in study.simulations.values() if simulation.targets == file)
+    start, later = chain.weeks[0], [week for week in chain.path.weeks if week > chain.weeks[0]]
+    # it ends two weeks of the atlas after the end
+    weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
+    return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(start, mesh) * weeks
+
+
+def _series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
+    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(weeks[0], mesh) * (weeks[-1] - weeks[0])
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:

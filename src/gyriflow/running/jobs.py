@@ -12,7 +12,6 @@ import pandas as pd
 
 from ..io.files import AnyPath
 
-MESSAGE_COLUMNS = ("subject", "run", "step", "level", "message")
 NEXT = r"(?!\d{4}-\d\d-\d\d |warning: |gyriflow: )"
 """Lookahead: the line does not begin another message."""
 MESSAGE = re.compile(
@@ -28,11 +27,8 @@ UNSPECIFIC_ERROR = "WorkflowError"
 """Suffix of exceptions that only report that a step failed; logs of jobs on a cluster end with them."""
 LOGGED = re.compile(r"\d{4}-\d\d-\d\d \S+ (?:INFO|WARNING) ")
 OUT_OF_MEMORY = "it was killed, most probably because memory ran out: its log ends without a message"
-_PLACES = (
-    re.compile(r"results/brains/(?P<subject>[^/]+)/(?:metrics/)?logs/(?P<step>[^/]+)\.log"),
-    re.compile(r"results/runs/(?P<run>[^/]+)/(?P<subject>[^/]+)/(?:.*/)?logs/(?P<step>[^/]+)\.log"),
-    re.compile(r"results/study/(?:.*/)?logs/(?P<step>[^/]+)\.log"),
-)
+LOG_FOLDERS = {"brains": ["subject"], "runs": ["run", "subject"], "study": []}
+"""What the folders around a log name, by folder in `results`."""
 
 
 class Message(NamedTuple):
@@ -41,6 +37,10 @@ class Message(NamedTuple):
     level: str
     text: str
     by_gyriflow: bool
+
+    @property
+    def first_line(self) -> str:
+        return self.text.partition("\n")[0]
 
 
 def messages_in(text: str) -> Iterator[Message]:
@@ -55,10 +55,7 @@ def messages_in(text: str) -> Iterator[Message]:
 
 
 def cause(text: str) -> str:
-    """Return why a job failed, from its log: gyriflow's own message, else the exception, else the last lines.
-
-    A job was killed if its log ends without an error.
-    """
+    """Return why a job failed, from its log: gyriflow's own message, the exception, or the last lines if not killed."""
     # the program's own error line comes before logged errors
     printed = [match["error"].strip() for match in MESSAGE.finditer(text) if match["error"]]
     errors = printed or [
@@ -95,8 +92,7 @@ def read_log(path: AnyPath) -> str:
 
 def read_messages(path: AnyPath) -> list[tuple[str, str]]:
     """Return the distinct messages of a step's log as ("warning" or "error", first line)."""
-    messages = [(message.level, message.text.partition("\n")[0]) for message in messages_in(read_log(path))]
-    return list(dict.fromkeys(messages))
+    return list(dict.fromkeys((message.level, message.first_line) for message in messages_in(read_log(path))))
 
 
 def gather_messages(
@@ -104,20 +100,18 @@ def gather_messages(
 ) -> pd.DataFrame:
     """Return the warnings and errors of a study, of some of its brains, and of some (run, brain) pairs.
 
-    Columns are subject, run (each empty if not applicable), step, level ("warning" or "error") and message. Only logs
-    written after `since_s` (s since the epoch) are read.
+    Subject and run are empty if not applicable. Only logs written after `since_s` (s since the epoch) are read.
     """
-    folder, ids, folded = Path(folder), set(brains), {tuple(pair) for pair in runs}
+    folder, known = Path(folder), {("", ""), *(("", brain) for brain in brains), *map(tuple, runs)}
     rows = []
-    for path in sorted(folder.glob("results/**/logs/*.log")):
-        place = path.relative_to(folder).as_posix()
-        match = next((match for pattern in _PLACES if (match := pattern.fullmatch(place))), None)
-        if match is None or path.stat().st_mtime < since_s:
-            continue
-        source = {"subject": "", "run": "", **match.groupdict()}
-        if (source["run"], source["subject"]) in folded or (not source["run"] and source["subject"] in {"", *ids}):
+    for path in sorted(folder.glob("results/*/**/logs/*.log")):
+        kind, *names = path.relative_to(folder / "results").parts[:-2]
+        source = {"run": "", "subject": ""} | dict(zip(LOG_FOLDERS.get(kind, ()), names, strict=False))
+        is_known = kind in LOG_FOLDERS and (source["run"], source["subject"]) in known
+        if is_known and path.stat().st_mtime >= since_s:
+            source["step"] = path.stem
             rows += [{**source, "level": level, "message": message} for level, message in read_messages(path)]
-    return pd.DataFrame(rows, columns=list(MESSAGE_COLUMNS))
+    return pd.DataFrame(rows, columns=["subject", "run", "step", "level", "message"])
 
 
 BENCHMARK_COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}
@@ -127,9 +121,8 @@ BENCHMARK_COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"
 def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
     """Return time and memory of jobs as measured by Snakemake, in the order of the rules.
 
-    `patterns` are regular expressions for the paths of each rule's benchmark files, with the groups `run` and `brain`.
-    Columns are rule, run and brain (None if not applicable), wall_s, cpu_s, memory_MiB. Values are NaN if Snakemake
-    could not measure them ("NA", "-") or the file is incomplete.
+    `patterns` are regular expressions for the paths of each rule's benchmark files, with the groups `run` and `brain`
+    (None if not applicable). Values are NaN if Snakemake could not measure them or the file is incomplete.
     """
     folder = Path(folder)
     benchmarks = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))

@@ -37,8 +37,6 @@ ENVIRONMENT = SHIPPED / "envs" / "gyriflow.yaml"
 """The conda environment, whose variables of MPI and BLAS are defaults in any other one, too, as in `./run`."""
 INTERRUPT_S = 0.5
 """Time for Snakemake to notice an interruption before its jobs are stopped, so that they do not count as failed."""
-MAX_WAIT_S = 3.0
-"""Time to wait for a run that is about to end."""
 GRACE_S = 4.0
 """Time for jobs to end by SIGTERM, before they are killed. Schedulers and containers allow 10 s or more in all."""
 READ_ONLY_OPTIONS = (
@@ -70,10 +68,7 @@ received_signals: list[int] = []
 
 
 def hold_lock(directory: Path) -> IO[str] | None:
-    """Lock a working directory; return the open lock file, or None if another process holds the lock.
-
-    The lock lasts until the file is closed. StorageError if the directory cannot be written.
-    """
+    """Lock a working directory until the returned file is closed; None if another process has locked it."""
     path = directory / ".snakemake" / "gyriflow.lock"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,12 +83,9 @@ def hold_lock(directory: Path) -> IO[str] | None:
 
 
 def clear_stale_lock(directory: Path) -> None:
-    """Remove Snakemake's locks from a working directory if nothing runs in it.
-
-    Waits at most `MAX_WAIT_S` seconds for a run to end. StorageError if it still runs, or if the directory cannot be
-    written.
-    """
-    deadline = time.monotonic() + MAX_WAIT_S
+    """Remove Snakemake's locks from a working directory; StorageError if it is in use or cannot be written."""
+    # a run may be about to end
+    deadline = time.monotonic() + 3.0
     while (file := hold_lock(directory)) is None:
         if time.monotonic() > deadline:
             remedy = "Wait for it to end, or choose another folder with --directory"
@@ -110,17 +102,14 @@ def clear_stale_lock(directory: Path) -> None:
 
 
 def check_configfiles(files: Sequence[Path], directory: Path) -> None:
-    """Raise InputError if a configuration file is missing, is not YAML or has a duplicate key.
-
-    Without `files`, the directory's own config/config.yaml is checked if it exists.
-    """
+    """Raise InputError if a file, or else the directory's config/config.yaml, is not a valid YAML configuration."""
     default = directory / "config" / "config.yaml"
     for file in files or ([default] if default.is_file() else []):
         try:
             read_keys(file)
         except InputError as error:
-            remedy = "" if file.exists() else ". Put targets before --configfile, or after another option"
-            raise InputError(f"configuration {error}{remedy}") from error
+            remedy = None if file.exists() else "Put targets before --configfile, or after another option"
+            raise InputError(f"configuration {error}", remedy=remedy) from error
 
 
 def check_options(unknown: Sequence[str], usage: str) -> None:
@@ -128,13 +117,6 @@ def check_options(unknown: Sequence[str], usage: str) -> None:
     options = ["--stage", *dict.fromkeys(re.findall(r"--[a-z][a-z-]+", usage))]
     for name in (argument.partition("=")[0] for argument in unknown if argument.startswith("-")):
         raise InputError(f"unknown option {name}; {did_you_mean(name, options)}")
-
-
-def unknown_target_error(name: str) -> InputError:
-    """Return the error for a target that no rule makes."""
-    rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
-    targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
-    return InputError(f"no stage or result is named {name}; {did_you_mean(name, targets)}")
 
 
 def redirect_output(log: Path) -> None:
@@ -186,9 +168,9 @@ def _is_running(process: psutil.Process) -> bool:
 
 
 def finish_without(refused: dict[str, str], arguments: Sequence[str], directory: Path) -> int:
-    """Run the same call again without the refused brains, so that the others get their tables and figures.
+    """Run the same call again without the refused brains, unless it asks for their files.
 
-    Nothing is run if the call asks for files of a refused brain. Return the exit code of an interrupted run, or else 0.
+    Return the exit code of an interrupted run, or else 0.
     """
     if any(argument.startswith(f"results/brains/{brain}/") for argument in arguments for brain in refused):
         return 0
@@ -211,10 +193,7 @@ def finish_without(refused: dict[str, str], arguments: Sequence[str], directory:
 
 
 def exit_code(code: int, recorded: int | None, directory: Path) -> int:
-    """Return the exit code of a run, given Snakemake's `code` and the one `recorded` by the first failed step.
-
-    A full disk is reported and gives the code of a StorageError.
-    """
+    """Return the exit code of a run, given Snakemake's `code` and the one `recorded`; report a full disk."""
     if code and recorded in (None, 1) and (full := full_disk(directory)):
         print(f"gyriflow: {directory.resolve()}: {full}, then run the same command again", file=sys.stderr)
         return StorageError.exit_code
@@ -255,21 +234,8 @@ def set_environment(exit_file: Path, *, keep_going: bool, dry_run: bool) -> None
     os.environ[EXIT_FILE] = str(exit_file)
 
 
-def restore_dates(directory: Path) -> None:
-    """Give the results of a copied study the dates at which they were made."""
-    if dates := dates_before_copy(directory):
-        print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
-    # files of another user cannot be dated
-    with suppress(OSError):
-        for path, date in dates.items():
-            os.utime(path, (date, date))
-
-
 def call_snakemake(arguments: Sequence[str]) -> int:
-    """Run Snakemake in this process; return its exit code, or 128 plus the number of the signal that stopped it.
-
-    InputError if a target does not exist.
-    """
+    """Run Snakemake in this process; return its exit code, or 128 plus the number of the signal that stopped it."""
     from snakemake import cli
 
     unknown_targets: list[str] = []
@@ -306,8 +272,10 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         code = 1
     finally:
         logger.removeFilter(is_shown)
-    if unknown_targets:
-        raise unknown_target_error(unknown_targets[0])
+    for name in unknown_targets:
+        rules = [path.read_text() for path in (SHIPPED / "workflow" / "rules").glob("*.smk")]
+        targets = re.findall(r"^rule (\w+):", "".join(rules), re.MULTILINE)
+        raise InputError(f"no stage or result is named {name}; {did_you_mean(name, targets)}")
     return 128 + received_signals[0] if code and received_signals else code
 
 
@@ -325,16 +293,21 @@ def main(arguments: Sequence[str]) -> int:
     dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
     if not dry_run:
         clear_stale_lock(directory)
-        restore_dates(directory)
+        if dates := dates_before_copy(directory):
+            print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
+        # files of another user cannot be dated
+        with suppress(OSError):
+            for path, date in dates.items():
+                os.utime(path, (date, date))
     runs_nothing = dry_run and not options.nolock
+    if not runs_nothing:
+        set_cache(directory)
     # in the working directory, where jobs on other machines of a cluster find it too
     folder = Path(gettempdir()) if runs_nothing else directory.absolute() / ".snakemake"
     exit_file = folder / f"gyriflow-exit-{os.getpid()}"
     # a killed run may have had the same process number, as in containers
     with suppress(OSError):
         exit_file.unlink()
-    if not runs_nothing:
-        set_cache(directory)
     set_environment(exit_file, keep_going=options.keep_going, dry_run=dry_run)
     complete = ["--snakefile", str(SHIPPED / "Snakefile")] if options.snakefile is None else []
     # a folder of that name may be in the working directory

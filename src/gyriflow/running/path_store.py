@@ -26,16 +26,11 @@ def path_store(study: Study, path: Chain, contents: Mapping[str, str]) -> Path |
     code. `contents` are hashes by path (`provenance.input_contents`).
     """
     config, first = study.config, path.brains[0].id
-    folders = [
-        used.folder
-        for used in study.used_atlases
-        for file in used.files
-        if used.atlas.brain_id(file.series, file.week) == first
-    ]
-    if not folders or not all(brain.id in study.atlases for brain in path.brains):
+    if not all(brain.id in study.atlases for brain in path.brains):
         return None
+    folder = next(used.folder for used in study.used_atlases if used.atlas is study.atlases[first])
     files = [[contents[file] for file in brain.config.files] for brain in path.brains]
     code = [code_hash(SHIPPED / "workflow" / "scripts" / f"{name}.py") for name in SCRIPTS]
     settings = [config.surface.model_dump(mode="json"), PATH_MESH_SETTINGS.model_dump(mode="json"), path.weeks]
     key = hashlib.sha256(json.dumps([files, settings, config.growth.matched_surfaces, code]).encode()).hexdigest()[:12]
-    return folders[0] / "paths" / f"{first}-{key}.h5"
+    return folder / "paths" / f"{first}-{key}.h5"

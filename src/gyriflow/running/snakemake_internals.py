@@ -26,14 +26,14 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
     """Give rules a parameter that changes with their code; Snakemake reruns jobs whose parameters have changed.
 
     Snakemake itself sees the date of a script, which a new checkout changes, and no package that a script imports. A
-    shell command has to name the code of its program itself. `rules` are those of a workflow, as `workflow.rules` has
-    them; `scripts` is the folder of their scripts.
+    shell command has to name the code of its program itself. `scripts` is the folder of the rules' scripts.
     """
     for rule in rules:
+        script = scripts / Path(rule.script or "").name
         if rule.script and not hasattr(rule.params, "code"):
-            rule.set_params(code=code_hash(scripts / Path(rule.script).name))
+            rule.set_params(code=code_hash(script))
         if rule.script or rule.shellcmd:
-            text = rule.shellcmd or (scripts / Path(rule.script).name).read_text()
+            text = rule.shellcmd or script.read_text()
             rule.set_params(command=f"code {hashlib.sha256(text.encode()).hexdigest()[:12]}")
 
 
@@ -58,13 +58,8 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
     """Have Snakemake record the content of input files instead of their paths, so that they may be moved.
 
     Files of gyriflow and of a user count as changed if their content has, whatever their date. Dates of results mean
-    nothing in a copy of a study.
-
-    Parameters
-    ----------
-    contents : hashes of the study's input files by path
-    earlier : hashes of the last run
-    folders : folders of the user whose place is not recorded, as that of the working directory and of gyriflow is not
+    nothing in a copy of a study. `contents` are hashes of the study's input files by path, `earlier` those of the last
+    run; the place of `folders` is not recorded, like that of the working directory and of gyriflow.
     """
     from snakemake.io import _IOFile
     from snakemake.persistence import PersistenceBase
@@ -126,7 +121,7 @@ def temporary_records(directory: Path) -> Iterator[None]:
 
 
 def dates_before_copy(directory: Path) -> dict[Path, float]:
-    """Return when the results of a working directory were made (s since the epoch), by path.
+    """Return when the results of a copied working directory were made (s since the epoch), by path.
 
     Empty if any of them still has its date, as after a move: then no copy has given all of them new ones.
     """

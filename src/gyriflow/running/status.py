@@ -39,7 +39,15 @@ def status(directory: Path) -> Iterator[str]:
     configured = _configured(directory)
     if not results.is_dir() and state is None and not (directory / CONFIG).is_file():
         raise InputError("contains no study", path=directory.resolve(), expected=f"results/ or {CONFIG} in it")
-    yield from _lines(state, is_live(directory))
+    is_live = False
+    # this user has no run in a directory that cannot be written
+    with suppress(StorageError):
+        if (directory / ".snakemake" / "gyriflow.lock").is_file():
+            lock = hold_lock(directory)
+            is_live = lock is None
+            if lock:
+                lock.close()
+    yield from _lines(state, is_live)
     brains = [
         {"brain": folder.name}
         | {name: "done" if (folder / file).is_file() else MISSING for name, file in BRAIN_RESULTS.items()}
@@ -68,18 +76,6 @@ def format_duration(seconds: float) -> str:
 def format_progress(step: Mapping[str, Any]) -> str:
     """Format the progress of a simulation from one of its step events."""
     return f"GW {step['week']:.2f} of {step['end_week']:g}"
-
-
-def is_live(directory: Path) -> bool:
-    """Return whether a run is using a directory at this moment."""
-    # this user has no run in a directory that cannot be written
-    with suppress(StorageError):
-        if (directory / ".snakemake" / "gyriflow.lock").is_file():
-            lock = hold_lock(directory)
-            if lock is None:
-                return True
-            lock.close()
-    return False
 
 
 def find_report(directory: Path) -> Path:

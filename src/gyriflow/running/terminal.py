@@ -198,8 +198,7 @@ class RunDisplay:
         self._follow(job)
         for message in messages_in(read_log(job.log)) if job.log else ():
             if message.by_gyriflow and message.level == "warning":
-                first_line, _, _ = message.text.partition("\n")
-                self._show_once(f"warning {job.name}: {first_line}")
+                self._show_once(f"warning {job.name}: {message.first_line}")
 
     def _show_once(self, line: str) -> None:
         if line not in self.shown:

@@ -30,6 +30,7 @@ from gyriflow.running.cost import (
     simulation_needs,
     surface_memory_mib,
 )
+from gyriflow.running.path_store import PATH_MESH_SETTINGS
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.shipped import SHIPPED
@@ -307,6 +308,51 @@ def test_the_time_and_work_of_a_study_are_those_of_its_foldings_and_other_steps(
         # the two largest of the foldings that run at the same time
         memory = long.memory_mib if cores == 1 else max(long.memory_mib, short.memory_mib)
         assert lines[4] == Facts("memory", f"{memory / 1024:.1f} GB")
+
+
+def test_a_prediction_takes_the_time_of_its_atlas_path_its_shapes_and_its_folding(tmp_path, monkeypatch):
+    weeks = (22, 24, 25, 27, 30, 34)
+    atlas = [{"id": f"x{week}", "week": week, "population": "x", **LABELLED} for week in weeks]
+    brains = [{"id": "a", "week": 23, "population": "a", **LABELLED}, *atlas]
+    expected = {"preset": "expected", "end_week": 25}
+    growth = {"brains": {"x": [f"x{week}" for week in weeks]}}
+    study = resolve(load(STUDY | {"brains": brains, "folding": expected, "growth": growth, "runs": {"p": {}}}))
+    mesh, reason = study.config.mesh, "Missing output files: x"
+    made = "results/brains/x22/path/shapes.h5", "results/brains/a/mesh/targets.atlas.h5"
+    needed = ["results/brains/x22/path/brain.xdmf"]
+    path = checking.PlannedJob("atlas_path", {"brain": "x22"}, 1, reason, needed, made[:1])
+    targets = checking.PlannedJob(
+        "predicted_targets", {"brain": "a", "origin": "atlas"}, 1, reason, ["x.xdmf", *made[:1]], made[1:]
+    )
+    folding = checking.PlannedJob("simulate", {"run": "p", "brain": "a"}, 2, reason, made[1:])
+    simulation = study.simulations["p", "a"]
+    steps = 2 * 7 * 86400 / simulation.settings.step_s
+    folding_s = 6e-6 * linear_elements(23, mesh) * steps
+    assert simulation_needs(simulation, mesh).seconds == pytest.approx(folding_s)
+    # the path has 12 weeks; the prediction ends at the second week at or past the end
+    path_s = 9e-5 * linear_elements(22, PATH_MESH_SETTINGS) * 12
+    targets_s = 10 + 4e-5 * linear_elements(23, mesh) * (27 - 23)
+    for jobs, cores, seconds in (
+        ([path, targets, folding], 1, path_s + targets_s + folding_s),
+        ([path, targets, folding], 2, path_s + targets_s + folding_s / 2),
+        ([path._replace(inputs=["paths/x22-0123.h5"]), targets, folding], 2, targets_s + folding_s / 2),
+        ([targets, folding], 1, targets_s + folding_s),
+    ):
+        monkeypatch.setattr(checking, "plan", lambda *_, jobs=jobs, **__: jobs)
+        lines = [line for line, _ in work_of(tmp_path / "x.yaml", tmp_path, cores, [], study)]
+        assert next(line for line in lines if line.startswith("time")) == Facts(format_duration(seconds), cores)
+        on_path = [line for line in lines if "path of" in line]
+        if jobs[0] is path:
+            assert on_path == [Facts("x22", "has to be made", format_duration(path_s))]
+        else:
+            assert ["kept" in line for line in on_path] == [True] * (len(jobs) - 2)
+    # of its own series, all weeks of it
+    measured = {"start": "x22", "folding": {"preset": "measured", "end_week": 30}, "growth": growth}
+    own = resolve(load(STUDY | {"brains": brains} | measured))
+    jobs = [checking.PlannedJob("targets", {"brain": "x22", "origin": "self"}, 1, reason)]
+    monkeypatch.setattr(checking, "plan", lambda *_, **__: jobs)
+    lines = [line for line, _ in work_of(tmp_path / "x.yaml", tmp_path, 1, [], own)]
+    assert lines[2] == Facts(f"about {format_duration(9e-5 * linear_elements(22, mesh) * 8)} on")
 
 
 @pytest.mark.parametrize(
