@@ -46,13 +46,11 @@ def path_through(
     step_gw: float = 1 / 7,
     stops: Collection[float] = (),
 ) -> Path:
-    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, as a run with steps of `step_gw` takes
-    it.
+    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, for a run with steps of `step_gw`.
 
-    Each shape is first aligned rigidly to the one before. Shapes observed at almost the same time are merged
-    (`merged_shapes`); `stops` are the weeks of shapes that were not observed but lie between. The velocity is
-    continuous, that of `limited_velocities`. Near elements that a straight step of the run would invert, the path is
-    straight from shape to shape instead, so that the velocity may jump there at the two weeks.
+    Each shape is aligned rigidly to the one before; shapes at almost the same time are merged (`merged_shapes`).
+    `stops` are weeks of shapes that were not observed. Velocities are `limited_velocities`; near elements that a step
+    would invert the path is straight from shape to shape, so that the velocity may jump at the weeks.
     """
     sizes = vertex_sizes(shapes[0], linear_pieces(mesh))
     aligned = [shapes[0]]
@@ -132,8 +130,7 @@ def _next(observed: Ints, last: int) -> int:
 def limited_velocities(weeks: Floats, places: Floats) -> Floats:
     """Return the (k, n, 3) velocities at k weeks of points on their way through (k, n, 3) places.
 
-    At each week it is that of the parabola through this place and its neighbours, at the ends the mean velocity to the
-    neighbour; limited in length, so that noise of two shapes at almost the same time does not bend the path after them.
+    It is the parabola's through a place and its neighbours, the mean velocity at the ends, limited in length.
     """
     velocities = np.gradient(places, weeks, axis=0)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(weeks)[:, None]

@@ -57,10 +57,9 @@ LATTICE_TRIANGLES = np.array(
 
 @dataclass(frozen=True, eq=False)
 class TetrahedralMesh:
-    """A tetrahedral mesh of linear or of quadratic elements: (n, 3) nodes in mm, and (m, 4) or (m, 10) elements.
+    """A tetrahedral mesh: (n, 3) nodes in mm, and (m, 4) linear or (m, 10) quadratic elements of positive volume.
 
-    Elements are indices of nodes in the order of VTK: four corners, and the nodes on the edges 01, 12, 02, 03, 13, 23.
-    Volumes are positive.
+    Nodes are in the order of VTK: four corners, and those on the edges 01, 12, 02, 03, 13, 23.
     """
 
     vertices: Floats
@@ -103,10 +102,7 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
 
 
 def radius_ratios(mesh: TetrahedralMesh) -> Floats:
-    """Return the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
-
-    For quadratic elements they are computed from the corners.
-    """
+    """Return the (m,) ratios 3 × inscribed / circumscribed radius of the corners: 1 regular, 0 flat."""
     ratios = np.empty(len(mesh.tets))
     for part in chunks(len(ratios)):
         a, b, c, d = mesh.vertices[mesh.corners[part].T]
@@ -142,10 +138,7 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
 
 
 def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Add a node at the midpoint of each edge of a linear mesh: quadratic elements with straight sides.
-
-    Corners keep their numbers.
-    """
+    """Add nodes at the midpoints of a linear mesh's edges; corners keep their numbers."""
     pairs = np.sort(mesh.tets[:, EDGES], axis=2).reshape(-1, 2)
     names, place = np.unique(pairs @ [len(mesh.vertices), 1], return_inverse=True)
     ends = np.stack(np.divmod(names, len(mesh.vertices)), axis=1)
@@ -154,10 +147,7 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
-    """Return the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight for each quadratic one.
-
-    Elements with straight sides and positive volume give pieces of positive volume.
-    """
+    """Return the (p, 4) linear tetrahedra between the nodes: the elements, or eight for each quadratic one."""
     return mesh.tets if mesh.order == 1 else np.asarray(mesh.tets[:, PIECES]).reshape(-1, 4)
 
 
