@@ -34,8 +34,7 @@ QUARTERS_DEG = 15.0
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
     """Estimate the pose from cerebellum, brainstem and labelled sides; return None if too few of them are labelled.
 
-    The file's pose is kept if it differs by less than 60°, with a warning from 15° on. InputError if the labels of
-    left and right are mirrored, so that no rotation can correct them.
+    InputError if labels of left and right are mirrored, so that no rotation can correct them.
     """
     centres = {
         name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
@@ -100,10 +99,7 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
 
 
 def _rotation_from_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
-    """Estimate the (3, 3) rotation to RAS+ from labelled sides and the hindbrain together.
-
-    InputError if the sides are mirrored, according to the `rotation` from the hindbrain or to the fit itself.
-    """
+    """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain; InputError if they are mirrored."""
     below = [(unit(offset), EXPECTED[name]) for name, offset in hindbrain.items()]
     turn, mirrored = (_rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides))
     if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
@@ -124,9 +120,8 @@ def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
     """Return whether exchanged sides explain a volume better than a rotation.
 
-    Mirrored sides with one more direction still fit a rotation `turn`: a half turn about an oblique axis. With the
-    sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes instead give
-    quarter turns, most often from LPS. Otherwise the sides of an upright brain are taken to be exchanged.
+    Mirrored sides and one more direction fit an oblique half turn, and exchanged an upright brain; wrong axis codes
+    give quarter turns, most often from LPS.
     """
     if angle_deg(turn) < MIN_TURN_DEG:
         return False

@@ -58,9 +58,8 @@ CLOSING_MM = 6.0
 class Cerebrum:
     """The cerebrum of a label volume, cropped with a margin of `PAD_VOXELS`.
 
-    `mask` (i, j, k) is its mask, `tissue` are the labels, with 0 where labels of the cerebrum were removed; the (4, 4)
-    affine is that of the cropped volume. Parts below `smallest_part` of the largest were removed; if the sides are
-    labelled, a hemisphere may be far smaller than the other. The report has volumes and removed parts, in plain values.
+    `mask` (i, j, k) is its mask, `tissue` the labels, 0 where they were removed; the (4, 4) affine is that of the
+    cropped volume. Parts below `smallest_part` of the largest were removed. The report is in plain values.
     """
 
     mask: Mask
@@ -130,11 +129,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Return the (i, j, k) mask of the cerebrum.
-
-    InputError if the volume has labels that are not in the scheme, or lacks all of the scheme's labels of the cerebrum,
-    the cortex or the white matter (of everything inside the cortex, if the scheme has no white matter).
-    """
+    """Return the (i, j, k) mask of the cerebrum; InputError for labels not in the scheme, or missing tissues of it."""
     present = set(map(int, np.unique(labels))) - {0}
     unknown = sorted(present - set(scheme.labels))
     if unknown:
@@ -165,10 +160,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
 def require_cortex_outside(
     labels: Labels, scheme: LabelScheme, minimum: float = MIN_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
 ) -> float:
-    """Return the share of the cerebrum's surface that is covered by cortex; `unlabelled` ventricles count as cerebrum.
-
-    InputError if it is less than `minimum`: then the scheme belongs to another kind of volume with the same numbers.
-    """
+    """Return the share of the cerebrum's surface with cortex; InputError below `minimum`: another scheme."""
     cerebrum = ndimage.binary_fill_holes(np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1))
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
@@ -183,10 +175,7 @@ def require_cortex_outside(
 
 
 def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats) -> None:
-    """Raise InputError if labels of the left hemisphere lie to the right of those of the right one, or are mixed.
-
-    `to_right` (3,) is the direction from left to right in the coordinates of the (4, 4) affine.
-    """
+    """Raise InputError if, along `to_right` (3,) in mm, labels of left lie right of those of right, or are mixed."""
     if not (np.isin(labels, scheme.left).any() and np.isin(labels, scheme.right).any()):
         return
     left, right = (
@@ -211,10 +200,8 @@ def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right:
 def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's tissue.
 
-    Labels of the ventricles often continue through the aqueduct to the fourth ventricle, between brainstem and
-    cerebellum. A voxel of fluid is enclosed if more than half of its 26 rays through fluid hit tissue of the cerebrum.
-    If the scheme has cerebellum or brainstem, only parts that touch these more than anything else outside are left
-    out, so that a ventricle which thin tissue leaves open to the outer CSF stays whole.
+    Their labels often continue to the fourth ventricle. A voxel is enclosed if more than half of its 26 rays through
+    fluid hit tissue. With cerebellum or brainstem in the scheme, only parts that mostly touch these are left out.
     """
     fluid = np.isin(labels, scheme.ventricles)
     if not fluid.any():
@@ -229,9 +216,8 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
     """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is labelled.
 
-    More than half of the 26 rays of such a voxel hit tissue inside the cortex. Rays in sulci, fissures and cisterns hit
-    cortex or leave the brain. If no cortex is labelled, almost all rays must hit. Less than `REPORTED_LOSS` of the
-    cerebrum is roughness of the labels.
+    More than half of the 26 rays of such a voxel hit tissue inside the cortex, almost all if no cortex is labelled.
+    Less than `REPORTED_LOSS` of the cerebrum is roughness of the labels.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)

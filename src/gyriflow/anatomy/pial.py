@@ -117,10 +117,8 @@ MIN_GAP_MM = 0.5
 class PialSurface:
     """A posed pial surface in RAS+ mm.
 
-    `whole` is closed and outward, in one piece or in one for each hemisphere. `left` and `right` are its parts, open
-    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls; None for a
-    missing hemisphere. `pose` leads from the brain's files. The report has the pose, measures and repairs, in plain
-    values for JSON.
+    `whole` is closed and outward, in one or two pieces. `left` and `right` (None if missing) are its parts, open where
+    cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls. `pose` leads from the brain's files.
     """
 
     whole: TriangleMesh
@@ -161,15 +159,12 @@ def from_labels(
 ) -> PialSurface:
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
-    A volume with wrong axes is rotated according to its cerebellum, brainstem and sides, or else to its shape. The
-    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel) and its handles are removed. Its isosurface is smoothed,
-    remeshed to `edge_length_mm`, freed of terraces, moved outward to restore the volume, and rotated so that the
-    mid-sagittal plane is x = const. If cortex labels of both sides touch, the fissure is opened there to 1.5 mm,
-    half-way between the labels of the two sides if the scheme has them. With `open_sulci`, fused sulci are opened. With
-    `side` the volume contains only that hemisphere, which is posed as in `from_surface`.
+    The pose follows from cerebellum, brainstem and sides, or else from the shape. The mask is smoothed (Gaussian, σ = 1
+    voxel) and freed of handles; its surface is smoothed, remeshed to `edge_length_mm`, freed of terraces, given the
+    mask's volume, and rotated so that the mid-plane is x = const. Where cortex labels of both sides touch, the fissure
+    is opened to 1.5 mm; with `open_sulci`, fused sulci are. A hemisphere (`side`) is posed as in `from_surface`.
 
-    InputError if the labels do not fit the scheme or the week, for a single hemisphere without `side`, and for a whole
-    brain or labels of the other hemisphere with it. MeshError if the surface keeps self-intersections.
+    InputError if the labels do not fit the scheme, the week or the `side`. MeshError if self-intersections remain.
     """
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
     cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
@@ -259,10 +254,9 @@ def _fissure_of_labels(
 def _with_fissure(
     field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], core: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Open a hidden fissure as a whole, down to the tissue that joins the hemispheres.
+    """Open a hidden fissure as a whole; return the field, its affine, and the volume removed (mL).
 
-    Return the field, its affine, and the volume removed (mL). If more than a thousandth of the brain is removed, the
-    fissure was fused. Voxels that are too coarse for its walls are then refined first.
+    Where more than a thousandth of the brain is removed, voxels too coarse for its walls are refined first.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # an opening of less than two voxels would be lost
@@ -338,14 +332,11 @@ def from_hemispheres(
 ) -> PialSurface:
     """Return the pial surface of a brain from surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to
-    `edge_length_mm`, rotated together so that the mid-sagittal plane is x = const, and moved along x to a gap of 0.5 mm
-    between them. With coordinates "auto" each may have any rigid pose, which is determined from its
-    shape; `declared` is whether both files name the same coordinate system. If a shape contradicts named coordinates,
-    there is a warning.
-    Hemispheres that share the vertices of a cut, as those that gyriflow writes, are joined along it to one surface.
-    InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
-    impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
+    They are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to `edge_length_mm`,
+    rotated so that the mid-plane is x = const, and moved to a gap of 0.5 mm. With coordinates "auto" each may have any
+    rigid pose; `declared` is whether both files name one coordinate system. Hemispheres that share the vertices of a
+    cut are joined. InputError if the pose is unclear, or they are swapped or of different or impossible size; MeshError
+    if one cannot be made sound.
     """
     if (joined := joined_along_cut(left, right)) is not None:
         connected = from_surface(
@@ -432,12 +423,9 @@ def from_surface(
 ) -> PialSurface:
     """Return the pial surface of a brain, or of a single hemisphere (`side`), from one surface.
 
-    It is repaired (holes up to `max_hole_mm`, open medial walls of hemispheres), smoothed and remeshed to
-    `edge_length_mm`. A whole brain is rotated so that the mid-sagittal plane is x = const. If its hemispheres are two
-    pieces, they get a gap as in `from_hemispheres`. The medial wall of a single hemisphere is set upright next to
-    x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
-    InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
-    if it cannot be made closed and free of handles and self-intersections.
+    It is repaired and posed as in `from_hemispheres`; two pieces get a gap as there. The medial wall of a hemisphere is
+    set upright next to x = `fissure_x_mm`. InputError if it is not what `side` says, or of an impossible size;
+    MeshError if it cannot be made sound.
     """
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
     clean = sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
@@ -467,11 +455,7 @@ def from_surface(
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
-    """Return a simple geometry, unchanged, in place of a brain; left and right meet at x = 0.
-
-    It has neither a fissure nor a size to check, and smoothing would round its edges. MeshError if it is not closed or
-    has self-intersections.
-    """
+    """Return a simple geometry, unchanged, as a brain with sides at x = 0; MeshError if it is not sound."""
     require_sound(mesh)
     sides = dict(zip(SIDES, split(mesh, 0.0), strict=True))
     return _pial_surface(mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0}))
@@ -554,10 +538,7 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
 def _without_islands(
     surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
 ) -> tuple[TriangleMesh, Mask, Mask]:
-    """Leave out what is not connected to a hemisphere's largest piece.
-
-    Return the surface, the mask of its caps, and that of the faces that remain.
-    """
+    """Leave out what is apart from a side's largest piece; return the surface, masks of its caps and faces kept."""
     is_kept, warnings = largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)

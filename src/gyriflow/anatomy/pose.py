@@ -1,7 +1,4 @@
-"""Estimate the pose of a surface from its shape: two hemispheres, a single hemisphere, or a whole brain.
-
-Files that are well posed keep their pose. Left hemispheres are mirrored here and treated as right ones.
-"""
+"""Estimate the pose of a surface from its shape. Left hemispheres are mirrored here and treated as right ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -50,8 +47,7 @@ class Hemisphere:
     """A right hemisphere, or a mirrored left one, with the pose estimated from its shape.
 
     `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
-    is the distance from the template relative to the size. `confidence` is the residual of the next best pose divided
-    by this residual, `side_ratio` that of the mirrored shape.
+    is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape.
     """
 
     shape: PointCloud
@@ -81,12 +77,10 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
     """Return the pose of a brain from two closed, outward hemispheres, each in any rigid pose.
 
-    Each is registered to the template, and the mirrored left one to the right one. If both share coordinates close to
-    RAS or LPS, the file's pose is kept. If they share other coordinates, one rigid motion poses both. Otherwise each
-    gets its own, with the medial walls next to x = 0. `declared` is whether both files name the same coordinate system.
-
-    If a shape fits several poses, both are taken as RAS+ with a warning. InputError if it does not fit RAS+ either, and
-    if the two seem to be swapped or of one side.
+    Common coordinates close to RAS or LPS are kept; other common ones get one rigid motion, else each gets its own,
+    with the medial walls next to x = 0. `declared` is whether both files name one coordinate system. If a shape fits
+    several poses, both are taken as RAS+ with a warning. InputError if that does not fit, or the two seem swapped or of
+    one side.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
@@ -161,10 +155,7 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
 
 
 def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: str) -> Pose:
-    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+.
-
-    Few random poses are this close to RAS+, so this is evidence if the shape is ambiguous.
-    """
+    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+."""
     fit = register(hemisphere.shape, targets, np.eye(3))
     fits_ras = fit.residual < MIN_CONFIDENCE * hemisphere.residual and fit.residual <= MAX_RESIDUAL
     if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
@@ -222,11 +213,7 @@ def pitch_deg(rotation: Floats) -> float:
 
 
 def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
-    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps".
-
-    If sides and coordinates are correct, the surfaces are in RAS+. If both are wrong, the hemispheres still lie side by
-    side, but their mirror images fit better.
-    """
+    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps"."""
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
         named = coordinates.upper()
@@ -241,8 +228,7 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     """Return the pose of a whole brain's surface in coordinates "ras", "lps" or "auto".
 
-    Named coordinates are kept, with a warning if the shape clearly contradicts them. InputError with "auto" if the
-    shape is ambiguous.
+    Named ones are kept, with a warning if the shape contradicts them. InputError with "auto" if it is ambiguous.
     """
     shape = shape_of(mesh, max_depth=MAX_DEPTH)
     fit, confidence = register_from_all_sides(shape, brains())
@@ -251,10 +237,9 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
-    """Return the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
+    """Return the pose of a label volume from the surface of its cerebrum, in the volume's coordinates.
 
-    The file's pose is kept, with a warning, if the shape is within 60° of it or ambiguous. `has_sides` is whether left
-    and right are labelled.
+    The file's is kept, with a warning, if it is within 60° or unclear. `has_sides` is whether the sides are labelled.
     """
     unchecked = Pose(warnings=("neither labels nor shape determine the pose: it is the file's, unchecked",))
     try:
@@ -267,10 +252,9 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
     """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or "auto".
 
-    With "auto", the axes of the file are kept if its shape fits RAS or LPS within 35°, and the medial wall is then set
-    upright. Otherwise the pose of the shape is taken. `of_volume`: the surface comes from a label volume, and other
-    volumes of the brain are assumed to have the same axes. InputError if the pose is ambiguous or the shape is the
-    other hemisphere's.
+    With "auto", axes of the file that fit RAS or LPS within 35° are kept and the medial wall is set upright, else the
+    pose is that of the shape. `of_volume`: the surface is that of a label volume, whose axes other volumes have, too.
+    InputError if the pose is ambiguous or the shape is the other hemisphere's.
     """
     mirror = MIRROR if side == "left" else np.eye(4)
     hemisphere = hemisphere_by_shape(transformed(mesh, mirror))

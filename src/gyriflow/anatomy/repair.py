@@ -1,7 +1,4 @@
-"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them through voxels.
-
-Every repair is counted.
-"""
+"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them; every repair is counted."""
 
 import logging
 from collections.abc import Mapping
@@ -85,10 +82,7 @@ INSIDE_LEVEL = 0.8
 
 @dataclass(frozen=True, eq=False)
 class RepairedSurface:
-    """A surface after repairs, with a report in plain values for JSON and warnings.
-
-    `is_cap` is the (m,) mask of the faces that close medial walls, empty if the surface was made of labels.
-    """
+    """A surface after repairs, a plain report, warnings, and the (m,) mask of medial caps, empty for labels."""
 
     mesh: TriangleMesh
     report: dict[str, Any]
@@ -101,8 +95,7 @@ def sound_pieces(
 ) -> RepairedSurface:
     """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks.
 
-    With `caps_walls`, one hole of each hemisphere may be larger, and is capped. Whether it faces the other hemisphere
-    can be checked only after posing.
+    With `caps_walls`, one larger hole of each hemisphere is capped; after posing it must face the other one.
     """
     lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
     mesh, repairs, is_cap = clean(mesh, max_hole_mm, single=single, caps_walls=caps_walls)
@@ -133,8 +126,7 @@ def sound_pieces(
 def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     """Smooth and remesh a surface so that each piece is a sphere without self-intersections.
 
-    If the triangles cannot be repaired, the surface is rebuilt through voxels of half an edge length; the report of
-    `rebuild` is in "remade". MeshError if self-intersections remain.
+    Else it is rebuilt through voxels ("remade" in the report). MeshError if self-intersections remain.
     """
     smooth, cutting = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
@@ -181,10 +173,9 @@ def faults(mesh: TriangleMesh) -> str:
 
 
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Smooth, remesh and untangle a surface; return it and the number of self-intersecting faces before untangling.
+    """Smooth (Taubin 1995, λ = 0.5, μ = −0.53), remesh and untangle a surface; also count crossing faces before.
 
-    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53). Walls of a narrow slit that keep crossing are
-    not smoothed.
+    Walls of a narrow slit that keep crossing are not smoothed.
     """
     document = in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
@@ -215,9 +206,8 @@ def clean(
     """Return the surface as closed, outward, manifold pieces of similar size, counts of repairs, and the mask of caps.
 
     Equal vertices are merged, degenerate and duplicate faces removed, edges of more than two faces split, holes up to
-    `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
-    all but the largest; with `caps_walls`, larger holes are capped as in `sound_pieces`. MeshError for other larger
-    holes and for surfaces that stay open.
+    `max_hole_mm` closed, faces turned outward, and small or inner pieces dropped; `single` and `caps_walls` as in
+    `sound_pieces`. MeshError for other holes and surfaces that stay open.
     """
     # before vertices are merged, which may join pieces; without shared vertices, each face is a piece
     mesh, turned = _turn_outward(mesh, 2)
@@ -271,8 +261,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
     """Return the (m,) mask of faces that repeat an earlier one in the opposite orientation, except shared walls.
 
-    A wall that two closed pieces share has both orientations, and each of its edges has as many faces in one direction
-    as in the other.
+    Each edge of a wall that two closed pieces share has as many faces in one direction as in the other.
     """
     _, first, face, count = np.unique(
         np.sort(mesh.faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
@@ -426,9 +415,8 @@ def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Move a closed surface along its normals until it encloses a volume; return it and a report in plain values.
 
-    Smoothing and remeshing move a convex surface inward by some hundredths of a mm, which ΔV/A restores. Walls that
-    would cross each other are not moved, nor is the whole surface if more than 5 % of the volume is missing or if it
-    would still cross itself. `area_mm2` is the area of the mask's isosurface before smoothing and remeshing.
+    Walls that would cross are not moved, nor is a surface that lacks more than 5 % or still would cross itself.
+    `area_mm2` is the area before smoothing and remeshing.
     """
     before = signed_volume(mesh) / volume_mm3 - 1.0
     moved = _move_along_normals(mesh, volume_mm3) if abs(before) <= MAX_RESTORED else mesh
@@ -461,11 +449,7 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Rebuild a surface through voxels, without handles or self-intersections; return it and a report.
-
-    The winding number separates inside from outside even where the surface crosses itself. Details below the voxel size
-    are lost.
-    """
+    """Rebuild a surface through voxels by winding numbers, free of handles and crossings; return it and a report."""
     ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
     labels, affine = surface_mask(mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]]))
     inside = labels > 0

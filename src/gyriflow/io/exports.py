@@ -80,10 +80,9 @@ BidsNames = Mapping[str, tuple[str, str | None]]
 class ExportedBrain:
     """A brain at a week and its files by side; regions may be empty.
 
-    The run is "real" for observed brains. The subject is the scanned person, or the brain if none is named. For a
-    simulated brain, everything but run, week and files is that of its start brain. The report has the pose of its
-    surface. `template_maps` are at the vertices of another brain. Simulated brains of labels have a `volume`: the start
-    brain's `labels`, whose grid is used, and the `surface` and `thickness` of the whole brain.
+    The run is "real" for observed brains; simulated ones have brain, subject and covariates of their start.
+    `template_maps` are at another brain's vertices. Simulated brains of labels have a `volume`: the start's `labels`,
+    whose grid is used, and `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -111,10 +110,9 @@ def export_bids(
 ) -> None:
     """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
-    Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
-    Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables` have
-    the columns subject, run and week; `columns` has the metric's description and unit of each in `metrics_wide`.
-    InputError where two brains have one name.
+    Brains of no named session have their week's, where a subject has several. Surfaces lie in the world of the brain's
+    volumes, unless its sides were posed separately. `tables` have the columns subject, run and week; `columns` has
+    description and unit of each in `metrics_wide`. InputError where two brains have one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]

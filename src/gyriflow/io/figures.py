@@ -28,10 +28,7 @@ TABLE_LOOK = (
 
 
 def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
-    """Write a figure twice, as pixels, `DPI` to the inch, and as vectors.
-
-    Pictures within the vectors keep all of their pixels.
-    """
+    """Write a figure as pixels, `DPI` to the inch, and as vectors, in which pictures keep their pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):
@@ -48,10 +45,7 @@ def write_html(path: AnyPath, body: str) -> None:
 
 
 def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tuple[str, float]]:
-    """Return pictures as data addresses for a page, WebP coded, each with the width in inches that it has in print.
-
-    All have as many pixels as fit into a number of bytes.
-    """
+    """Return pictures as data addresses (WebP) that together fit `budget_bytes`, and their widths in print (inches)."""
     for width in WIDTHS:
         coded = [_coded(path, width) for path in paths]
         if sum(map(len, coded)) <= budget_bytes:

@@ -78,12 +78,10 @@ class LabelSource(NamedTuple):
 
 
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
-    """Return the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+    """Return the label volume of a NIfTI or MGH file, in RAS+ mm, ending a voxel beyond its labels if `cropped`.
 
-    A `cropped` one ends a voxel beyond its labels, so that an empty border takes no memory.
-
-    `affine_from` selects one of NIfTI's two matrices; "auto" takes the one that is set and refuses two that disagree.
-    InputError for missing or truncated files, non-integer values, NaN, and ambiguous orientation.
+    `affine_from` selects one of NIfTI's matrices; "auto" takes the one that is set and refuses two that disagree.
+    InputError for invalid files, non-integer values, NaN, and ambiguous orientation.
     """
     values, affine = read_values(path, affine_from, "labels")
     if cropped:
@@ -104,10 +102,7 @@ def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[N
 
 
 class VolumeHeader(NamedTuple):
-    """The numbers of voxels along three axes, their sizes in mm, the unit of length ("unknown": mm) and the space.
-
-    The space is the name of a NIfTI code, such as "scanner" or "mni"; MGH has mm and scanner space always.
-    """
+    """Numbers of voxels along three axes, their sizes in mm, the unit ("unknown": mm) and space, such as "mni"."""
 
     shape: tuple[int, ...]
     voxel_mm: tuple[float, ...]
@@ -129,8 +124,7 @@ def read_header(path: AnyPath) -> VolumeHeader:
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
-    `content` names the values in messages: "labels". InputError for missing or truncated files, other numbers
-    of axes, unclear orientation.
+    `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
     """
     image = _load(path, content)
     with reading(path, "an image", _expected(content)):
@@ -160,11 +154,7 @@ def _expected(content: str) -> str:
 
 
 def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> ScalarVolume:
-    """Return the values of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
-
-    `affine_from` as in `read_label_volume`. InputError for missing or truncated files, more than three axes that are
-    longer than 1, unclear orientation.
-    """
+    """Return the values of a NIfTI or MGH file in RAS+ mm; `affine_from` and InputError as `read_label_volume`."""
     values, affine = read_values(path, affine_from, "numbers")
     return ScalarVolume(values.astype(float), affine)
 

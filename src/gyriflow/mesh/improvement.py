@@ -23,9 +23,8 @@ MAX_SURFACE_STEP = 0.05
 def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Return a linear mesh whose flattest elements are improved; the mesh itself if none is flat.
 
-    A vertex of a flat element is moved to or from the opposite face, or along the line between its middle edges, if
-    that raises the least radius ratio of all elements around the vertex, none of which is inverted. Vertices of the
-    surface move less than a twentieth of an edge.
+    A vertex is moved from the opposite face or along the line between middle edges if that raises the least radius
+    ratio around it; vertices of the surface move less than a twentieth of an edge.
     """
     flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
     if not 0 < len(flat) <= MAX_FLAT:

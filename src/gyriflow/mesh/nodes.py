@@ -1,7 +1,6 @@
-"""Quadratic elements whose outer nodes are moved onto the smooth surface.
+"""Quadratic elements whose outer nodes are moved onto the smooth surface, as far as elements stay sound.
 
-Facets are bumps of the size of an element, and bumps grow with the cortex: nodes on the middles of outer edges would
-keep them. A node goes to the nearest place of the surface only as far as its elements stay sound.
+Facets are bumps of the size of an element, which grow with the cortex if nodes stay on the middles of edges.
 """
 
 import logging
@@ -30,11 +29,10 @@ WORSE = 0.5
 
 
 def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
-    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth surface where they can.
+    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth surface (mm) where they can.
 
-    Corners move first, with straight sides; then the nodes on the middles of outer edges leave their chords. Where
-    an element would become unsound, or the surface of the mesh cross itself, moves are halved and then given up. The
-    surface is closed and outward, near to that of the mesh; both are in mm.
+    Corners move first, with straight sides; then nodes on the middles of outer edges. Where an element would become
+    unsound, or the surface cross itself, moves are halved and then given up.
     """
     before = radius_ratios(mesh)
 

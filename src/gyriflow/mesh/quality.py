@@ -52,8 +52,7 @@ OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 class GapWalls:
     """Faces of a closed surface that face a parallel wall across a narrow gap.
 
-    The (g, 3) `middle` of the gap before each face in mm, its unit `normal`, the (g,) `width` to the wall opposite in
-    mm and the `area` of the face in mm².
+    The (g, 3) `middle` of the gap in mm, the face's `normal` and `area` (mm²), and the `width` (g,) to the wall in mm.
     """
 
     middle: Floats
@@ -63,11 +62,10 @@ class GapWalls:
 
 
 def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
-    """Return how far two surfaces are from each target, in mm.
+    """Return how far two surfaces are from each other, in mm.
 
-    `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
-    both directions; `hausdorff` is the largest distance found. Every face is sampled at the centroids of the four
-    triangles between its corners and the middles of its edges, and for the largest distance at its corners.
+    Within `hausdorff99` lies 99 % of either's area; `hausdorff` is the largest distance. Every face is sampled at the
+    centroids of its four parts, and for the largest distance at its corners.
     """
     ways = [_distances(mesh, target), _distances(target, mesh)]
     return {
@@ -77,10 +75,7 @@ def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
 
 
 def gap_walls(mesh: TriangleMesh) -> GapWalls:
-    """Return the walls of narrow gaps of a closed surface, such as the fissure and sulci.
-
-    From every face's centroid a ray goes outwards; where it meets a parallel wall within 3 mm, there is a gap.
-    """
+    """Return the walls of narrow gaps of a closed surface: rays from centroids meet parallel walls within 3 mm."""
     normals = face_normals(mesh)
     start = corners(mesh).mean(axis=1) + OFF_MM * normals
     face, distance = _first_hits(mesh, start, normals)
@@ -91,10 +86,9 @@ def gap_walls(mesh: TriangleMesh) -> GapWalls:
 
 
 def gap_summary(walls: GapWalls) -> dict[str, float | None]:
-    """Return the widths of gaps and the area of their walls.
+    """Return the area of gaps' walls, and below which widths in mm 1 % and half of it lies (None without a gap).
 
-    `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
-    no gap; the minimum is not given, since the width is 0 at the bottom of every gap), `area_mm2` is that area.
+    The minimum is not given, since the width is 0 at the bottom of every gap.
     """
     widths: list[float | None] = [None, None]
     if len(walls.width):
@@ -105,8 +99,7 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
     """Return the share of the walls' area before which another surface leaves the gap open; None without a gap.
 
-    It is open where its middle is outside the closed surface `mesh`, and the gap of `mesh` there is at least half as
-    wide.
+    There its middle is outside the closed surface `mesh`, whose gap is at least half as wide.
     """
     if not len(walls.width):
         return None
@@ -137,10 +130,7 @@ def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Return for each of (m,) elements a lower bound of the determinant of its map, over the mean.
-
-    It is 1 for straight sides with nodes on their middles, and positive only where the element folds over nowhere.
-    """
+    """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not positive if folded."""
     if mesh.order == 1:
         return np.ones(len(mesh.tets))
     return lower_bounds(mesh.vertices, mesh.tets) / (6 * signed_volumes(mesh))
@@ -161,10 +151,8 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Return counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
-    `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
-    that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
-    between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
-    given one's gaps that the mesh leaves open, None where it has none (see `fidelity`).
+    `surface` is the one that was filled; distance, change of volume and gaps are relative to it (see `fidelity`).
+    Quadratic elements are measured on the triangles between nodes. `gap_kept` is None without gaps.
     """
     ratios, angles, volumes = radius_ratios(mesh), dihedral_angles(mesh), signed_volumes(mesh)
     boundary, _ = boundary_surface(mesh)
@@ -204,8 +192,7 @@ def refuse_bad_mesh(
 ) -> None:
     """Raise MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
 
-    For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
-    each other are always refused. `path` is for the message: where the mesh can be looked at.
+    It has the number of bad elements and the worst place. `path` is where the mesh can be looked at.
     """
     faults = []
     for name, values, least in (
