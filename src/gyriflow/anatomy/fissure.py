@@ -14,22 +14,11 @@ from scipy.spatial.transform import Rotation
 from skimage.segmentation import watershed
 
 from ..errors import InputError
+from ..geometry import triangles
 from ..geometry.alignment import motion
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on
-from ..geometry.triangles import (
-    Ints,
-    TriangleMesh,
-    area_vectors,
-    corners,
-    edges,
-    face_areas,
-    face_components,
-    mean_edge_length,
-    submesh,
-    vertex_areas,
-    vertex_normals,
-)
+from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import Side
 from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
 
@@ -105,7 +94,7 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
     has little asymmetry and many such points: in an asymmetric brain the fissure counts. With coordinates that the user
     has `named`, an almost as symmetric plane x = const is kept: a body of revolution has many planes.
     """
-    weights = vertex_areas(mesh)
+    weights = triangles.vertex_areas(mesh)
     selection = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[selection], cKDTree(mesh.vertices)
     planes = _symmetry_planes(sample, tree)
@@ -113,7 +102,7 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
         x, middle = np.array([1.0, 0.0, 0.0]), float(weights @ mesh.vertices[:, 0] / weights.sum())
         distance = _mirror_distance(x, middle, sample, tree)
         least = min(asymmetry for _, _, asymmetry in planes)
-        if distance < SYMMETRY_TOL_FACTOR * least + SYMMETRY_TOL_EDGES * mean_edge_length(mesh):
+        if distance < SYMMETRY_TOL_FACTOR * least + SYMMETRY_TOL_EDGES * triangles.mean_edge_length(mesh):
             return _fit_to_fissure(mesh, x, middle, distance)
     candidates = [_fit_to_fissure(mesh, *plane) for plane in planes]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
@@ -137,7 +126,7 @@ def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
     """Return the (k, 3) points half-way between facing walls of the fissure, a fifth of the width around a plane."""
     height = mesh.vertices @ normal - offset
     width = np.ptp(height)
-    facing = vertex_normals(mesh) @ normal
+    facing = triangles.vertex_normals(mesh) @ normal
     near = np.abs(height) < FISSURE_BAND * width
     left, right = np.flatnonzero(near & (facing > 0.5)), np.flatnonzero(near & (facing < -0.5))
     if len(left) < 8 or len(right) < 8:
@@ -386,8 +375,8 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
     Two comparable closed pieces mostly on different sides are the hemispheres. Otherwise patches that bulge over the
     fissure go to the nearest hemisphere, so that each is in one piece. InputError if such patches are too large.
     """
-    surface = face_components(mesh)
-    areas = face_areas(mesh)
+    surface = triangles.face_components(mesh)
+    areas = triangles.face_areas(mesh)
     side = heights < 0
     sizes = np.bincount(surface, weights=areas)
     # walls in contact at the fissure do not count
@@ -432,12 +421,12 @@ def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floa
     """
     is_kept, warnings = np.zeros(len(mesh.faces), dtype=bool), []
     for side, is_side in sides.items():
-        part, faces = submesh(mesh, is_side)[0], np.flatnonzero(is_side)
-        component, areas = face_components(part), face_areas(part)
+        part, faces = triangles.submesh(mesh, is_side)[0], np.flatnonzero(is_side)
+        component, areas = triangles.face_components(part), triangles.face_areas(part)
         is_kept[faces[component == 0]] = True
         if not component.any():
             continue
-        place = transform_points(corners(part)[component == 1].mean(axis=(0, 1))[None], to_file)[0]
+        place = transform_points(triangles.corners(part)[component == 1].mean(axis=(0, 1))[None], to_file)[0]
         share = areas[component > 0].sum() / areas.sum()
         found = f"the {side} hemisphere is in {component.max() + 1} pieces, {100 * share:.1f} % of its area is outside "
         found += f"the largest, around ({', '.join(str(round(x)) for x in place)}) mm in the file's coordinates"
@@ -457,20 +446,20 @@ def cut_share(*sides: TriangleMesh) -> float:
 
     The area vectors of a closed surface sum to zero, so those of a hemisphere give its opening.
     """
-    cuts = sum(float(np.linalg.norm(area_vectors(side).sum(axis=0))) for side in sides)
+    cuts = sum(float(np.linalg.norm(triangles.area_vectors(side).sum(axis=0))) for side in sides)
     return cuts / sum(ConvexHull(side.vertices[:, 1:]).volume for side in sides)
 
 
 def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:
     """Return the (m,) mask of the faces of a surface that are nearer to a left hemisphere, as by `left_faces`."""
-    centres = corners(mesh).mean(axis=1)
+    centres = triangles.corners(mesh).mean(axis=1)
     to_left, to_right = (nearest_on(centres, side)[0] for side in (left, right))
     return left_faces(mesh, to_left - to_right)
 
 
 def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
     """Split a pial surface (RAS+) into its left and right faces at the plane x = `fissure_x_mm`, open at the cut."""
-    return cut_sides(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+    return cut_sides(mesh, left_faces(mesh, triangles.corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
 
 
 def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMesh]:
@@ -479,14 +468,14 @@ def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMes
         problem = "the brain lies on one side of the interhemispheric fissure"
         found = f"{int(left.sum())} of {len(left)} faces on the left"
         raise InputError(problem, found=found, expected="two hemispheres")
-    return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
+    return triangles.submesh(mesh, left)[0], triangles.submesh(mesh, ~left)[0]
 
 
 def cut_middle(left: TriangleMesh, right: TriangleMesh) -> float:
     """Return the mean x in mm of the cut between hemispheres, or of the gap between them if both are closed."""
     borders = []
     for side in (left, right):
-        pairs, counts = edges(side)
+        pairs, counts = triangles.edges(side)
         borders.append(side.vertices[np.unique(pairs[counts == 1]), 0])
     if cut := [border for border in borders if len(border)]:
         return float(np.mean(np.concatenate(cut)))

@@ -12,19 +12,8 @@ from scipy import ndimage
 from ..errors import InputError
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import (
-    COMPARABLE,
-    OUTSIDE,
-    PAD_VOXELS,
-    Floats,
-    Mask,
-    crop,
-    main_parts,
-    parts_in_boxes,
-    shifted_affine,
-    smooth_mask,
-    without_stalks,
-)
+from . import extraction
+from .extraction import Floats, Mask
 
 log = logging.getLogger(__name__)
 
@@ -97,9 +86,9 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
             "ventricles without a label?"
         )
     open_fluid = outside_ventricles(labels, scheme)
-    whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
-    smallest = MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else COMPARABLE
-    main, parts, dropped = main_parts(whole, smallest)
+    whole, stalks = extraction.without_stalks((mask & ~open_fluid) | unlabelled, affine)
+    smallest = MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
+    main, parts, dropped = extraction.main_parts(whole, smallest)
     if dropped > REPORTED_LOSS * main.sum():
         loss = f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the brain"
         warnings.append(f"{parts} separate parts were dropped: {loss}")
@@ -123,9 +112,9 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
         volumes |= {"tissue": main & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()}
     report["border_share"] = border_share(main)
-    box, first = crop(main)
-    cropped, labelled = np.pad(main[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
-    return Cerebrum(cropped, labelled, shifted_affine(affine, first), smallest, report, warnings)
+    box, first = extraction.crop(main)
+    cropped, labelled = np.pad(main[box], extraction.PAD_VOXELS), np.pad(tissue[box], extraction.PAD_VOXELS)
+    return Cerebrum(cropped, labelled, extraction.shifted_affine(affine, first), smallest, report, warnings)
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
@@ -233,7 +222,9 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
     hit_share = _ray_share(clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING)
-    number, _ = ndimage.label(clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)), OUTSIDE)
+    number, _ = ndimage.label(
+        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)), extraction.OUTSIDE
+    )
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1)
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
@@ -246,8 +237,8 @@ def _touching_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
     if not hindbrain.any():
         return out
     elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
-    for box, part in parts_in_boxes(out):
-        around = ndimage.binary_dilation(part, OUTSIDE)
+    for box, part in extraction.parts_in_boxes(out):
+        around = ndimage.binary_dilation(part, extraction.OUTSIDE)
         if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
             touching[box] |= part
     return touching
@@ -267,7 +258,7 @@ def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np
     share = np.zeros(pad[0].shape, dtype=np.float32)
     share[tuple(start.T)] = hits / len(DIRECTIONS)
     smooth = ndimage.gaussian_filter(share[1:-1, 1:-1, 1:-1], smoothing_voxels)
-    return smooth / np.maximum(smooth_mask(clear, smoothing_voxels), 1e-6)
+    return smooth / np.maximum(extraction.smooth_mask(clear, smoothing_voxels), 1e-6)
 
 
 def border_share(mask: Mask) -> float:

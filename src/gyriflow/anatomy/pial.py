@@ -9,22 +9,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError, MeshError
+from ..geometry import triangles
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
-from ..geometry.triangles import (
-    TriangleMesh,
-    area,
-    area_cm2,
-    area_vectors,
-    corners,
-    euler_number,
-    is_closed,
-    merged,
-    signed_volume,
-    submesh,
-    transformed,
-    volume_ml,
-)
+from ..geometry.triangles import TriangleMesh
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -142,7 +130,7 @@ def from_labels(
     if side:
         plausible.require_single_hemisphere(even.mesh)
         return _one_side(even, side, pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
-    heights = fissure.sample(side_mm, grid, corners(even.mesh).mean(axis=1))
+    heights = fissure.sample(side_mm, grid, triangles.corners(even.mesh).mean(axis=1))
     return _two_sides(even, fissure.left_faces(even.mesh, heights), plane, pose, brain)
 
 
@@ -292,25 +280,30 @@ def from_hemispheres(
             joined, week=week, coordinates=coordinates, edge_length_mm=edge_length_mm, max_hole_mm=max_hole_mm
         )
         to_pose = connected.pose.of_file()
-        plausible.require_left_and_right(transformed(left, to_pose), transformed(right, to_pose), coordinates)
+        plausible.require_left_and_right(
+            triangles.transformed(left, to_pose), triangles.transformed(right, to_pose), coordinates
+        )
         return replace(connected, report=connected.report | {"source": "hemispheres", "joined_along_cut": True})
     brain, named = _Brain(week, {"source": "hemispheres", "coordinates": coordinates}), coordinates != "auto"
     to_ras = CONVENTIONS[coordinates] if named else np.eye(4)
     parts = [
-        repair.sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True)
+        repair.sound_pieces(triangles.transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True)
         for mesh in (left, right)
     ]
     for side, part in zip(SIDES, parts, strict=True):
         brain.take(part, f"_{side}")
     left, right = (part.mesh for part in parts)
-    brain.warn(plausible.require_plausible_size(signed_volume(left) + signed_volume(right), week))
+    brain.warn(plausible.require_plausible_size(triangles.signed_volume(left) + triangles.signed_volume(right), week))
     if named:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
         pose = pose_of_pair(left, right, declared=declared)
-        left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
+        left, right = (
+            triangles.transformed(left, pose.of_file("left")),
+            triangles.transformed(right, pose.of_file("right")),
+        )
         brain.warn(pose.warnings)
-    length = float(np.ptp(merged(left, right).vertices, axis=0).max())
+    length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
     brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
         brain.warn(hemisphere_warnings(left, right, coordinates))
@@ -322,7 +315,7 @@ def from_hemispheres(
         brain.take(part, f"_{side}")
     surface = replace(
         parts[0],
-        mesh=merged(*(part.mesh for part in parts)),
+        mesh=triangles.merged(*(part.mesh for part in parts)),
         is_cap=np.concatenate([part.is_cap for part in parts]),
     )
     plane = fissure.mid_plane(surface.mesh, named=named)
@@ -333,12 +326,12 @@ def from_hemispheres(
 
 def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
     """Return the closed surface of two open hemispheres with the same vertices along their cut, or None."""
-    if is_closed(left) or is_closed(right):
+    if triangles.is_closed(left) or triangles.is_closed(right):
         return None
-    both = merged(left, right)
+    both = triangles.merged(left, right)
     vertices, index = np.unique(both.vertices, axis=0, return_inverse=True)
     joined = TriangleMesh(vertices, index.reshape(-1)[both.faces])
-    return joined if is_closed(joined) else None
+    return joined if triangles.is_closed(joined) else None
 
 
 def _two_pieces(
@@ -349,7 +342,7 @@ def _two_pieces(
     is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
     gap, to_right = fissure.smallest_gap(left, right), plane.normal
     left, right, moved = fissure.separate(left, right, MIN_GAP_MM, to_right)
-    mesh = merged(left, right)
+    mesh = triangles.merged(left, right)
     brain.warn(plausible.facing_warnings(left, right, to_right))
     if moved > 0:
         brain.warn([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
@@ -380,7 +373,7 @@ def from_surface(
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
     clean = repair.sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
     brain.take(clean)
-    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
+    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * triangles.signed_volume(clean.mesh), week))
     if side:
         plausible.require_single_hemisphere(clean.mesh)
     even = repair.make_pieces_sound(clean, edge_length_mm)
@@ -395,11 +388,11 @@ def from_surface(
     if side:
         return _one_side(even, side, pose, brain)
     brain.warn(pose.warnings)
-    even, named = replace(even, mesh=transformed(even.mesh, pose.of_file())), coordinates != "auto"
+    even, named = replace(even, mesh=triangles.transformed(even.mesh, pose.of_file())), coordinates != "auto"
     plane = fissure.mid_plane(even.mesh, named=named)
-    heights = fissure.fissure_between(even.mesh, plane).height_above(corners(even.mesh).mean(axis=1))
+    heights = fissure.fissure_between(even.mesh, plane).height_above(triangles.corners(even.mesh).mean(axis=1))
     is_left = fissure.left_faces(even.mesh, heights)
-    if all(map(is_closed, fissure.cut_sides(even.mesh, is_left))):
+    if all(map(triangles.is_closed, fissure.cut_sides(even.mesh, is_left))):
         return _two_pieces(even, is_left, plane, pose, brain, named=named)
     return _two_sides(even, is_left, plane, pose, brain)
 
@@ -414,18 +407,18 @@ def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
 def _pial_surface(
     whole: TriangleMesh, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, brain: _Brain
 ) -> PialSurface:
-    areas: dict[str, float] = {side: area_cm2(part) for side, part in sides.items()}
+    areas: dict[str, float] = {side: triangles.area_cm2(part) for side, part in sides.items()}
     report = brain.report | {
         "pose": pose.plain(),
         "week": brain.week,
         "fissure_x_mm": fissure_x,
         "area_cm2": {"whole": sum(areas.values()), **areas},
-        "volume_mL": volume_ml(whole),
+        "volume_mL": triangles.volume_ml(whole),
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),
         "faces": len(whole.faces),
         "pieces": len(repair.pieces(whole)),
-        "euler_number": euler_number(whole),
+        "euler_number": triangles.euler_number(whole),
         "warnings": brain.warnings,
     }
     return PialSurface(whole, sides.get("left"), sides.get("right"), fissure_x, pose, report)
@@ -436,10 +429,10 @@ def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: P
     mesh, is_cap, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain)
     is_left = is_left[is_kept]
     matrix, angle = fissure.upright(plane, mesh.vertices.mean(axis=0))
-    whole = transformed(mesh, matrix)
+    whole = triangles.transformed(mesh, matrix)
     for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
-        _require_medial(submesh(whole, cap)[0], sign)
-    left, right = fissure.cut_sides(submesh(whole, ~is_cap)[0], is_left[~is_cap])
+        _require_medial(triangles.submesh(whole, cap)[0], sign)
+    left, right = fissure.cut_sides(triangles.submesh(whole, ~is_cap)[0], is_left[~is_cap])
     # x of the plane, which may be tilted by less than half a degree, at the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
@@ -452,7 +445,7 @@ def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: P
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
         brain.warn([f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose"])
     brain.warn(plausible.proportion_warnings(np.ptp(whole.vertices, axis=0)))
-    areas = sorted((area(left), area(right)))
+    areas = sorted((triangles.area(left), triangles.area(right)))
     if areas[1] > MAX_AREA_RATIO * areas[0]:
         found = f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²"
         raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
@@ -475,10 +468,10 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
     brain.warn(pose.warnings)
     every = np.ones(len(surface.mesh.faces), dtype=bool)
     mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
-    whole = pial = transformed(mesh, pose.of_file())
+    whole = pial = triangles.transformed(mesh, pose.of_file())
     if is_cap.any():
-        _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
-        pial = submesh(whole, ~is_cap)[0]
+        _require_medial(triangles.submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
+        pial = triangles.submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]
     fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
     brain.report["rotation_deg"] = angle_deg(pose.of_file()[:3, :3])
@@ -492,12 +485,12 @@ def _without_islands(
     is_kept, warnings = fissure.largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)
-    return submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
+    return triangles.submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
 
 
 def _require_medial(cap: TriangleMesh, sign: float) -> None:
     """Raise MeshError if the cap of a posed hemisphere does not face the other one, in the direction `sign` x."""
-    normal = area_vectors(cap).sum(axis=0)
+    normal = triangles.area_vectors(cap).sum(axis=0)
     if sign * normal[0] < MIN_AXIS_COSINE * np.linalg.norm(normal):
         problem = "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere"
         found = f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across"

@@ -11,17 +11,9 @@ from ..geometry.alignment import MIRROR, RigidFit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
+from . import template
 from .hindbrain import MIN_TURN_DEG, pose_from_rotation
-from .template import (
-    MAX_DEPTH,
-    PointCloud,
-    brains,
-    hemispheres,
-    medial_wall,
-    register,
-    register_from_all_sides,
-    shape_of,
-)
+from .template import PointCloud
 
 # a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
 # atlases of 21 to 38 GW, 1.1 in their whole brains), and its own residual is at most this, in sizes
@@ -64,10 +56,10 @@ class Hemisphere:
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape, even if it is not clear."""
-    shape = shape_of(mesh)
-    fit, confidence = register_from_all_sides(shape, hemispheres())
-    mirrored, _ = register_from_all_sides(shape.mirrored(), hemispheres())
-    normal, offset = medial_wall(shape, -fit.rotation[0])
+    shape = template.shape_of(mesh)
+    fit, confidence = template.register_from_all_sides(shape, template.hemispheres())
+    mirrored, _ = template.register_from_all_sides(shape.mirrored(), template.hemispheres())
+    normal, offset = template.medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
@@ -86,12 +78,12 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     _require_sides(shapes)
     if not all(hemisphere.is_clear for hemisphere in shapes):
         poses = [
-            _pose_as_ras(hemisphere, hemispheres(), f"{side} hemisphere")
+            _pose_as_ras(hemisphere, template.hemispheres(), f"{side} hemisphere")
             for hemisphere, side in zip(shapes, SIDES, strict=True)
         ]
         return poses[0]
     mirrored_left, own_right = shapes
-    fit = register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
+    fit = template.register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
     # mean of the right one's own estimate and of that from the left one
     middle = Rotation.from_matrix([own_right.rotation, mirrored_left.rotation @ fit.rotation.T]).mean().as_matrix()
     pair = replace(mirrored_left, rotation=middle @ fit.rotation), replace(own_right, rotation=middle)
@@ -156,7 +148,7 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
 
 def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: str) -> Pose:
     """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+."""
-    fit = register(hemisphere.shape, targets, np.eye(3))
+    fit = template.register(hemisphere.shape, targets, np.eye(3))
     fits_ras = fit.residual < MIN_CONFIDENCE * hemisphere.residual and fit.residual <= MAX_RESIDUAL
     if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
         next_best = f"the next best pose has {hemisphere.confidence:.2f} times as much"
@@ -230,10 +222,10 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
 
     Named ones are kept, with a warning if the shape contradicts them. InputError with "auto" if it is ambiguous.
     """
-    shape = shape_of(mesh, max_depth=MAX_DEPTH)
-    fit, confidence = register_from_all_sides(shape, brains())
+    shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
+    fit, confidence = template.register_from_all_sides(shape, template.brains())
     brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
-    return _choose_pose(brain, brain.rotation, coordinates, "brain", brains())
+    return _choose_pose(brain, brain.rotation, coordinates, "brain", template.brains())
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
@@ -266,7 +258,7 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
             found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
         )
-    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", hemispheres(), of_volume=of_volume)
+    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", template.hemispheres(), of_volume=of_volume)
     if side_ratio < MIN_SIDE_RATIO:
         doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
         pose = replace(pose, warnings=(doubt, *pose.warnings))

@@ -37,8 +37,9 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
             moves = [
-                move for vertex in mesh.tets[element] if (move := _best_move(vertices, mesh.tets, element, vertex,
-                on_surface))
+                move
+                for vertex in mesh.tets[element]
+                if (move := _best_move(vertices, mesh.tets, element, vertex, on_surface))
             ]
             if not moves:
                 break

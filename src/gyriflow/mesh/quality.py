@@ -11,25 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
+from ..geometry import tetrahedra, triangles
 from ..geometry.jacobians import lower_bounds
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
-from ..geometry.tetrahedra import (
-    MIN_RADIUS_RATIO,
-    TetrahedralMesh,
-    boundary_surface,
-    radius_ratios,
-    signed_volumes,
-)
-from ..geometry.triangles import (
-    Floats,
-    TriangleMesh,
-    area,
-    corners,
-    face_areas,
-    face_normals,
-    mean_edge_length,
-    signed_volume,
-)
+from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh
+from ..geometry.triangles import Floats, TriangleMesh
 
 QUANTILE = 0.99
 GAP_MM = 3.0
@@ -76,13 +62,15 @@ def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
 
 def gap_walls(mesh: TriangleMesh) -> GapWalls:
     """Return the walls of narrow gaps of a closed surface: rays from centroids meet parallel walls within 3 mm."""
-    normals = face_normals(mesh)
-    start = corners(mesh).mean(axis=1) + OFF_MM * normals
+    normals = triangles.face_normals(mesh)
+    start = triangles.corners(mesh).mean(axis=1) + OFF_MM * normals
     face, distance = _first_hits(mesh, start, normals)
     facing = face >= 0
     facing[facing] = np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
     half = 0.5 * distance[facing, None] * normals[facing]
-    return GapWalls(start[facing] + half, normals[facing], OFF_MM + distance[facing], face_areas(mesh)[facing])
+    return GapWalls(
+        start[facing] + half, normals[facing], OFF_MM + distance[facing], triangles.face_areas(mesh)[facing]
+    )
 
 
 def gap_summary(walls: GapWalls) -> dict[str, float | None]:
@@ -123,17 +111,17 @@ def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[N
 
 
 def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
-    a, b, c = corners(mesh).transpose(1, 0, 2)
+    a, b, c = triangles.corners(mesh).transpose(1, 0, 2)
     centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
     distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), target)
-    return distance, np.concatenate([np.tile(face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
+    return distance, np.concatenate([np.tile(triangles.face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not positive if folded."""
     if mesh.order == 1:
         return np.ones(len(mesh.tets))
-    return lower_bounds(mesh.vertices, mesh.tets) / (6 * signed_volumes(mesh))
+    return lower_bounds(mesh.vertices, mesh.tets) / (6 * tetrahedra.signed_volumes(mesh))
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
@@ -154,23 +142,23 @@ def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, A
     `surface` is the one that was filled; distance, change of volume and gaps are relative to it (see `fidelity`).
     Quadratic elements are measured on the triangles between nodes. `gap_kept` is None without gaps.
     """
-    ratios, angles, volumes = radius_ratios(mesh), dihedral_angles(mesh), signed_volumes(mesh)
-    boundary, _ = boundary_surface(mesh)
+    ratios, angles, volumes = tetrahedra.radius_ratios(mesh), dihedral_angles(mesh), tetrahedra.signed_volumes(mesh)
+    boundary, _ = tetrahedra.boundary_surface(mesh)
     walls = gap_walls(surface)
     return {
         "order": mesh.order,
         "tets": len(mesh.tets),
         "vertices": len(mesh.vertices),
         "pial_faces": len(boundary.faces),
-        "pial_edge_mm": mean_edge_length(boundary),
-        "pial_area_mm2": area(boundary),
-        "smallest_pial_face_mm2": float(face_areas(boundary).min()),
+        "pial_edge_mm": triangles.mean_edge_length(boundary),
+        "pial_area_mm2": triangles.area(boundary),
+        "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
         "crossing_faces": crossing_faces(boundary),
         "surface_distance_mm": fidelity(boundary, surface),
         "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(boundary))},
         "gap_kept": gap_kept(walls, boundary),
         "volume_mm3": float(volumes.sum()),
-        "volume_change": float(volumes.sum() / signed_volume(surface) - 1),
+        "volume_change": float(volumes.sum() / triangles.signed_volume(surface) - 1),
         "min_radius_ratio": float(ratios.min()),
         "mean_radius_ratio": float(ratios.mean()),
         "median_radius_ratio": float(np.median(ratios)),
@@ -196,7 +184,7 @@ def refuse_bad_mesh(
     """
     faults = []
     for name, values, least in (
-        ("radius ratio", radius_ratios(mesh), min_radius_ratio),
+        ("radius ratio", tetrahedra.radius_ratios(mesh), min_radius_ratio),
         ("ratio of Jacobians", jacobian_ratios(mesh), MIN_JACOBIAN_RATIO),
     ):
         bad, worst = values < least, values.argmin()
