@@ -199,7 +199,15 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     # rays also pass unlabelled voxels inside: choroid plexus, septum
     clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
     out = fluid & (_ray_share(clear, tissue, RAY_SMOOTHING) <= ENCLOSED)
-    return _touching_hindbrain(out, labels, scheme)
+    hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
+    if not hindbrain.any():
+        return out
+    elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
+    for box, part in extraction.parts_in_boxes(out):
+        around = ndimage.binary_dilation(part, extraction.OUTSIDE)
+        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
+            touching[box] |= part
+    return touching
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
@@ -230,18 +238,6 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
-
-
-def _touching_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
-    hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
-    if not hindbrain.any():
-        return out
-    elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
-    for box, part in extraction.parts_in_boxes(out):
-        around = ndimage.binary_dilation(part, extraction.OUTSIDE)
-        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
-            touching[box] |= part
-    return touching
 
 
 def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:

@@ -143,7 +143,8 @@ def _read_volume(
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
     pose = None if side else pose_of_labels(labels, affine, scheme)
-    sides = _labelled_sides(cerebrum.tissue, scheme)
+    labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
+    sides = [name for name, numbers in (("left", scheme.left), ("right", scheme.right)) if {*labelled} & {*numbers}]
     if side and set(sides) - {side}:
         raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
     brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
@@ -495,9 +496,3 @@ def _require_medial(cap: TriangleMesh, sign: float) -> None:
         problem = "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere"
         found = f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across"
         raise MeshError(problem, found=found, expected="a closed surface, or hemispheres open at medial walls only")
-
-
-def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
-    cortex = scheme.cortex or scheme.cerebrum
-    labels = {"left": scheme.left, "right": scheme.right}
-    return [side for side in SIDES if np.isin(tissue, np.intersect1d(labels[side], cortex)).any()]

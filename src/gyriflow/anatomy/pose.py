@@ -104,7 +104,13 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         },
         "mirror_residual": round(fit.residual, DIGITS),
     }
-    doubts = [] if together else [_apart_warning(*motions, mirrored_left)]
+    doubts = []
+    if not together:
+        angle, shift = _difference(*motions, mirrored_left)
+        doubts.append(
+            f"the medial walls do not face each other in the files' coordinates: {np.linalg.norm(shift):.1f} mm and "
+            f"{angle:.0f}° off: each was posed by its own shape. Are both files in one space?"
+        )
     if _mean_side_ratio(shapes) < MIN_SIDE_RATIO:
         doubts.append("left and right are those of the configuration: the shapes do not show if the files are swapped")
     # volumes of the brain are in RAS+
@@ -115,16 +121,6 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         together,
         evidence,
         tuple(doubts),
-    )
-
-
-def _apart_warning(to_left: Floats, to_right: Floats, left: Hemisphere) -> str:
-    centre, difference = MIRROR[:3, :3] @ left.shape.centre, to_left - to_right
-    distance = float(np.linalg.norm(difference[:3, :3] @ centre + difference[:3, 3]))
-    angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
-    return (
-        f"the medial walls do not face each other in the files' coordinates: {distance:.1f} mm and {angle:.0f}° off: "
-        "each was posed by its own shape. Are both files in one space?"
     )
 
 
@@ -172,13 +168,18 @@ def _motions(left: Hemisphere, right: Hemisphere, fit: RigidFit) -> tuple[Floats
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
+def _difference(to_left: Floats, to_right: Floats, left: Hemisphere) -> tuple[float, Floats]:
+    """Return the angle between two motions, and their shift (3,) in mm at the left hemisphere's centre."""
+    difference = to_right - to_left
+    shift = difference[:3, :3] @ MIRROR[:3, :3] @ left.shape.centre + difference[:3, 3]
+    return angle_deg(to_right[:3, :3].T @ to_left[:3, :3]), shift
+
+
 def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere, declared: bool) -> bool:
-    angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
+    angle, shift_mm = _difference(to_left, to_right, left)
     if declared and angle < DECLARED_TURN_DEG:
         return True
-    centre = MIRROR[:3, :3] @ left.shape.centre
-    difference = to_right - to_left
-    shift = np.abs(difference[:3, :3] @ centre + difference[:3, 3]) / right.shape.size_mm
+    shift = np.abs(shift_mm) / right.shape.size_mm
     return bool(angle < COMMON_DEG and shift[0] < COMMON_DISTANCE and np.hypot(*shift[1:]) < COMMON_OFFSET)
 
 

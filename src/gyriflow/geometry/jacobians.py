@@ -16,7 +16,8 @@ from .triangles import Floats
 # corners of the edges whose midpoints are nodes 4 to 9, in the order of VTK
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 # the eight parts of an element between its nodes: one at each corner, four around the axis from node 4 to node 9
-PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
+CORNER_PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
+PARTS = (*CORNER_PARTS, (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
 NODES = np.array([np.eye(4)[i] for i in range(4)] + [(np.eye(4)[a] + np.eye(4)[b]) / 2 for a, b in EDGES])
 """Barycentric coordinates (10, 4) of the nodes."""
 POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])

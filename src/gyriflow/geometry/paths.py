@@ -117,14 +117,11 @@ def merged_shapes(weeks: Floats, places: Floats, stops: Collection[float] = ()) 
             (early, first), (late, last) = means[max(number - 1, 0)], means[min(number + 1, len(groups) - 1)]
             week, mean = means[number]
             merged[group] = mean + ((weeks[group] - week) / (late - early))[:, None, None] * (last - first)
-            around = slice(observed[max(np.searchsorted(observed, group[0]) - 1, 0)], _next(observed, group[-1]))
+            before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
+            end = observed[after] if after < len(observed) else group[-1] + 1
+            around = slice(observed[max(before, 0)], end)
             kept[around] &= np.isin(np.arange(len(weeks))[around], observed)
     return weeks[kept], merged[kept]
-
-
-def _next(observed: Ints, last: int) -> int:
-    later = observed[observed > last]
-    return int(later[0]) if len(later) else last + 1
 
 
 def limited_velocities(weeks: Floats, places: Floats) -> Floats:

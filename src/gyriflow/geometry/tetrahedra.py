@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .jacobians import EDGES, chunks, coefficients, shape_values
+from .jacobians import CORNER_PARTS, EDGES, chunks, coefficients, determinants, shape_values
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
@@ -26,16 +26,7 @@ FINE_FACES = (
     ((0, 6, 4), (6, 2, 5), (4, 5, 1), (6, 5, 4)),
 )
 # the linear elements between the nodes of a quadratic one: at its corners, and around the diagonal from node 6 to 8
-PIECES = (
-    (0, 4, 6, 7),
-    (4, 1, 5, 8),
-    (6, 5, 2, 9),
-    (7, 8, 9, 3),
-    (6, 8, 4, 5),
-    (6, 8, 5, 9),
-    (6, 8, 9, 7),
-    (6, 8, 7, 4),
-)
+PIECES = (*CORNER_PARTS, (6, 8, 4, 5), (6, 8, 5, 9), (6, 8, 9, 7), (6, 8, 7, 4))
 PIECES_OF_ORDER = {1: 1, 2: 4}
 """Number of triangles of a face; with nodes on its edges, one at each corner and one in the middle."""
 
@@ -89,10 +80,8 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     volumes = np.empty(len(tets))
     for part in chunks(len(tets)):
-        a, b, c, d = (np.take(vertices, corners, axis=0) for corners in tets[part].T)
-        # the triple product is written out, since NumPy's cross product is slower
-        (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
-        volumes[part] = ((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0
+        places = np.take(vertices, tets[part], axis=0)
+        volumes[part] = determinants(places[:, 1:] - places[:, :1]) / 6.0
     return volumes
 
 

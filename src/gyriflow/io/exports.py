@@ -14,7 +14,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
-from ..quantities import VERTEX_MAPS, VertexMap
+from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
 from .made_files import making_files, require_own_data_set
@@ -216,7 +216,8 @@ def _write_maps(
             for name, values in read_vertex_maps(path).items():
                 quantity = VERTEX_MAPS[name]
                 suffix, sign = quantity.bids_suffix, quantity.export_sign
-                sidecars["_".join(filter(None, (entity, suffix)))] = {**_described(quantity), **more}
+                described = {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
+                sidecars["_".join(filter(None, (entity, suffix)))] = {**described, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
                 write_vertex_maps(named, {suffix if sign < 0 else name: sign * values}, STRUCTURES[side])
@@ -299,10 +300,6 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
     for name, table in tables.items():
         columns = {str(key): PEOPLE.get(str(key), OF_INPUT) for key in table if key not in first[:2]}
         write_json(folder / f"{name}.json", columns)
-
-
-def _described(quantity: VertexMap) -> dict[str, Any]:
-    return {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
 
 
 def bids_unit(unit: str) -> str:

@@ -403,10 +403,7 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "GIFTI": _read_gifti_surface,
     "VTK": _read_vtk_surface,
-    "STL": _read_with_trimesh,
-    "PLY": _read_with_trimesh,
-    "OBJ": _read_with_trimesh,
-    "OFF": _read_with_trimesh,
+    **dict.fromkeys(("STL", "PLY", "OBJ", "OFF"), _read_with_trimesh),
     "FreeSurfer": _read_freesurfer_surface,
 }
 """The reader of each format of surfaces."""

@@ -131,8 +131,20 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
         if nib.is_proxy(image.dataobj):
             _require_its_size(image, path)
         values = _stored_values(image, path)
-    values = _three_axes(values, path, content)
-    return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
+    shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
+    if len(shape) != 3 or values.dtype.kind not in "biuf":
+        form, expected = (
+            f"shape {values.shape}, type {values.dtype}",
+            "three axes (further ones of length 1) of numbers",
+        )
+        raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
+    affine = np.array(_affine(image, affine_from, path), dtype=float)
+    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
+        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
+    if sizes.max() > ANISOTROPY_WARNED * sizes.min():
+        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
+    return values.reshape(shape), affine
 
 
 VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}
@@ -270,24 +282,6 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
         problem, expected = "has a unit of length that is not in NIfTI", "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
     return unit
-
-
-def _checked_affine(affine: Floats, path: AnyPath) -> Floats:
-    sizes = np.linalg.norm(affine[:3, :3], axis=0)
-    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
-        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
-    if sizes.max() > ANISOTROPY_WARNED * sizes.min():
-        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
-    return affine
-
-
-def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
-    shape = values.shape
-    shape3d = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
-    if len(shape3d) != 3 or values.dtype.kind not in "biuf":
-        form, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
-        raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
-    return values.reshape(shape3d)
 
 
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:

@@ -26,12 +26,12 @@ OFF_MM = 1e-4
 """A ray starts so far above its own face."""
 STILL_OPEN = 0.5
 """A gap counts as kept where so much of its width is left."""
+# in reverse, these are the opposite ones
 SIDES_OF_ELEMENT = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 MIN_JACOBIAN_RATIO = 0.1
 """Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight, 0 folded over."""
 MIN_GAP_KEPT = 0.95
 """Least accepted part of the fissure and other gaps, by the area of their walls, that stays open."""
-OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat between corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
-    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, OPPOSITE, strict=True)):
+    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, reversed(SIDES_OF_ELEMENT), strict=True)):
         edge = corner[:, b] - corner[:, a]
         first, second = (np.cross(edge, corner[:, k] - corner[:, a]) for k in (c, d))
         sine = np.linalg.norm(np.cross(first, second), axis=1)
