@@ -163,7 +163,11 @@ def _read_volume(
         surface = extraction.isosurface(extraction.smooth_mask(parts), cerebrum.affine)
         # a brain that is cut by the field of view may be as narrow, which has been reported already
         brain.warn(plausible.require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
-        pose = pose or _pose_by_shape(field, cerebrum.affine, scheme)
+        if pose is None:
+            every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+            coarse = extraction.unambiguous(field[::every, ::every, ::every])
+            rough = extraction.isosurface(coarse, cerebrum.affine @ np.diag([every, every, every, 1.0]))
+            pose = pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
         brain.warn(pose.warnings)
     return cerebrum, pose or Pose()
 
@@ -247,13 +251,6 @@ def _with_sulci(
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     return opened, fine, report["opened_mL"] - gained_ml
-
-
-def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
-    every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
-    coarse = extraction.unambiguous(field[::every, ::every, ::every])
-    rough = extraction.isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
-    return pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
 
 
 def from_hemispheres(

@@ -39,10 +39,7 @@ TEXT_COLUMNS = (
     *("measure", "quantity", "proxy", "unit", "model", "kind", "growth_of", "parameter", "result", "place", "pose_by"),
     *("verdict", "cause", "outcome", "flag", "resolution", "level", "message", "warnings", "stage", "rule"),
 )
-"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids.
-
-Other columns hold numbers, true or false, or texts that are never like these. A cell without a value is empty.
-"""
+"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids."""
 
 
 def companion_files(path: AnyPath) -> list[str]:

@@ -133,8 +133,7 @@ def write_surface(
 def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
     """Write a brain's surface and its hemispheres to `files`: `whole`, `left` and `right` if present, `stl`."""
     write_surface(files.whole, whole)
-    sides: dict[Side, TriangleMesh | None] = {"left": left, "right": right}
-    for side, mesh in sides.items():
+    for side, mesh in zip(SIDES, (left, right), strict=True):
         if mesh is not None:
             write_surface(files[side], mesh, STRUCTURES[side], "Pial")
     if stl := files.get("stl"):

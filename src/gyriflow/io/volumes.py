@@ -56,14 +56,6 @@ class LabelVolume:
         return {int(number): int(count) * voxel_ml for number, count in zip(numbers, voxels, strict=True)}
 
 
-@dataclass(frozen=True, eq=False)
-class ScalarVolume:
-    """The (i, j, k) values of the voxels, NaN if undefined, and the (4, 4) affine to RAS+ mm."""
-
-    values: Floats
-    affine: Floats
-
-
 class LabelSource(NamedTuple):
     """A file of tissue labels, which of NIfTI's two matrices counts, and what its labels mean."""
 
@@ -133,11 +125,9 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
         values = _stored_values(image, path)
     shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
     if len(shape) != 3 or values.dtype.kind not in "biuf":
-        form, expected = (
-            f"shape {values.shape}, type {values.dtype}",
-            "three axes (further ones of length 1) of numbers",
-        )
-        raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
+        form, problem = f"shape {values.shape}, type {values.dtype}", f"is not a volume of {content}"
+        expected = "three axes (further ones of length 1) of numbers"
+        raise InputError(problem, path=path, found=form, expected=expected)
     affine = np.array(_affine(image, affine_from, path), dtype=float)
     sizes = np.linalg.norm(affine[:3, :3], axis=0)
     if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
@@ -165,10 +155,10 @@ def _expected(content: str) -> str:
     return f"a whole volume of {content} ({', '.join(VOLUME_SUFFIXES)})"
 
 
-def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> ScalarVolume:
-    """Return the values of a NIfTI or MGH file in RAS+ mm; `affine_from` and InputError as `read_label_volume`."""
+def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> tuple[Floats, Floats]:
+    """Return (i, j, k) values of a NIfTI or MGH file, NaN if undefined, and the affine, as `read_label_volume`."""
     values, affine = read_values(path, affine_from, "numbers")
-    return ScalarVolume(values.astype(float), affine)
+    return values.astype(float), affine
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
