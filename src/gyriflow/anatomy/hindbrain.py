@@ -36,17 +36,9 @@ def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelSch
 
     InputError if labels of left and right are mirrored, so that no rotation can correct them.
     """
-    centres = {
-        name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
-        for name, numbers in (
-            ("cerebrum", scheme.cerebrum),
-            ("cerebellum", scheme.cerebellum),
-            ("brainstem", scheme.brainstem),
-            ("left", scheme.left),
-            ("right", scheme.right),
-        )
-        if np.isin(labels, numbers).any()
-    }
+    names = "cerebrum", "cerebellum", "brainstem", "left", "right"
+    places = {name: np.argwhere(np.isin(labels, getattr(scheme, name))) for name in names}
+    centres = {name: affine[:3, :3] @ voxels.mean(axis=0) for name, voxels in places.items() if len(voxels)}
     hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
     size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
     for name, offset in hindbrain.items():

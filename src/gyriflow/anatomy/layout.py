@@ -52,11 +52,9 @@ def layout_of(labels: Labels) -> Layout:
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for a scheme without cortex."""
     cerebrum, cortex, white, fluid, left, right = (
-        np.isin(layout.labels, numbers)
-        for numbers in (
-            scheme.cerebrum, scheme.cortex, scheme.white_matter, scheme.ventricles, scheme.left, scheme.right
-        )
-    )  # fmt: skip
+        np.isin(layout.labels, getattr(scheme, name))
+        for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right")
+    )
     if not cortex.any():
         return
     outside, counted = ~cerebrum & (layout.labels != HOLE), layout.labels != HOLE

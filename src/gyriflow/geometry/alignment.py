@@ -13,6 +13,7 @@ from .triangles import Floats, TriangleMesh, face_normals, transformed
 CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees of one of them."""
 
+IDENTITY: Floats = np.eye(3)
 MIRROR: Floats = np.diag([-1.0, 1.0, 1.0, 1.0])
 """The (4, 4) reflection that exchanges left and right in RAS coordinates."""
 
@@ -36,13 +37,10 @@ STALL_ROUNDS, STALL_TOL = 5, 1e-3
 """Surfaces that differ never stop moving, so rounds also end when this many reduced the distance by less than this."""
 
 
-def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
+def motion(rotation: ArrayLike = IDENTITY, shift: ArrayLike = 0.0) -> Floats:
     """Return the (4, 4) motion p → rotation p + shift. The default of each is the identity."""
     matrix = np.eye(4)
-    if rotation is not None:
-        matrix[:3, :3] = rotation
-    if shift is not None:
-        matrix[:3, 3] = shift
+    matrix[:3, :3], matrix[:3, 3] = rotation, shift
     return matrix
 
 

@@ -128,15 +128,8 @@ def inverted_on_the_way(
         # rows of one end, with one or two of the other
         mixed = [np.where(np.isin(range(3), rows)[:, None], last, first) for rows in ((0,), (1,), (2,))]
         opposite = [np.where(np.isin(range(3), rows)[:, None], first, last) for rows in ((0,), (1,), (2,))]
-        bernstein_values = np.stack(
-            [
-                determinants(first),
-                sum(map(determinants, mixed)) / 3,
-                sum(map(determinants, opposite)) / 3,
-                determinants(last),
-            ],
-            axis=1,
-        )
+        ends = [first], mixed, opposite, [last]
+        bernstein_values = np.stack([sum(map(determinants, maps)) / len(maps) for maps in ends], axis=1)
         bernstein_values -= least * np.maximum(bernstein_values[:, :1], 0.0)
         undecided = np.flatnonzero(bernstein_values.min(axis=1) <= 0)
         inverted[chunk.start + undecided] = [_has_root(*values) for values in bernstein_values[undecided]]

@@ -60,14 +60,8 @@ def path_through(
     velocities = limited_velocities(at, places)
     # by interval, since velocities may differ on the two sides of a week: control points of Bernstein's polynomials
     lengths = np.diff(at)[:, None, None]
-    control = np.stack(
-        [
-            places[:-1],
-            places[:-1] + velocities[:-1] * lengths / 3,
-            places[1:] - velocities[1:] * lengths / 3,
-            places[1:],
-        ]
-    )
+    first, last = places[:-1], places[1:]
+    control = np.stack([first, first + velocities[:-1] * lengths / 3, last - velocities[1:] * lengths / 3, last])
     inverted = []
     for i, length in enumerate(np.diff(at)):
         steps = max(1, int(np.ceil(length / step_gw - 1e-6)))

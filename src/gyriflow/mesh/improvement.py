@@ -36,14 +36,10 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
         for _ in range(ROUNDS):
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
-            moves = [
-                move
-                for vertex in mesh.tets[element]
-                if (move := _best_move(vertices, mesh.tets, element, vertex, on_surface))
-            ]
-            if not moves:
+            moves = [_best_move(vertices, mesh.tets, element, vertex, on_surface) for vertex in mesh.tets[element]]
+            if not any(moves):
                 break
-            _, vertex, place = max(moves, key=lambda move: move[0])
+            _, vertex, place = max(filter(None, moves), key=lambda move: move[0])
             vertices[vertex] = place
     improved = TetrahedralMesh(vertices, mesh.tets)
     before, after = (float(radius_ratios(m)[flat].min()) for m in (mesh, improved))
