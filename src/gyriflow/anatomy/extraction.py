@@ -201,12 +201,11 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
             view |= alternating
     ends = (slice(None, -1), slice(1, None))
     count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
-    for j in (0, 1):
-        for k in (0, 1):
-            low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
-            opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
-            for corner in np.ndindex(2, 2, 2):
-                ambiguous[tuple(ends[side] for side in corner)] |= opposite
+    for j, k in np.ndindex(2, 2):
+        low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
+        opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
+        for corner in np.ndindex(2, 2, 2):
+            ambiguous[tuple(ends[side] for side in corner)] |= opposite
     separated = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
     return np.where(ambiguous, separated, field).astype(np.float32)
 
@@ -295,7 +294,7 @@ def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDAr
 
 
 def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with every voxel restored that is free to be, those far from one half first."""
+    """Return `after` with voxels restored to `before` where topology allows, those far from one half first."""
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
     places = places[np.argsort(-np.abs(field[tuple(places.T)] - 0.5), kind="stable")] + 1

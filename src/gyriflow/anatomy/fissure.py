@@ -27,8 +27,7 @@ DIRECTIONS = 400
 STARTS = 5
 # the left-right axis is searched within this angle of the world's x axis
 SEARCH_DEG = 60.0
-# a plane x = const is accepted if the distance to the mirror image is at most this factor of the best plane's, plus
-# this many edge lengths, since distances are measured to vertices
+# a plane x = const is accepted if its mirror distance is at most this factor of the best plane's, plus so many edges
 SYMMETRY_TOL_FACTOR, SYMMETRY_TOL_EDGES = 1.1, 0.1
 # smaller tilts are not corrected, since the plane is not more accurate
 MIN_TILT_DEG = 0.5

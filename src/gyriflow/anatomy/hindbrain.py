@@ -83,8 +83,7 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
         (np.cross(*pair), unit(pair[0] + pair[1]))
         for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
     )
-    # the brainstem is in front of the cerebellum, so the cross product points to the right. If both lie in the same
-    # direction, the rotation about it is unknown
+    # the cross product points to the right. If both lie in the same direction, the rotation about it is unknown
     if np.linalg.norm(theirs[0]) < MIN_SPREAD:
         return None
     return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])

@@ -12,8 +12,7 @@ from ..settings.schemes import LabelScheme
 from .extraction import Floats
 from .labels import MIN_CORTEX_OUTSIDE, Labels
 
-# share of a tissue's neighbours that are cerebrum; in 47 brains of three atlases 0.89 or more for white matter and
-# fluid, 0.33 or less for tissues outside
+# share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter and fluid, ≤ 0.33 outside
 MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
 # shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more white matter
 CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01

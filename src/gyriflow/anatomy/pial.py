@@ -17,19 +17,12 @@ from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
 from . import extraction, fissure, plausible, repair
+from . import pose as posing
 from .extraction import LEVEL, Floats, Mask
 from .fissure import MidPlane
 from .hindbrain import pose_of_labels
 from .labels import MIN_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
 from .layout import layout_of, scheme_contradictions
-from .pose import (
-    WALL_DISTANCE_MM,
-    hemisphere_warnings,
-    pose_of_hemisphere,
-    pose_of_pair,
-    pose_of_surface,
-    pose_of_volume_by_shape,
-)
 from .repair import RepairedSurface
 from .sulci import open_fused_sulci
 from .thickness import MIN_VOXELS, border, voxels_through_cortex
@@ -129,7 +122,7 @@ def from_labels(
     brain.take(even)
     if side:
         plausible.require_single_hemisphere(even.mesh)
-        return _one_side(even, side, pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
+        return _one_side(even, side, posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
     heights = fissure.sample(side_mm, grid, triangles.corners(even.mesh).mean(axis=1))
     return _two_sides(even, fissure.left_faces(even.mesh, heights), plane, pose, brain)
 
@@ -167,7 +160,7 @@ def _read_volume(
             every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
             coarse = extraction.unambiguous(field[::every, ::every, ::every])
             rough = extraction.isosurface(coarse, cerebrum.affine @ np.diag([every, every, every, 1.0]))
-            pose = pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
+            pose = posing.pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
         brain.warn(pose.warnings)
     return cerebrum, pose or Pose()
 
@@ -295,7 +288,7 @@ def from_hemispheres(
     if named:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
-        pose = pose_of_pair(left, right, declared=declared)
+        pose = posing.pose_of_pair(left, right, declared=declared)
         left, right = (
             triangles.transformed(left, pose.of_file("left")),
             triangles.transformed(right, pose.of_file("right")),
@@ -304,7 +297,7 @@ def from_hemispheres(
     length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
     brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
-        brain.warn(hemisphere_warnings(left, right, coordinates))
+        brain.warn(posing.hemisphere_warnings(left, right, coordinates))
     parts = [
         repair.make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
         for part, mesh in zip(parts, (left, right), strict=True)
@@ -377,10 +370,10 @@ def from_surface(
     even = repair.make_pieces_sound(clean, edge_length_mm)
     brain.take(even)
     if side:
-        pose = pose_of_hemisphere(even.mesh, side, coordinates)
+        pose = posing.pose_of_hemisphere(even.mesh, side, coordinates)
     else:
         brain.warn(plausible.require_whole(even.mesh, "surface"))
-        pose = pose_of_surface(even.mesh, coordinates)
+        pose = posing.pose_of_surface(even.mesh, coordinates)
     # "lps" if these were found, else the configured coordinates
     brain.report["coordinates"] = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     if side:
@@ -471,7 +464,7 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
         _require_medial(triangles.submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
         pial = triangles.submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]
-    fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
+    fissure_x = float(x.max() + posing.WALL_DISTANCE_MM if side == "left" else x.min() - posing.WALL_DISTANCE_MM)
     brain.report["rotation_deg"] = angle_deg(pose.of_file()[:3, :3])
     return _pial_surface(whole, {side: pial}, fissure_x, pose, brain)
 

@@ -18,8 +18,7 @@ log = logging.getLogger(__name__)
 EARLY, LATE = (25.4, 92.0), (36.6, 304.0)
 # accepted ratio to it: from small fetuses with pathologies to adults, and the log-linear growth is coarse
 MIN_RATIO, MAX_RATIO = 0.2, 6.0
-# beyond these ratios it is doubtful. Atlases from 21 to 36 GW have 0.57 to 1.27; a brain with 0.8 mm voxels whose
-# coordinates are voxel indices has 1.95
+# beyond these it is doubtful: atlases from 21 to 36 GW have 0.57 to 1.27, coordinates in voxels of 0.8 mm give 1.95
 MIN_USUAL_RATIO, MAX_USUAL_RATIO = 0.55, 1.45
 # width and height over length are 0.74 to 0.83 and 0.63 to 0.72 in atlases
 WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)

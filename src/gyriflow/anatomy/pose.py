@@ -219,10 +219,7 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
-    """Return the pose of a whole brain's surface in coordinates "ras", "lps" or "auto".
-
-    Named ones are kept, with a warning if the shape contradicts them. InputError with "auto" if it is ambiguous.
-    """
+    """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto"; InputError if this is unclear."""
     shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
     fit, confidence = template.register_from_all_sides(shape, template.brains())
     brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)

@@ -19,13 +19,11 @@ from .fissure import sample
 
 # voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
 MAX_VOXEL_MM = 0.55
-# the nearest points of white matter on both sides of a sulcus are at least this many cortical thicknesses apart;
-# under a bend or a thick crest they are closer
+# white matter of two banks is at least this many cortical thicknesses apart, closer under a bend or a thick crest
 MIN_BANK_DISTANCE = 1.4
 # the cortex of a bank has at least this share of its usual thickness
 MIN_BANK = 0.75
-# smaller sheets are roughness of the labels; sheets less deep than this (in cortical thicknesses) are the rounded
-# bottom of an open sulcus
+# smaller sheets are roughness of the labels; less deep ones (in thicknesses) the rounded bottom of an open sulcus
 MIN_SHEET_MM2 = 8.0
 MIN_SHEET_DEPTH = 1.5
 # margin around a brain

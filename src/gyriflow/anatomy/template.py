@@ -8,15 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry.alignment import (
-    CUBE_ROTATIONS,
-    MIRROR,
-    Planes,
-    RigidFit,
-    fits_from_all_sides,
-    follow_planes,
-    residual_ratio,
-)
+from ..geometry import alignment
+from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Planes, RigidFit
 from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
@@ -67,10 +60,7 @@ class PointCloud:
 
 
 def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
-    """Sample points of a closed, outward surface at random, in proportion to area.
-
-    Those deeper than `max_depth` sizes below the hull are left out: a fissure may be open or fused.
-    """
+    """Sample a closed, outward surface by area, but for points deeper than `max_depth` sizes below its hull."""
     triangles, areas = corners(mesh), face_areas(mesh)
     volumes = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
     centre = 0.75 * volumes @ triangles.mean(axis=1) / volumes.sum()
@@ -118,7 +108,7 @@ def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) ->
     This is the residual of the best pose more than 40° away over that of the best: near 1 the pose is unclear.
     """
     middle = targets[len(targets) // 2]
-    fits = fits_from_all_sides(
+    fits = alignment.fits_from_all_sides(
         CUBE_ROTATIONS,
         lambda start: _descend(shape, middle, start, None, COARSE, 12, 8),
         lambda fit: register(shape, targets, fit.rotation, fit.shift),
@@ -126,7 +116,7 @@ def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) ->
         DISTINCT_DEG,
     )
     best = min(fits, key=lambda fit: fit.residual)
-    confidence = residual_ratio(fits, best, DISTINCT_DEG)
+    confidence = alignment.residual_ratio(fits, best, DISTINCT_DEG)
     fine = [_descend(shape, target, best.rotation, best.shift, FINE, 30, 1) for target in targets]
     return min(fine, key=lambda fit: fit.residual), confidence
 
@@ -152,7 +142,9 @@ def _descend(
     def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
         return bool(np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3)
 
-    rotation, shift = follow_planes(rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged)
+    rotation, shift = alignment.follow_planes(
+        rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged
+    )
     forward, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
     target_points, facing = target.points[::every], target.normals[::every]
     backward, _ = shape.tree.query(shape.features((target_points - shift) @ rotation, facing @ rotation))

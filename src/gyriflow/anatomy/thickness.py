@@ -23,8 +23,7 @@ from .repair import make_sound, sound_pieces, surface_of_mask
 
 log = logging.getLogger(__name__)
 
-# a vertex has cortex under it if a voxel of cortex is closer than this, and lies on the labels' own surface if a voxel
-# outside is closer than that
+# a vertex has cortex under it if a voxel of it is closer than this, and lies at the labels if one outside is
 NEAR_VOXELS = 1.0
 MAX_OUTSIDE_VOXELS = 1.5
 # an opened fissure is this close to its plane

@@ -16,8 +16,7 @@ KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0
 NODES_OF_ORDER = {1: 4, 2: 10}
 MIN_RADIUS_RATIO = 0.02
 """Least accepted quality of an element (`radius_ratios`)."""
-# the face opposite to each corner, counter-clockwise from outside; and its four triangles if its edges have nodes: at
-# its corners in turn, and between the nodes
+# the face opposite to each corner, outward; and its four triangles if its edges have nodes: at its corners, between
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 FINE_FACES = (
     ((1, 5, 8), (5, 2, 9), (8, 9, 3), (5, 9, 8)),

@@ -234,18 +234,13 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
 
 
-def _read_vtk_surface(path: Path) -> RawSurface:
-    points, faces = read_vtk(path)
-    return np.asarray(points, dtype=float), faces, None, None
-
-
 def read_pose(path: AnyPath) -> Pose:
     """Read the pose in a `surface.json`."""
     return pose_from(read_json(path)["pose"])
 
 
 def connectivity(path: Path) -> tuple[int, int, str]:
-    """Return a surface file's numbers of vertices and triangles, and a digest of these in any order; InputError."""
+    """Return a surface file's numbers of vertices and triangles, and a digest of the triangles in any order."""
     return _connectivity(path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None)
 
 
@@ -401,7 +396,7 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
 
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "GIFTI": _read_gifti_surface,
-    "VTK": _read_vtk_surface,
+    "VTK": lambda path: (*read_vtk(path), None, None),
     **dict.fromkeys(("STL", "PLY", "OBJ", "OFF"), _read_with_trimesh),
     "FreeSurfer": _read_freesurfer_surface,
 }

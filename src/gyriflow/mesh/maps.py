@@ -16,8 +16,7 @@ log = logging.getLogger(__name__)
 
 FARTHEST_MM = 5.0
 QUANTILE = 0.95
-"""The surface of a map may be this far from this part of the mesh's surface: pial, white and midthickness surfaces of
-the same brain are nearer, and a few places where one of them is cut differently do no harm."""
+"""A map's surface may be this far from this part of the mesh's: all surfaces of one brain are, but where they are cut."""
 NEIGHBOURS = 8
 TIE = 1e-9
 """Relative difference below which two distances count as equal."""
