@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 FARTHEST_MM = 5.0
 QUANTILE = 0.95
-"""A map's surface may be this far from this part of the mesh's: all surfaces of one brain are, but where they are cut."""
+"""A map's surface may be this far from the mesh's: all surfaces of one brain are nearer, but where they are cut."""
 NEIGHBOURS = 8
 TIE = 1e-9
 """Relative difference below which two distances count as equal."""
