@@ -9,7 +9,7 @@ UNLOCKABLE: set[str] = set()
 
 
 def lock_file(file: IO, *, wait: bool = False) -> bool:
-    """Lock an open file until closed, or return False if another process has it; without locks warn once."""
+    """Lock an open file until it is closed (`wait` for it, or return False); without locks, warn once and go on."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:

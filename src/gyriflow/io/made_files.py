@@ -10,7 +10,10 @@ from .files import AnyPath, files_below, read_json, write_json
 
 @contextmanager
 def making_files(folder: AnyPath, record: AnyPath, *subfolders: str) -> Iterator[None]:
-    """Remove files of earlier blocks (of some subfolders only) from a folder, and list those of this in `record`."""
+    """Remove the files that earlier blocks made in a folder, and list those that this block makes in `record`.
+
+    With `subfolders`, only earlier files in these are removed. Files that are not listed are left.
+    """
     folder, listed = Path(folder), set[str]()
     with suppress(InputError):
         listed = set(read_json(record))
