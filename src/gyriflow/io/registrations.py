@@ -103,6 +103,6 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
         surfaces = {name: list(at[:].astype(np.float64)) for name, at in file.get("surfaces", {}).items()}
         ages = pd.DataFrame({name: values[:] for name, values in file["ages"].items()}) if "ages" in file else None
         positions = file["positions"][:].astype(np.float64)
-        special = (file[name][:].tolist() for name in ("stops", "between"))
+        stops, between = (file[name][:].tolist() for name in ("stops", "between"))
         tets = file["tets"][:] if "tets" in file else None
-        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, *special, tets)
+        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, stops, between, tets)
