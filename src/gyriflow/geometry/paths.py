@@ -41,7 +41,7 @@ class Path:
 
 def path_through(
     weeks: Sequence[float],
-    shapes: Sequence[Floats],
+    shapes: Sequence[Floats] | Floats,
     mesh: TetrahedralMesh,
     step_gw: float = 1 / 7,
     stops: Collection[float] = (),
@@ -65,7 +65,7 @@ def path_through(
     inverted = []
     for i, length in enumerate(np.diff(at)):
         steps = max(1, int(np.ceil(length / step_gw - 1e-6)))
-        ends = np.linspace(0.0, 1.0, steps + 1, dtype=np.float64)
+        ends = np.arange(steps + 1) / steps
         straight = control[0, i] + np.array([1 / 3, 2 / 3])[:, None, None] * (control[3, i] - control[0, i])
         for _ in range(STRAIGHTENING_ROUNDS):
             faults = _inverted_between(control[:, i], ends, mesh)
