@@ -17,8 +17,8 @@ with step(snakemake.log[0]):
     surface, report = read_surface(files.surface), read_json(files.report)
     pose, image, tissues, thickness = read_pose(files.report), None, None, None
     if files.image:
-        volume = read_volume_map(files.image, params.labels.affine_from)
-        image = volume.values, pose.world @ volume.affine
+        values, affine = read_volume_map(files.image, params.labels.affine_from)
+        image = values, pose.world @ affine
     if params.labels:
         labels = params.labels.read()
         tissues = tissue_groups(labels.labels, params.labels.scheme), pose.world @ labels.affine

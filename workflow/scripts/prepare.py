@@ -27,8 +27,8 @@ with step(snakemake.log[0]):
             surface = on_mesh.move_to_mesh(mesh.vertices[boundary_surface(mesh)[1]], surface, pose.of_file())
             maps[name] = on_mesh.vertex_map_on_mesh(mesh.vertices, facets, surface, values, path)
         else:
-            volume, motion = read_volume_map(path, params.affine_from), pose.of_volume(path)
-            maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, volume.values, motion @ volume.affine, path)
+            (values, affine), motion = read_volume_map(path, params.affine_from), pose.of_volume(path)
+            maps[name] = on_mesh.volume_map_on_mesh(mesh.vertices, values, motion @ affine, path)
         on_mesh.require_within(maps[name], bounds_of(FoldingSettings.model_fields[name]), path)
         if name == "thickness_mm":
             require_plausible_thickness(maps[name], source["curve"], path)

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from gyriflow.errors import MeshError
-from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.tetrahedra import boundary_surface, radius_ratios
 from gyriflow.io.files import write_json
 from gyriflow.io.made_files import making_files
 from gyriflow.io.surfaces import read_surface, write_surface
 from gyriflow.io.tetmeshes import write_tetrahedral_mesh
-from gyriflow.mesh.quality import quality_summary, radius_ratios, refuse_bad_mesh
+from gyriflow.mesh.quality import quality_summary, refuse_bad_mesh
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.step import step
 

@@ -55,10 +55,7 @@ STALK_MM = 4.0
 
 
 def crop(mask: Mask) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
-    """Return the bounding box of an (i, j, k) mask as slices, and the (3,) index of its first voxel after padding.
-
-    The padding is `PAD_VOXELS` wide.
-    """
+    """Return the bounding box of an (i, j, k) mask, and the (3,) index of its first voxel padded by `PAD_VOXELS`."""
     box = ndimage.find_objects(mask.astype(np.uint8))[0]
     return box, np.array([side.start for side in box]) - PAD_VOXELS
 
@@ -71,10 +68,7 @@ def shifted_affine(affine: Floats, first: NDArray[np.int64]) -> Floats:
 
 
 def parts_in_boxes(mask: Mask) -> Iterator[tuple[tuple[slice, ...], Mask]]:
-    """Yield each connected part of an (i, j, k) mask: its bounding box plus one voxel, and its mask in that box.
-
-    Voxels are connected through faces, edges and corners.
-    """
+    """Yield for each connected part (faces, edges, corners) of a mask its box plus one voxel, and its mask there."""
     number, _ = ndimage.label(mask, OUTSIDE)
     for index, tight in enumerate(ndimage.find_objects(number), start=1):
         box = _wider(tight, 1)
@@ -93,9 +87,8 @@ def smooth_mask(mask: Mask, smoothing_voxels: float = SMOOTHING_VOXELS) -> NDArr
 def remove_bridges(mask: Mask, field: NDArray[np.float32]) -> tuple[NDArray[np.float32], int]:
     """Reopen slits of a mask that smoothing has closed; return the smoothed field and the number of voxels reopened.
 
-    A slit is a group of voxels outside the mask and connected to the outside: a sulcus, the fissure or the Sylvian
-    opening, one voxel wide. Its voxels get the value that places the surface at the slit's walls. Groups of a few
-    voxels are roughness of the labels and stay closed. So do slits that would pierce the mask.
+    A slit is a group of outside voxels connected to the outside, one voxel wide: a sulcus or the fissure. Its voxels
+    get the value that places the surface at its walls. Small groups, and slits that would pierce the mask, stay closed.
     """
     number, _ = ndimage.label(~mask)
     # the volume is padded, so its first voxel is outside
@@ -118,10 +111,7 @@ def refine(field: NDArray, affine: Floats, factor: int) -> tuple[NDArray, Floats
 
 
 def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, int]:
-    """Return the mask's largest part and those of comparable size, with cavities filled.
-
-    The second and third value are the number of parts dropped and of their voxels.
-    """
+    """Return the mask's parts of comparable size to its largest, cavities filled; parts and voxels dropped."""
     number, count = ndimage.label(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
@@ -133,10 +123,7 @@ def main_parts(mask: Mask, comparable: float = COMPARABLE) -> tuple[Mask, int, i
 def make_simple(
     field: NDArray[np.float32], comparable: float = COMPARABLE
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Return the field with a level set that has only main parts, no cavities and no handles; and a report.
-
-    Main parts have at least `comparable` times the size of the largest.
-    """
+    """Return the field with a level set of main parts without cavities or handles, and a report; see `main_parts`."""
     inside = field > LEVEL
     if not inside.any():
         raise MeshError("the mask is empty after smoothing")
@@ -148,10 +135,7 @@ def make_simple(
 
 
 def isosurface(field: NDArray[np.float32], affine: Floats) -> TriangleMesh:
-    """Return the surface in mm, oriented outward, on which an (i, j, k) field is one half.
-
-    MeshError if it encloses no volume.
-    """
+    """Return the outward surface in mm on which an (i, j, k) field is one half; MeshError if it encloses no volume."""
     vertices, faces, _, _ = marching_cubes(field, LEVEL, gradient_direction="ascent")
     # transformed() flips the faces if the affine mirrors (LAS, LPI, …)
     mesh = transformed(TriangleMesh(vertices, faces), affine)
@@ -169,9 +153,8 @@ def handles(mask: Mask) -> int:
 def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], dict[str, int]]:
     """Cut or fill the handles of the level set at one half of an (i, j, k) field; return the field and the counts.
 
-    Patches that an opening removes or a closing adds are tried from the smallest to the largest. A patch that removes
-    a handle is applied, except for the voxels that can be restored without a change of topology (simple points,
-    Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
+    Patches that an opening removes or a closing adds are tried, smallest first. One that removes a handle is applied
+    but for its simple points (Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
     """
     original = field > 0.5
     mask = original.copy()
@@ -204,9 +187,8 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
 def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Adjust a field so that its isosurface connects inside voxels through faces only.
 
-    If inside and outside voxels alternate around a square, or two opposite corners of a cube differ from the other
-    six, marching cubes decides from the values which ones to connect. The values are changed so that it never
-    connects the inside.
+    Where inside and outside alternate around a square, or two opposite corners of a cube differ from the other six,
+    marching cubes decides from the values; these are changed so that it never connects the inside.
     """
     mask = field > 0.5
     ambiguous = np.zeros_like(mask)
@@ -219,21 +201,17 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
             view |= alternating
     ends = (slice(None, -1), slice(1, None))
     count = sum(mask[i, j, k].astype(np.int8) for i in ends for j in ends for k in ends)
-    for j in (0, 1):
-        for k in (0, 1):
-            low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
-            opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
-            for corner in np.ndindex(2, 2, 2):
-                ambiguous[tuple(ends[side] for side in corner)] |= opposite
+    for j, k in np.ndindex(2, 2):
+        low, high = mask[ends[0], ends[j], ends[k]], mask[ends[1], ends[1 - j], ends[1 - k]]
+        opposite = (low & high & (count == 2)) | (~low & ~high & (count == 6))
+        for corner in np.ndindex(2, 2, 2):
+            ambiguous[tuple(ends[side] for side in corner)] |= opposite
     separated = np.where(mask, np.minimum(field, 0.55), np.minimum(field, 0.05))
     return np.where(ambiguous, separated, field).astype(np.float32)
 
 
 def dilated(mask: Mask, radius: float) -> Mask:
-    """Dilate an (i, j, k) mask by a ball of a radius in voxels, at most 10.
-
-    Squared distances are summed axis by axis, in bytes. A distance transform takes ten times the time and memory.
-    """
+    """Dilate an (i, j, k) mask by a ball of at most 10 voxels; a distance transform takes ten times as long."""
     squared = np.where(mask, 0, int(radius**2) + 1).astype(np.uint8)
     for axis in range(3):
         nearest = squared.copy()
@@ -283,10 +261,7 @@ def _pieces(mask: Mask) -> tuple[int, int]:
 
 
 def _euler_cells(mask: Mask) -> NDArray[np.int8]:
-    """Return the contribution of each 2 × 2 × 2 block to the Euler number, at the block's first voxel.
-
-    Voxels connected through faces have the Euler number of a complex of points, edges, squares and cubes.
-    """
+    """Return each 2 × 2 × 2 block's part of the Euler number, at its first voxel; faces connect voxels."""
     x, y, z = (_pairs(mask, axis) for axis in range(3))
     xy, xz, yz = _pairs(x, 1), _pairs(x, 2), _pairs(y, 2)
     return mask.astype(np.int8) - x - y - z + xy + xz + yz - _pairs(xy, 2)
@@ -307,10 +282,7 @@ def _euler_gain(before: Mask, after: Mask) -> int:
 
 
 def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Label the parts of a `change` of the mask; return the labels, and by label the change of the Euler number.
-
-    Parts touch neither at edges nor at corners, so each block of eight voxels contains only one of them.
-    """
+    """Label the parts of a `change` of the mask; return the labels, and by label the change of the Euler number."""
     number, count = ndimage.label(change, OUTSIDE)
     gain = _euler_cells(mask ^ change) - _euler_cells(mask)
     places, last = np.argwhere(gain), np.array(mask.shape) - 1
@@ -322,10 +294,7 @@ def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDAr
 
 
 def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with every voxel restored to `before` whose change does not affect the topology.
-
-    Voxels far from one half are restored first, so the remaining changes lie where the field is closest to one half.
-    """
+    """Return `after` with voxels restored to `before` where topology allows, those far from one half first."""
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
     places = places[np.argsort(-np.abs(field[tuple(places.T)] - 0.5), kind="stable")] + 1
@@ -368,8 +337,7 @@ def _connected(places: int, seeds: int, neighbours: list[int]) -> int:
 def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any]]]:
     """Remove the parts of an (i, j, k) mask that hang by a stalk; return the mask and each part's volume and place.
 
-    A part hangs by a stalk if a ball of 3.2 mm diameter cannot pass from the rest into it and the cross-section that
-    connects it is at most 12 mm². A gyrus may be as thin, but is connected along its length.
+    A ball of 3.2 mm diameter cannot pass through a stalk, and its cross-section is at most 12 mm²; a gyrus is wider.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     depth = ndimage.distance_transform_edt(mask, sampling=size)

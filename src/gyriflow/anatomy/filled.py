@@ -33,10 +33,9 @@ def filled_labels(
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return an (i, j, k) volume with the labels of `FILLED` inside a pial surface, and its (4, 4) affine.
 
-    `whole` is the closed surface; `sides` are its hemispheres, open where they were cut or capped at the midline. All
-    surfaces are in the same pose. Cortex lies between the `sides` and the `whites`, or else within `thickness_mm` of
-    the `sides`. Cuts, and places where white and pial surfaces coincide, have no cortex. Hemispheres are joined where
-    their gap at the fissure is no wider than the gap that opens a fissure of labels, since labels touch there.
+    `whole` is the closed surface, `sides` are its hemispheres, open or capped at the midline, all in one pose. Cortex
+    lies between the `sides` and the `whites`, or else within `thickness_mm`; cuts and coinciding surfaces have none.
+    Hemispheres are joined where their gap at the fissure is as narrow as one that is opened in labels.
     """
     mask, affine = surface_mask(whole, voxel_mm)
     inside = mask > 0

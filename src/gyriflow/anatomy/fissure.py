@@ -14,22 +14,11 @@ from scipy.spatial.transform import Rotation
 from skimage.segmentation import watershed
 
 from ..errors import InputError
+from ..geometry import triangles
 from ..geometry.alignment import motion
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on
-from ..geometry.triangles import (
-    Ints,
-    TriangleMesh,
-    area_vectors,
-    corners,
-    edges,
-    face_areas,
-    face_components,
-    mean_edge_length,
-    submesh,
-    vertex_areas,
-    vertex_normals,
-)
+from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import Side
 from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask
 
@@ -38,8 +27,7 @@ DIRECTIONS = 400
 STARTS = 5
 # the left-right axis is searched within this angle of the world's x axis
 SEARCH_DEG = 60.0
-# a plane x = const is accepted if the distance to the mirror image is at most this factor of the best plane's, plus
-# this many edge lengths, since distances are measured to vertices
+# a plane x = const is accepted if its mirror distance is at most this factor of the best plane's, plus so many edges
 SYMMETRY_TOL_FACTOR, SYMMETRY_TOL_EDGES = 1.1, 0.1
 # smaller tilts are not corrected, since the plane is not more accurate
 MIN_TILT_DEG = 0.5
@@ -101,12 +89,11 @@ class MidPlane:
 def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
     """Return the mid-sagittal plane of a closed, outward surface whose left-right axis is within `SEARCH_DEG` of x.
 
-    Planes of mirror symmetry are the candidates. Each is fitted to the fissure, that is, to the points half-way between
-    medial walls that face each other. The chosen plane has little asymmetry and many fissure points. In an asymmetric
-    brain the plane of symmetry and the fissure differ; then the fissure counts. If the user has named the coordinates
-    (`named`), a plane x = const that is almost as symmetric as the best is kept: a body of revolution has many planes.
+    Planes of mirror symmetry are fitted to the points half-way between medial walls that face each other. The best one
+    has little asymmetry and many such points: in an asymmetric brain the fissure counts. With coordinates that the user
+    has `named`, an almost as symmetric plane x = const is kept: a body of revolution has many planes.
     """
-    weights = vertex_areas(mesh)
+    weights = triangles.vertex_areas(mesh)
     selection = np.random.default_rng(0).choice(len(weights), SAMPLES, p=weights / weights.sum())
     sample, tree = mesh.vertices[selection], cKDTree(mesh.vertices)
     planes = _symmetry_planes(sample, tree)
@@ -114,7 +101,7 @@ def mid_plane(mesh: TriangleMesh, *, named: bool = False) -> MidPlane:
         x, middle = np.array([1.0, 0.0, 0.0]), float(weights @ mesh.vertices[:, 0] / weights.sum())
         distance = _mirror_distance(x, middle, sample, tree)
         least = min(asymmetry for _, _, asymmetry in planes)
-        if distance < SYMMETRY_TOL_FACTOR * least + SYMMETRY_TOL_EDGES * mean_edge_length(mesh):
+        if distance < SYMMETRY_TOL_FACTOR * least + SYMMETRY_TOL_EDGES * triangles.mean_edge_length(mesh):
             return _fit_to_fissure(mesh, x, middle, distance)
     candidates = [_fit_to_fissure(mesh, *plane) for plane in planes]
     return max(candidates, key=lambda plane: (plane.fissure_points + 100.0) / (plane.asymmetry_mm + 0.5))
@@ -135,13 +122,10 @@ def _fit_to_fissure(mesh: TriangleMesh, normal: Floats, offset: float, asymmetry
 
 
 def fissure_points(mesh: TriangleMesh, normal: Floats, offset: float) -> Floats:
-    """Return the (k, 3) points half-way between walls that face each other across the interhemispheric fissure.
-
-    Only walls within a fifth of the brain's width of the plane normal·p = offset are used.
-    """
+    """Return the (k, 3) points half-way between facing walls of the fissure, a fifth of the width around a plane."""
     height = mesh.vertices @ normal - offset
     width = np.ptp(height)
-    facing = vertex_normals(mesh) @ normal
+    facing = triangles.vertex_normals(mesh) @ normal
     near = np.abs(height) < FISSURE_BAND * width
     left, right = np.flatnonzero(near & (facing > 0.5)), np.flatnonzero(near & (facing < -0.5))
     if len(left) < 8 or len(right) < 8:
@@ -165,10 +149,7 @@ def _middles(mesh: TriangleMesh, height: Floats, wall: Ints, opposite: Ints, nor
 
 
 def upright(plane: MidPlane, centre: Floats) -> tuple[Floats, float]:
-    """Return the smallest (4, 4) rotation about `centre` that makes the plane x = const, and its angle in degrees.
-
-    Anterior and superior remain those of the world coordinates. Below half a degree the identity is returned.
-    """
+    """Return the smallest (4, 4) rotation about `centre` to a plane x = const, and its degrees; none below 0.5°."""
     angle = float(np.degrees(np.arccos(np.clip(plane.normal[0], -1.0, 1.0))))
     if angle < MIN_TILT_DEG:
         return np.eye(4), 0.0
@@ -243,10 +224,9 @@ def _plane_through(points: Floats, normal: Floats, offset: float) -> tuple[Float
 
 @dataclass(frozen=True, eq=False)
 class Fissure:
-    """The mid-surface of the interhemispheric fissure, as heights in mm above the mid-sagittal plane.
+    """The mid-surface of the fissure: `heights` (a, b) in mm above the mid-sagittal plane, every 0.5 mm.
 
-    `axes` (2, 3) are unit vectors in the plane. `heights` (a, b) are given every 0.5 mm along them, the first at the
-    in-plane coordinates `corner` (2,).
+    They are given along `axes` (2, 3), unit vectors in the plane, from the in-plane coordinates `corner` (2,).
     """
 
     plane: MidPlane
@@ -289,10 +269,9 @@ def side_distance(
 ) -> NDArray[np.float32]:
     """Return each voxel's distance in mm from the surface between the hemispheres, negative on the left.
 
-    A voxel of an (i, j, k) mask belongs to the hemisphere from which a flood reaches it first (watershed). The flood
-    starts from the labels `left` and `right`, or else in the `core`, the tissue inside the cortex, far from the
-    mid-surface `fissure`. It fills the core, then the cortex by its distance from the core. So gyri may reach over the
-    mid-surface, cortex is parted half-way where it touches, and cortex of any thickness where CSF shows the fissure.
+    A voxel of an (i, j, k) mask belongs to the hemisphere from which a flood reaches it first (watershed): through the
+    `core`, the tissue inside the cortex, then the cortex by its distance from the core. It starts from the labels
+    `left` and `right`, or in the core far from the mid-surface. So gyri may reach over the mid-surface.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     places = np.argwhere(core)
@@ -326,10 +305,9 @@ def hidden_fissure(
 ) -> Mask:
     """Return the voxels of the surface between the hemispheres that cortex hides, in two or three layers.
 
-    `side_mm` is the result of `side_distance`, `brain` the (i, j, k) mask with all gaps that its labels show, `core`
-    the tissue inside the cortex. The hidden fissure ends above the tissue that joins the hemispheres (corpus callosum,
-    deep grey matter, ventricles). Small contacts of the core elsewhere are errors of the labels. With `bridges`, bits
-    of tissue that cross a visible fissure are included.
+    `side_mm` is that of `side_distance`, `brain` the (i, j, k) mask with all gaps that its labels show. The fissure
+    ends above the tissue of the `core` that joins the hemispheres; small contacts elsewhere are errors of the labels.
+    With `bridges`, bits of tissue that cross a visible fissure are included.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # not whole voxels, which rounding would include or not
@@ -362,11 +340,9 @@ def hidden_fissure(
 def open_fissure(
     field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], to_hidden_mm: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Open the hidden fissure of a smoothed (i, j, k) mask to `FISSURE_MM`.
+    """Open the hidden fissure of a smoothed (i, j, k) mask to `FISSURE_MM`, where cortex labels of both sides touch.
 
-    Labels of small fetal brains, and of older ones with a narrow fissure, have no CSF between the medial walls: the
-    cortex labels of both sides touch. `to_hidden_mm` is each voxel's distance from the result of `hidden_fissure`;
-    elsewhere the fissure is as wide as its CSF.
+    `to_hidden_mm` is each voxel's distance from the `hidden_fissure`; elsewhere it is as wide as its CSF.
     """
     voxel = float(abs(np.linalg.det(affine[:3, :3])) ** (1 / 3))
     outside = np.maximum(np.abs(side_mm) - 0.5 * FISSURE_MM, to_hidden_mm - max(voxel, 0.5 * FISSURE_MM))
@@ -379,10 +355,7 @@ def sample(field: NDArray[np.floating], affine: Floats, points: Floats) -> Float
 
 
 def plane_between_labels(left: Mask, right: Mask, affine: Floats, brain: Mask) -> MidPlane:
-    """Fit a plane to the points half-way between the labels of the two sides, in and around a brain.
-
-    It serves brains whose hemispheres are too unequal for a plane of mirror symmetry. All masks are (i, j, k).
-    """
+    """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a brain."""
     size = np.linalg.norm(affine[:3, :3], axis=0)
     to_left, to_right = (ndimage.distance_transform_edt(~side, sampling=size) for side in (left, right))
     side, near = to_left - to_right, ndimage.distance_transform_edt(~brain, sampling=size) < MARGIN_MM
@@ -396,15 +369,13 @@ def plane_between_labels(left: Mask, right: Mask, affine: Floats, brain: Mask) -
 
 
 def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
-    """Return the (m,) mask of the faces of the left hemisphere.
+    """Return the (m,) mask of the left faces, from their (m,) `heights` above the fissure, negative on the left.
 
-    `heights` (m,) are the distances of the faces from the fissure, negative on the left. Two comparable closed pieces
-    mostly on different sides are the hemispheres, even if they reach over the fissure. Otherwise patches that bulge
-    over the fissure are assigned to the nearest hemisphere, so that each is in one piece, except for closed pieces of
-    the surface. InputError if such patches are too large, so that a cut would not separate the hemispheres.
+    Two comparable closed pieces mostly on different sides are the hemispheres. Otherwise patches that bulge over the
+    fissure go to the nearest hemisphere, so that each is in one piece. InputError if such patches are too large.
     """
-    surface = face_components(mesh)
-    areas = face_areas(mesh)
+    surface = triangles.face_components(mesh)
+    areas = triangles.face_areas(mesh)
     side = heights < 0
     sizes = np.bincount(surface, weights=areas)
     # walls in contact at the fissure do not count
@@ -449,12 +420,12 @@ def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floa
     """
     is_kept, warnings = np.zeros(len(mesh.faces), dtype=bool), []
     for side, is_side in sides.items():
-        part, faces = submesh(mesh, is_side)[0], np.flatnonzero(is_side)
-        component, areas = face_components(part), face_areas(part)
+        part, faces = triangles.submesh(mesh, is_side)[0], np.flatnonzero(is_side)
+        component, areas = triangles.face_components(part), triangles.face_areas(part)
         is_kept[faces[component == 0]] = True
         if not component.any():
             continue
-        place = transform_points(corners(part)[component == 1].mean(axis=(0, 1))[None], to_file)[0]
+        place = transform_points(triangles.corners(part)[component == 1].mean(axis=(0, 1))[None], to_file)[0]
         share = areas[component > 0].sum() / areas.sum()
         found = f"the {side} hemisphere is in {component.max() + 1} pieces, {100 * share:.1f} % of its area is outside "
         found += f"the largest, around ({', '.join(str(round(x)) for x in place)}) mm in the file's coordinates"
@@ -470,32 +441,24 @@ def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floa
 
 
 def cut_share(*sides: TriangleMesh) -> float:
-    """Return the share of the medial walls that is a cut, of hemispheres posed with left and right along x.
+    """Return the share of the medial walls that is a cut, of posed hemispheres: opening over outline from the side.
 
-    It is the area of their openings (the area vectors of a closed surface sum to zero) over that of the convex outlines
-    of the hemispheres, seen from the side.
+    The area vectors of a closed surface sum to zero, so those of a hemisphere give its opening.
     """
-    cuts = sum(float(np.linalg.norm(area_vectors(side).sum(axis=0))) for side in sides)
+    cuts = sum(float(np.linalg.norm(triangles.area_vectors(side).sum(axis=0))) for side in sides)
     return cuts / sum(ConvexHull(side.vertices[:, 1:]).volume for side in sides)
 
 
 def nearer_left(mesh: TriangleMesh, left: TriangleMesh, right: TriangleMesh) -> Mask:
-    """Return the (m,) mask of the left faces of a surface that lies close to the two given hemispheres.
-
-    A face belongs to the hemisphere whose surface is nearer to its centroid, so `mesh` is cut along the same curved
-    fissure as the hemispheres. Stray patches are reassigned as in `left_faces`.
-    """
-    centres = corners(mesh).mean(axis=1)
+    """Return the (m,) mask of the faces of a surface that are nearer to a left hemisphere, as by `left_faces`."""
+    centres = triangles.corners(mesh).mean(axis=1)
     to_left, to_right = (nearest_on(centres, side)[0] for side in (left, right))
     return left_faces(mesh, to_left - to_right)
 
 
 def split(mesh: TriangleMesh, fissure_x_mm: float) -> tuple[TriangleMesh, TriangleMesh]:
-    """Split a pial surface into left and right hemisphere at the plane x = `fissure_x_mm` (RAS+).
-
-    Each face of `mesh` is in one of them. They are open where a connected brain is cut.
-    """
-    return cut_sides(mesh, left_faces(mesh, corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
+    """Split a pial surface (RAS+) into its left and right faces at the plane x = `fissure_x_mm`, open at the cut."""
+    return cut_sides(mesh, left_faces(mesh, triangles.corners(mesh)[:, :, 0].mean(axis=1) - fissure_x_mm))
 
 
 def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMesh]:
@@ -504,14 +467,14 @@ def cut_sides(mesh: TriangleMesh, left: Mask) -> tuple[TriangleMesh, TriangleMes
         problem = "the brain lies on one side of the interhemispheric fissure"
         found = f"{int(left.sum())} of {len(left)} faces on the left"
         raise InputError(problem, found=found, expected="two hemispheres")
-    return submesh(mesh, left)[0], submesh(mesh, ~left)[0]
+    return triangles.submesh(mesh, left)[0], triangles.submesh(mesh, ~left)[0]
 
 
 def cut_middle(left: TriangleMesh, right: TriangleMesh) -> float:
     """Return the mean x in mm of the cut between hemispheres, or of the gap between them if both are closed."""
     borders = []
     for side in (left, right):
-        pairs, counts = edges(side)
+        pairs, counts = triangles.edges(side)
         borders.append(side.vertices[np.unique(pairs[counts == 1]), 0])
     if cut := [border for border in borders if len(border)]:
         return float(np.mean(np.concatenate(cut)))
@@ -531,10 +494,9 @@ def smallest_gap(left: TriangleMesh, right: TriangleMesh) -> float:
 def separate(
     left: TriangleMesh, right: TriangleMesh, gap_mm: float, to_right: Floats
 ) -> tuple[TriangleMesh, TriangleMesh, float]:
-    """Move two hemispheres until the gap between them is `gap_mm`.
+    """Move two hemispheres along `to_right` (3,), a unit vector, until the gap between them is `gap_mm`.
 
-    They move by equal distances along `to_right` (3,), a unit vector from left to right. The third value is this
-    distance in mm, 0 if the gap was wide enough. InputError if more than 10 mm would be needed.
+    The third value is the distance that each moved in mm. InputError if it is more than 10 mm.
     """
     moved = 0.0
     gap = smallest_gap(left, right)

@@ -34,20 +34,11 @@ QUARTERS_DEG = 15.0
 def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
     """Estimate the pose from cerebellum, brainstem and labelled sides; return None if too few of them are labelled.
 
-    The file's pose is kept if it differs by less than 60°, with a warning from 15° on. InputError if the labels of
-    left and right are mirrored, so that no rotation can correct them.
+    InputError if labels of left and right are mirrored, so that no rotation can correct them.
     """
-    centres = {
-        name: affine[:3, :3] @ np.argwhere(np.isin(labels, numbers)).mean(axis=0)
-        for name, numbers in (
-            ("cerebrum", scheme.cerebrum),
-            ("cerebellum", scheme.cerebellum),
-            ("brainstem", scheme.brainstem),
-            ("left", scheme.left),
-            ("right", scheme.right),
-        )
-        if np.isin(labels, numbers).any()
-    }
+    names = "cerebrum", "cerebellum", "brainstem", "left", "right"
+    places = {name: np.argwhere(np.isin(labels, getattr(scheme, name))) for name in names}
+    centres = {name: affine[:3, :3] @ voxels.mean(axis=0) for name, voxels in places.items() if len(voxels)}
     hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
     size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
     for name, offset in hindbrain.items():
@@ -92,18 +83,14 @@ def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
         (np.cross(*pair), unit(pair[0] + pair[1]))
         for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
     )
-    # the brainstem is in front of the cerebellum, so the cross product points to the right. If both lie in the same
-    # direction, the rotation about it is unknown
+    # the cross product points to the right. If both lie in the same direction, the rotation about it is unknown
     if np.linalg.norm(theirs[0]) < MIN_SPREAD:
         return None
     return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
 
 
 def _rotation_from_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
-    """Estimate the (3, 3) rotation to RAS+ from labelled sides and the hindbrain together.
-
-    InputError if the sides are mirrored, according to the `rotation` from the hindbrain or to the fit itself.
-    """
+    """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain; InputError if they are mirrored."""
     below = [(unit(offset), EXPECTED[name]) for name, offset in hindbrain.items()]
     turn, mirrored = (_rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides))
     if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
@@ -124,9 +111,8 @@ def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
 def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
     """Return whether exchanged sides explain a volume better than a rotation.
 
-    Mirrored sides with one more direction still fit a rotation `turn`: a half turn about an oblique axis. With the
-    sides exchanged they fit `mirrored`, which is then as small as the brain's tilt. Wrong axis codes instead give
-    quarter turns, most often from LPS. Otherwise the sides of an upright brain are taken to be exchanged.
+    Mirrored sides and one more direction fit an oblique half turn, and exchanged an upright brain; wrong axis codes
+    give quarter turns, most often from LPS.
     """
     if angle_deg(turn) < MIN_TURN_DEG:
         return False

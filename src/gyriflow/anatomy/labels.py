@@ -12,19 +12,8 @@ from scipy import ndimage
 from ..errors import InputError
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
-from .extraction import (
-    COMPARABLE,
-    OUTSIDE,
-    PAD_VOXELS,
-    Floats,
-    Mask,
-    crop,
-    main_parts,
-    parts_in_boxes,
-    shifted_affine,
-    smooth_mask,
-    without_stalks,
-)
+from . import extraction
+from .extraction import Floats, Mask
 
 log = logging.getLogger(__name__)
 
@@ -58,9 +47,8 @@ CLOSING_MM = 6.0
 class Cerebrum:
     """The cerebrum of a label volume, cropped with a margin of `PAD_VOXELS`.
 
-    `mask` (i, j, k) is its mask, `tissue` are the labels, with 0 where labels of the cerebrum were removed; the (4, 4)
-    affine is that of the cropped volume. Parts below `smallest_part` of the largest were removed; if the sides are
-    labelled, a hemisphere may be far smaller than the other. The report has volumes and removed parts, in plain values.
+    `mask` (i, j, k) is its mask, `tissue` the labels, 0 where they were removed; the (4, 4) affine is that of the
+    cropped volume. Parts below `smallest_part` of the largest were removed. The report is in plain values.
     """
 
     mask: Mask
@@ -98,9 +86,9 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
             "ventricles without a label?"
         )
     open_fluid = outside_ventricles(labels, scheme)
-    whole, stalks = without_stalks((mask & ~open_fluid) | unlabelled, affine)
-    smallest = MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else COMPARABLE
-    main, parts, dropped = main_parts(whole, smallest)
+    whole, stalks = extraction.without_stalks((mask & ~open_fluid) | unlabelled, affine)
+    smallest = MIN_HEMISPHERE_RATIO if scheme.left and scheme.right else extraction.COMPARABLE
+    main, parts, dropped = extraction.main_parts(whole, smallest)
     if dropped > REPORTED_LOSS * main.sum():
         loss = f"{dropped * voxel_ml:.2f} mL, {100 * dropped / main.sum():.1f} % of the brain"
         warnings.append(f"{parts} separate parts were dropped: {loss}")
@@ -124,17 +112,13 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
         volumes |= {"tissue": main & ~fluid, "ventricles": fluid}
     report["label_volumes_mL"] = {name: float(voxels.sum() * voxel_ml) for name, voxels in volumes.items()}
     report["border_share"] = border_share(main)
-    box, first = crop(main)
-    cropped, labelled = np.pad(main[box], PAD_VOXELS), np.pad(tissue[box], PAD_VOXELS)
-    return Cerebrum(cropped, labelled, shifted_affine(affine, first), smallest, report, warnings)
+    box, first = extraction.crop(main)
+    cropped, labelled = np.pad(main[box], extraction.PAD_VOXELS), np.pad(tissue[box], extraction.PAD_VOXELS)
+    return Cerebrum(cropped, labelled, extraction.shifted_affine(affine, first), smallest, report, warnings)
 
 
 def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
-    """Return the (i, j, k) mask of the cerebrum.
-
-    InputError if the volume has labels that are not in the scheme, or lacks all of the scheme's labels of the cerebrum,
-    the cortex or the white matter (of everything inside the cortex, if the scheme has no white matter).
-    """
+    """Return the (i, j, k) mask of the cerebrum; InputError for labels not in the scheme, or missing tissues of it."""
     present = set(map(int, np.unique(labels))) - {0}
     unknown = sorted(present - set(scheme.labels))
     if unknown:
@@ -165,10 +149,7 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
 def require_cortex_outside(
     labels: Labels, scheme: LabelScheme, minimum: float = MIN_CORTEX_OUTSIDE, unlabelled: Mask | bool = False
 ) -> float:
-    """Return the share of the cerebrum's surface that is covered by cortex; `unlabelled` ventricles count as cerebrum.
-
-    InputError if it is less than `minimum`: then the scheme belongs to another kind of volume with the same numbers.
-    """
+    """Return the share of the cerebrum's surface with cortex; InputError below `minimum`: another scheme."""
     cerebrum = ndimage.binary_fill_holes(np.pad(np.isin(labels, scheme.cerebrum) | unlabelled, 1))
     outside = cerebrum & ~ndimage.binary_erosion(cerebrum)
     cortex = ndimage.binary_dilation(np.pad(np.isin(labels, scheme.cortex), 1))
@@ -183,10 +164,7 @@ def require_cortex_outside(
 
 
 def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right: Floats) -> None:
-    """Raise InputError if labels of the left hemisphere lie to the right of those of the right one, or are mixed.
-
-    `to_right` (3,) is the direction from left to right in the coordinates of the (4, 4) affine.
-    """
+    """Raise InputError if, along `to_right` (3,) in mm, labels of left lie right of those of right, or are mixed."""
     if not (np.isin(labels, scheme.left).any() and np.isin(labels, scheme.right).any()):
         return
     left, right = (
@@ -211,10 +189,8 @@ def require_sides(labels: Labels, scheme: LabelScheme, affine: Floats, to_right:
 def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     """Return the (i, j, k) mask of ventricles that are not enclosed by the cerebrum's tissue.
 
-    Labels of the ventricles often continue through the aqueduct to the fourth ventricle, between brainstem and
-    cerebellum. A voxel of fluid is enclosed if more than half of its 26 rays through fluid hit tissue of the cerebrum.
-    If the scheme has cerebellum or brainstem, only parts that touch these more than anything else outside are left
-    out, so that a ventricle which thin tissue leaves open to the outer CSF stays whole.
+    Their labels often continue to the fourth ventricle. A voxel is enclosed if more than half of its 26 rays through
+    fluid hit tissue. With cerebellum or brainstem in the scheme, only parts that mostly touch these are left out.
     """
     fluid = np.isin(labels, scheme.ventricles)
     if not fluid.any():
@@ -223,15 +199,22 @@ def outside_ventricles(labels: Labels, scheme: LabelScheme) -> Mask:
     # rays also pass unlabelled voxels inside: choroid plexus, septum
     clear = fluid | (ndimage.binary_fill_holes(tissue | fluid) & ~tissue)
     out = fluid & (_ray_share(clear, tissue, RAY_SMOOTHING) <= ENCLOSED)
-    return _touching_hindbrain(out, labels, scheme)
+    hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
+    if not hindbrain.any():
+        return out
+    elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
+    for box, part in extraction.parts_in_boxes(out):
+        around = ndimage.binary_dilation(part, extraction.OUTSIDE)
+        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
+            touching[box] |= part
+    return touching
 
 
 def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -> Mask:
     """Return the (i, j, k) mask of unlabelled ventricles; empty if any ventricle is labelled.
 
-    More than half of the 26 rays of such a voxel hit tissue inside the cortex. Rays in sulci, fissures and cisterns hit
-    cortex or leave the brain. If no cortex is labelled, almost all rays must hit. Less than `REPORTED_LOSS` of the
-    cerebrum is roughness of the labels.
+    More than half of the 26 rays of such a voxel hit tissue inside the cortex, almost all if no cortex is labelled.
+    Less than `REPORTED_LOSS` of the cerebrum is roughness of the labels.
     """
     filled = np.zeros(labels.shape, dtype=bool)
     cerebrum = np.isin(labels, scheme.cerebrum)
@@ -247,24 +230,14 @@ def unlabelled_ventricles(labels: Labels, scheme: LabelScheme, affine: Floats) -
     hindbrain = np.isin(numbers, (*scheme.cerebellum, *scheme.brainstem))
     clear = ndimage.binary_fill_holes(closed | tissue) & ~tissue & ~hindbrain
     hit_share = _ray_share(clear, tissue & ~np.isin(numbers, scheme.cortex), 0.5 * RAY_SMOOTHING)
-    number, _ = ndimage.label(clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)), OUTSIDE)
+    number, _ = ndimage.label(
+        clear & (hit_share > (ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX)), extraction.OUTSIDE
+    )
     sizes = np.bincount(number.ravel(), minlength=2)[1:]
     enclosed = np.isin(number, np.flatnonzero(sizes >= max(1, MIN_PART_SHARE * sizes.max())) + 1)
     if enclosed.sum() > REPORTED_LOSS * cerebrum.sum():
         filled[box] = enclosed[(slice(margin, -margin),) * 3]
     return filled
-
-
-def _touching_hindbrain(out: Mask, labels: Labels, scheme: LabelScheme) -> Mask:
-    hindbrain = np.isin(labels, (*scheme.cerebellum, *scheme.brainstem))
-    if not hindbrain.any():
-        return out
-    elsewhere, touching = ~hindbrain & ~np.isin(labels, scheme.cerebrum), np.zeros_like(out)
-    for box, part in parts_in_boxes(out):
-        around = ndimage.binary_dilation(part, OUTSIDE)
-        if (around & hindbrain[box]).sum() > (around & elsewhere[box]).sum():
-            touching[box] |= part
-    return touching
 
 
 def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np.float32]:
@@ -281,7 +254,7 @@ def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np
     share = np.zeros(pad[0].shape, dtype=np.float32)
     share[tuple(start.T)] = hits / len(DIRECTIONS)
     smooth = ndimage.gaussian_filter(share[1:-1, 1:-1, 1:-1], smoothing_voxels)
-    return smooth / np.maximum(smooth_mask(clear, smoothing_voxels), 1e-6)
+    return smooth / np.maximum(extraction.smooth_mask(clear, smoothing_voxels), 1e-6)
 
 
 def border_share(mask: Mask) -> float:

@@ -12,8 +12,7 @@ from ..settings.schemes import LabelScheme
 from .extraction import Floats
 from .labels import MIN_CORTEX_OUTSIDE, Labels
 
-# share of a tissue's neighbours that are cerebrum; in 47 brains of three atlases 0.89 or more for white matter and
-# fluid, 0.33 or less for tissues outside
+# share of a tissue's neighbours that are cerebrum; in 47 brains ≥ 0.89 for white matter and fluid, ≤ 0.33 outside
 MIN_INSIDE, MAX_OUTSIDE = 0.4, 0.5
 # shares of the cerebrum's tissue; in these brains 0.16 to 0.43 is cortex, 0.49 or more white matter
 CORTEX, WHITE, SMALL = (0.03, 0.6), (0.15, 1.0), 0.01
@@ -52,11 +51,9 @@ def layout_of(labels: Labels) -> Layout:
 def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     """Yield the contradictions between the arrangement of labels and a scheme; none for a scheme without cortex."""
     cerebrum, cortex, white, fluid, left, right = (
-        np.isin(layout.labels, numbers)
-        for numbers in (
-            scheme.cerebrum, scheme.cortex, scheme.white_matter, scheme.ventricles, scheme.left, scheme.right
-        )
-    )  # fmt: skip
+        np.isin(layout.labels, getattr(scheme, name))
+        for name in ("cerebrum", "cortex", "white_matter", "ventricles", "left", "right")
+    )
     if not cortex.any():
         return
     outside, counted = ~cerebrum & (layout.labels != HOLE), layout.labels != HOLE

@@ -9,93 +9,21 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import InputError, MeshError
+from ..geometry import triangles
 from ..geometry.alignment import angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose
-from ..geometry.triangles import (
-    TriangleMesh,
-    area,
-    area_cm2,
-    area_vectors,
-    corners,
-    euler_number,
-    is_closed,
-    merged,
-    signed_volume,
-    submesh,
-    transformed,
-    volume_ml,
-)
+from ..geometry.triangles import TriangleMesh
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .extraction import (
-    COMPARABLE,
-    LEVEL,
-    Floats,
-    Mask,
-    handles,
-    isosurface,
-    main_parts,
-    make_simple,
-    refine,
-    remove_bridges,
-    smooth_mask,
-    unambiguous,
-)
-from .fissure import (
-    FISSURE_MM,
-    MidPlane,
-    cut_middle,
-    cut_share,
-    cut_sides,
-    fissure_between,
-    hidden_fissure,
-    largest_pieces,
-    left_faces,
-    mid_plane,
-    open_fissure,
-    plane_between_labels,
-    sample,
-    separate,
-    side_distance,
-    smallest_gap,
-    split,
-    upright,
-)
+from . import extraction, fissure, plausible, repair
+from . import pose as posing
+from .extraction import LEVEL, Floats, Mask
+from .fissure import MidPlane
 from .hindbrain import pose_of_labels
 from .labels import MIN_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
 from .layout import layout_of, scheme_contradictions
-from .plausible import (
-    DOUBTFUL_RATIO,
-    cut_warnings,
-    facing_warnings,
-    logged,
-    max_cut_share,
-    proportion_warnings,
-    require_common_pose,
-    require_left_and_right,
-    require_pair,
-    require_plausible_size,
-    require_single_hemisphere,
-    require_whole,
-)
-from .pose import (
-    WALL_DISTANCE_MM,
-    hemisphere_warnings,
-    pose_of_hemisphere,
-    pose_of_pair,
-    pose_of_surface,
-    pose_of_volume_by_shape,
-)
-from .repair import (
-    RepairedSurface,
-    filled_warning,
-    make_pieces_sound,
-    pieces,
-    require_sound,
-    sound_pieces,
-    surface_of_mask,
-)
+from .repair import RepairedSurface
 from .sulci import open_fused_sulci
 from .thickness import MIN_VOXELS, border, voxels_through_cortex
 
@@ -117,10 +45,8 @@ MIN_GAP_MM = 0.5
 class PialSurface:
     """A posed pial surface in RAS+ mm.
 
-    `whole` is closed and outward, in one piece or in one for each hemisphere. `left` and `right` are its parts, open
-    where a connected brain is cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls; None for a
-    missing hemisphere. `pose` leads from the brain's files. The report has the pose, measures and repairs, in plain
-    values for JSON.
+    `whole` is closed and outward, in one or two pieces. `left` and `right` (None if missing) are its parts, open where
+    cut at the fissure, the plane x = `fissure_x_mm`, and at capped medial walls. `pose` leads from the brain's files.
     """
 
     whole: TriangleMesh
@@ -141,7 +67,7 @@ class _Brain:
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Log warnings and keep them."""
-        self.warnings += logged(warnings)
+        self.warnings += plausible.logged(warnings)
 
     def take(self, surface: RepairedSurface, suffix: str = "") -> None:
         """Keep the warnings and the report of repairs, its keys with a suffix."""
@@ -161,25 +87,22 @@ def from_labels(
 ) -> PialSurface:
     """Return the pial surface around the cerebrum of an (i, j, k) label volume with a (4, 4) affine to RAS+ mm.
 
-    A volume with wrong axes is rotated according to its cerebellum, brainstem and sides, or else to its shape. The
-    cerebrum's mask is smoothed (Gaussian, σ = 1 voxel) and its handles are removed. Its isosurface is smoothed,
-    remeshed to `edge_length_mm`, freed of terraces, moved outward to restore the volume, and rotated so that the
-    mid-sagittal plane is x = const. If cortex labels of both sides touch, the fissure is opened there to 1.5 mm,
-    half-way between the labels of the two sides if the scheme has them. With `open_sulci`, fused sulci are opened. With
-    `side` the volume contains only that hemisphere, which is posed as in `from_surface`.
+    The pose follows from cerebellum, brainstem and sides, or else from the shape. The mask is smoothed (Gaussian, σ = 1
+    voxel) and freed of handles; its surface is smoothed, remeshed to `edge_length_mm`, freed of terraces, given the
+    mask's volume, and rotated so that the mid-plane is x = const. Where cortex labels of both sides touch, the fissure
+    is opened to 1.5 mm; with `open_sulci`, fused sulci are. A hemisphere (`side`) is posed as in `from_surface`.
 
-    InputError if the labels do not fit the scheme or the week, for a single hemisphere without `side`, and for a whole
-    brain or labels of the other hemisphere with it. MeshError if the surface keeps self-intersections.
+    InputError if the labels do not fit the scheme, the week or the `side`. MeshError if self-intersections remain.
     """
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "labels"})
     cerebrum, pose = _read_volume(labels, affine, scheme, side, brain)
-    smooth, affine = smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
+    smooth, affine = extraction.smooth_mask(cerebrum.mask), pose.world @ cerebrum.affine
     grid, removed_ml = affine, 0.0
     side_mm: NDArray[np.float32] = np.zeros(0, dtype=np.float32)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
     if not side:
         plane, side_mm = _fissure_of_labels(cerebrum, core, smooth, affine, scheme, brain)
-        smooth, brain.report["slit_voxels_reopened"] = remove_bridges(cerebrum.mask, smooth)
+        smooth, brain.report["slit_voxels_reopened"] = extraction.remove_bridges(cerebrum.mask, smooth)
     original = smooth, grid
     if scheme.cortex and not side:
         smooth, affine, removed_ml = _with_fissure(smooth, affine, side_mm, core)
@@ -187,21 +110,21 @@ def from_labels(
     if open_sulci:
         smooth, affine, taken_ml = _with_sulci(smooth, affine, cerebrum, core, scheme, None if side else side_mm, brain)
         removed_ml += taken_ml
-    even = surface_of_mask(
+    even = repair.surface_of_mask(
         smooth,
         affine,
         cerebrum.volume_mm3,
         edge_length_mm,
-        smallest=COMPARABLE if side else cerebrum.smallest_part,
+        smallest=extraction.COMPARABLE if side else cerebrum.smallest_part,
         taken_mm3=removed_ml / ML_PER_MM3,
         original=original,
     )
     brain.take(even)
     if side:
-        require_single_hemisphere(even.mesh)
-        return _one_side(even, side, pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
-    heights = sample(side_mm, grid, corners(even.mesh).mean(axis=1))
-    return _two_sides(even, left_faces(even.mesh, heights), plane, pose, brain)
+        plausible.require_single_hemisphere(even.mesh)
+        return _one_side(even, side, posing.pose_of_hemisphere(even.mesh, side, "auto", of_volume=True), brain)
+    heights = fissure.sample(side_mm, grid, triangles.corners(even.mesh).mean(axis=1))
+    return _two_sides(even, fissure.left_faces(even.mesh, heights), plane, pose, brain)
 
 
 def _read_volume(
@@ -213,10 +136,11 @@ def _read_volume(
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
     pose = None if side else pose_of_labels(labels, affine, scheme)
-    sides = _labelled_sides(cerebrum.tissue, scheme)
+    labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
+    sides = [name for name, numbers in (("left", scheme.left), ("right", scheme.right)) if {*labelled} & {*numbers}]
     if side and set(sides) - {side}:
         raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
-    brain.warn(require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
+    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
     if (share := cerebrum.report["border_share"]) > REPORTED_LOSS:
         cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
         brain.warn([f"{cut}: parts outside are missing, and the surface is flat there"])
@@ -226,13 +150,17 @@ def _read_volume(
             problem = f"the volume has labels of the {sides[0]} hemisphere only"
             remedy = "Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side."
             raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
-        field = smooth_mask(cerebrum.mask)
+        field = extraction.smooth_mask(cerebrum.mask)
         # parts that are removed below because of their size do not count
-        parts, _, _ = main_parts(field > LEVEL, cerebrum.smallest_part)
-        surface = isosurface(smooth_mask(parts), cerebrum.affine)
+        parts, _, _ = extraction.main_parts(field > LEVEL, cerebrum.smallest_part)
+        surface = extraction.isosurface(extraction.smooth_mask(parts), cerebrum.affine)
         # a brain that is cut by the field of view may be as narrow, which has been reported already
-        brain.warn(require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
-        pose = pose or _pose_by_shape(field, cerebrum.affine, scheme)
+        brain.warn(plausible.require_whole(surface, "volume", refuses=share <= REPORTED_LOSS))
+        if pose is None:
+            every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
+            coarse = extraction.unambiguous(field[::every, ::every, ::every])
+            rough = extraction.isosurface(coarse, cerebrum.affine @ np.diag([every, every, every, 1.0]))
+            pose = posing.pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
         brain.warn(pose.warnings)
     return cerebrum, pose or Pose()
 
@@ -243,43 +171,44 @@ def _fissure_of_labels(
     """Return the mid-plane, and each voxel's distance from the surface between the hemispheres."""
     mask, has_sides = cerebrum.mask, bool(scheme.left and scheme.right)
     # medial walls of the tissue inside the cortex show the fissure even where the cortex hides it
-    walls = isosurface(smooth_mask(core) if scheme.cortex else field, affine)
-    plane = mid_plane(walls)
+    walls = extraction.isosurface(extraction.smooth_mask(core) if scheme.cortex else field, affine)
+    plane = fissure.mid_plane(walls)
     sides = [np.isin(cerebrum.tissue, labels) for labels in (scheme.left, scheme.right) if has_sides]
     if has_sides:
         left, right = sides
         axis = affine[:3, :3] @ (np.argwhere(right).mean(axis=0) - np.argwhere(left).mean(axis=0))
         if abs(plane.normal @ (axis / np.linalg.norm(axis))) < MIN_AXIS_COSINE:
-            plane = plane_between_labels(left, right, affine, mask)
+            plane = fissure.plane_between_labels(left, right, affine, mask)
             brain.warn(["the hemispheres are not mirror images of each other: the mid-plane is that of their labels"])
     require_sides(cerebrum.tissue, scheme, affine, plane.normal)
-    return plane, side_distance(mask, core if scheme.cortex else mask, affine, fissure_between(walls, plane), *sides)
+    return plane, fissure.side_distance(
+        mask, core if scheme.cortex else mask, affine, fissure.fissure_between(walls, plane), *sides
+    )
 
 
 def _with_fissure(
     field: NDArray[np.float32], affine: Floats, side_mm: NDArray[np.float32], core: Mask
 ) -> tuple[NDArray[np.float32], Floats, float]:
-    """Open a hidden fissure as a whole, down to the tissue that joins the hemispheres.
+    """Open a hidden fissure as a whole; return the field, its affine, and the volume removed (mL).
 
-    Return the field, its affine, and the volume removed (mL). If more than a thousandth of the brain is removed, the
-    fissure was fused. Voxels that are too coarse for its walls are then refined first.
+    Where more than a thousandth of the brain is removed, voxels too coarse for its walls are refined first.
     """
     size = np.linalg.norm(affine[:3, :3], axis=0)
     # an opening of less than two voxels would be lost
-    factor = int(np.ceil(1.8 * size.max() / FISSURE_MM))
+    factor = int(np.ceil(1.8 * size.max() / fissure.FISSURE_MM))
     for bridges in (False, True):
-        hidden = hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=bridges)
+        hidden = fissure.hidden_fissure(side_mm, field > LEVEL, core, affine, bridges=bridges)
         if not hidden.any():
             return field, affine, 0.0
         to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(np.float32)
         before, grid = field, affine
-        wide = open_fissure(field, affine, side_mm, to_hidden)
+        wide = fissure.open_fissure(field, affine, side_mm, to_hidden)
         if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(dtype=float):
-            distances = (refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
-            before, grid = refine(field, affine, factor)
-            wide = open_fissure(before, grid, *distances)
+            distances = (extraction.refine(values, affine, factor)[0] for values in (side_mm, to_hidden))
+            before, grid = extraction.refine(field, affine, factor)
+            wide = fissure.open_fissure(before, grid, *distances)
         # tissue that crosses the fissure makes tunnels of it, and closing these would close the fissure
-        if not handles(wide > LEVEL):
+        if not extraction.handles(wide > LEVEL):
             break
     voxel_ml = abs(np.linalg.det(grid[:3, :3])) * ML_PER_MM3
     return wide, grid, float((before - wide).sum(dtype=float) * voxel_ml)
@@ -303,7 +232,7 @@ def _with_sulci(
         report = {"stays_fused": fused}
     else:
         # handles are found faster before voxels are refined
-        simple, repaired = make_simple(field, cerebrum.smallest_part)
+        simple, repaired = extraction.make_simple(field, cerebrum.smallest_part)
         opened, fine, report = open_fused_sulci(simple, affine, core, side_mm)
     brain.report["sulci"] = report
     if not report.get("sheets"):
@@ -311,17 +240,10 @@ def _with_sulci(
             brain.warn([f"fused sulci were not opened: {report['stays_fused']}"])
         return field, affine, 0.0
     report["repaired_before"] = repaired
-    brain.warn(filled_warning(repaired, affine))
+    brain.warn(repair.filled_warning(repaired, affine))
     gained = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     gained_ml = gained * float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     return opened, fine, report["opened_mL"] - gained_ml
-
-
-def _pose_by_shape(field: NDArray[np.float32], affine: Floats, scheme: LabelScheme) -> Pose:
-    every = max(int(POSE_VOXEL_MM / np.linalg.norm(affine[:3, :3], axis=0).max()), 1)
-    coarse = unambiguous(field[::every, ::every, ::every])
-    rough = isosurface(coarse, affine @ np.diag([every, every, every, 1.0]))
-    return pose_of_volume_by_shape(rough, has_sides=bool(scheme.left and scheme.right))
 
 
 def from_hemispheres(
@@ -338,81 +260,84 @@ def from_hemispheres(
 ) -> PialSurface:
     """Return the pial surface of a brain from surfaces of its hemispheres.
 
-    The surfaces are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to
-    `edge_length_mm`, rotated together so that the mid-sagittal plane is x = const, and moved along x to a gap of 0.5 mm
-    between them. With coordinates "auto" each may have any rigid pose, which is determined from its
-    shape; `declared` is whether both files name the same coordinate system. If a shape contradicts named coordinates,
-    there is a warning.
-    Hemispheres that share the vertices of a cut, as those that gyriflow writes, are joined along it to one surface.
-    InputError if the pose cannot be determined, or if the hemispheres are swapped, of different size or of an
-    impossible size; MeshError if one cannot be made a closed surface without handles and self-intersections.
+    They are repaired (holes up to `max_hole_mm`, open medial walls), posed, smoothed, remeshed to `edge_length_mm`,
+    rotated so that the mid-plane is x = const, and moved to a gap of 0.5 mm. With coordinates "auto" each may have any
+    rigid pose; `declared` is whether both files name one coordinate system. Hemispheres that share the vertices of a
+    cut are joined. InputError if the pose is unclear, or they are swapped or of different or impossible size; MeshError
+    if one cannot be made sound.
     """
     if (joined := joined_along_cut(left, right)) is not None:
         connected = from_surface(
             joined, week=week, coordinates=coordinates, edge_length_mm=edge_length_mm, max_hole_mm=max_hole_mm
         )
         to_pose = connected.pose.of_file()
-        require_left_and_right(transformed(left, to_pose), transformed(right, to_pose), coordinates)
+        plausible.require_left_and_right(
+            triangles.transformed(left, to_pose), triangles.transformed(right, to_pose), coordinates
+        )
         return replace(connected, report=connected.report | {"source": "hemispheres", "joined_along_cut": True})
     brain, named = _Brain(week, {"source": "hemispheres", "coordinates": coordinates}), coordinates != "auto"
     to_ras = CONVENTIONS[coordinates] if named else np.eye(4)
     parts = [
-        sound_pieces(transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True) for mesh in (left, right)
+        repair.sound_pieces(triangles.transformed(mesh, to_ras), max_hole_mm, single=True, caps_walls=True)
+        for mesh in (left, right)
     ]
     for side, part in zip(SIDES, parts, strict=True):
         brain.take(part, f"_{side}")
     left, right = (part.mesh for part in parts)
-    brain.warn(require_plausible_size(signed_volume(left) + signed_volume(right), week))
+    brain.warn(plausible.require_plausible_size(triangles.signed_volume(left) + triangles.signed_volume(right), week))
     if named:
         pose = Pose(files=dict.fromkeys((*SIDES, "whole"), to_ras), by="configuration")
     else:
-        pose = pose_of_pair(left, right, declared=declared)
-        left, right = transformed(left, pose.of_file("left")), transformed(right, pose.of_file("right"))
+        pose = posing.pose_of_pair(left, right, declared=declared)
+        left, right = (
+            triangles.transformed(left, pose.of_file("left")),
+            triangles.transformed(right, pose.of_file("right")),
+        )
         brain.warn(pose.warnings)
-    length = float(np.ptp(merged(left, right).vertices, axis=0).max())
-    brain.warn(require_pair(left, right, max_hemisphere_ratio, coordinates))
+    length = float(np.ptp(triangles.merged(left, right).vertices, axis=0).max())
+    brain.warn(plausible.require_pair(left, right, max_hemisphere_ratio, coordinates))
     if named:
-        brain.warn(hemisphere_warnings(left, right, coordinates))
+        brain.warn(posing.hemisphere_warnings(left, right, coordinates))
     parts = [
-        make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
+        repair.make_pieces_sound(replace(part, mesh=mesh), edge_length_mm)
         for part, mesh in zip(parts, (left, right), strict=True)
     ]
     for side, part in zip(SIDES, parts, strict=True):
         brain.take(part, f"_{side}")
     surface = replace(
         parts[0],
-        mesh=merged(*(part.mesh for part in parts)),
+        mesh=triangles.merged(*(part.mesh for part in parts)),
         is_cap=np.concatenate([part.is_cap for part in parts]),
     )
-    plane = mid_plane(surface.mesh, named=named)
-    require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
+    plane = fissure.mid_plane(surface.mesh, named=named)
+    plausible.require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
     is_left = np.arange(len(surface.mesh.faces)) < len(parts[0].mesh.faces)
     return _two_pieces(surface, is_left, plane, pose, brain, named=named)
 
 
 def joined_along_cut(left: TriangleMesh, right: TriangleMesh) -> TriangleMesh | None:
     """Return the closed surface of two open hemispheres with the same vertices along their cut, or None."""
-    if is_closed(left) or is_closed(right):
+    if triangles.is_closed(left) or triangles.is_closed(right):
         return None
-    both = merged(left, right)
+    both = triangles.merged(left, right)
     vertices, index = np.unique(both.vertices, axis=0, return_inverse=True)
     joined = TriangleMesh(vertices, index.reshape(-1)[both.faces])
-    return joined if is_closed(joined) else None
+    return joined if triangles.is_closed(joined) else None
 
 
 def _two_pieces(
     surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: Pose, brain: _Brain, *, named: bool
 ) -> PialSurface:
     """Return the pial surface of a brain whose hemispheres are closed pieces, with a gap between them."""
-    left, right = cut_sides(surface.mesh, is_left)
+    left, right = fissure.cut_sides(surface.mesh, is_left)
     is_cap = np.concatenate([surface.is_cap[is_left], surface.is_cap[~is_left]])
-    gap, to_right = smallest_gap(left, right), plane.normal
-    left, right, moved = separate(left, right, MIN_GAP_MM, to_right)
-    mesh = merged(left, right)
-    brain.warn(facing_warnings(left, right, to_right))
+    gap, to_right = fissure.smallest_gap(left, right), plane.normal
+    left, right, moved = fissure.separate(left, right, MIN_GAP_MM, to_right)
+    mesh = triangles.merged(left, right)
+    brain.warn(plausible.facing_warnings(left, right, to_right))
     if moved > 0:
         brain.warn([f"each hemisphere was moved by {moved:.2f} mm, to a gap of {MIN_GAP_MM:g} mm between them"])
-        plane = mid_plane(mesh, named=named)
+        plane = fissure.mid_plane(mesh, named=named)
     shifts = {"left": motion(shift=-moved * to_right), "right": motion(shift=moved * to_right)}
     files = {side: shift @ pose.of_file(side) for side, shift in shifts.items()}
     pose = replace(pose, files={**pose.files, **files})
@@ -432,66 +357,59 @@ def from_surface(
 ) -> PialSurface:
     """Return the pial surface of a brain, or of a single hemisphere (`side`), from one surface.
 
-    It is repaired (holes up to `max_hole_mm`, open medial walls of hemispheres), smoothed and remeshed to
-    `edge_length_mm`. A whole brain is rotated so that the mid-sagittal plane is x = const. If its hemispheres are two
-    pieces, they get a gap as in `from_hemispheres`. The medial wall of a single hemisphere is set upright next to
-    x = `fissure_x_mm`. With coordinates "auto" the pose is determined from the shape.
-    InputError if a hemisphere is a whole brain or the reverse, of the other side, or of an impossible size; MeshError
-    if it cannot be made closed and free of handles and self-intersections.
+    It is repaired and posed as in `from_hemispheres`; two pieces get a gap as there. The medial wall of a hemisphere is
+    set upright next to x = `fissure_x_mm`. InputError if it is not what `side` says, or of an impossible size;
+    MeshError if it cannot be made sound.
     """
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
-    clean = sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
+    clean = repair.sound_pieces(mesh, max_hole_mm, single=side is not None, caps_walls=True)
     brain.take(clean)
-    brain.warn(require_plausible_size((2.0 if side else 1.0) * signed_volume(clean.mesh), week))
+    brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * triangles.signed_volume(clean.mesh), week))
     if side:
-        require_single_hemisphere(clean.mesh)
-    even = make_pieces_sound(clean, edge_length_mm)
+        plausible.require_single_hemisphere(clean.mesh)
+    even = repair.make_pieces_sound(clean, edge_length_mm)
     brain.take(even)
     if side:
-        pose = pose_of_hemisphere(even.mesh, side, coordinates)
+        pose = posing.pose_of_hemisphere(even.mesh, side, coordinates)
     else:
-        brain.warn(require_whole(even.mesh, "surface"))
-        pose = pose_of_surface(even.mesh, coordinates)
+        brain.warn(plausible.require_whole(even.mesh, "surface"))
+        pose = posing.pose_of_surface(even.mesh, coordinates)
     # "lps" if these were found, else the configured coordinates
     brain.report["coordinates"] = coordinates if np.array_equal(pose.world, pose.of_file()) else "lps"
     if side:
         return _one_side(even, side, pose, brain)
     brain.warn(pose.warnings)
-    even, named = replace(even, mesh=transformed(even.mesh, pose.of_file())), coordinates != "auto"
-    plane = mid_plane(even.mesh, named=named)
-    heights = fissure_between(even.mesh, plane).height_above(corners(even.mesh).mean(axis=1))
-    is_left = left_faces(even.mesh, heights)
-    if all(map(is_closed, cut_sides(even.mesh, is_left))):
+    even, named = replace(even, mesh=triangles.transformed(even.mesh, pose.of_file())), coordinates != "auto"
+    plane = fissure.mid_plane(even.mesh, named=named)
+    heights = fissure.fissure_between(even.mesh, plane).height_above(triangles.corners(even.mesh).mean(axis=1))
+    is_left = fissure.left_faces(even.mesh, heights)
+    if all(map(triangles.is_closed, fissure.cut_sides(even.mesh, is_left))):
         return _two_pieces(even, is_left, plane, pose, brain, named=named)
     return _two_sides(even, is_left, plane, pose, brain)
 
 
 def from_shape(mesh: TriangleMesh, *, week: float) -> PialSurface:
-    """Return a simple geometry, unchanged, in place of a brain; left and right meet at x = 0.
-
-    It has neither a fissure nor a size to check, and smoothing would round its edges. MeshError if it is not closed or
-    has self-intersections.
-    """
-    require_sound(mesh)
-    sides = dict(zip(SIDES, split(mesh, 0.0), strict=True))
+    """Return a simple geometry, unchanged, as a brain with sides at x = 0; MeshError if it is not sound."""
+    repair.require_sound(mesh)
+    sides = dict(zip(SIDES, fissure.split(mesh, 0.0), strict=True))
     return _pial_surface(mesh, sides, 0.0, Pose(), _Brain(week, {"source": "shape", "rotation_deg": 0.0}))
 
 
 def _pial_surface(
     whole: TriangleMesh, sides: Mapping[Side, TriangleMesh], fissure_x: float, pose: Pose, brain: _Brain
 ) -> PialSurface:
-    areas: dict[str, float] = {side: area_cm2(part) for side, part in sides.items()}
+    areas: dict[str, float] = {side: triangles.area_cm2(part) for side, part in sides.items()}
     report = brain.report | {
         "pose": pose.plain(),
         "week": brain.week,
         "fissure_x_mm": fissure_x,
         "area_cm2": {"whole": sum(areas.values()), **areas},
-        "volume_mL": volume_ml(whole),
+        "volume_mL": triangles.volume_ml(whole),
         "extents_mm": np.ptp(whole.vertices, axis=0).tolist(),
         "vertices": len(whole.vertices),
         "faces": len(whole.faces),
-        "pieces": len(pieces(whole)),
-        "euler_number": euler_number(whole),
+        "pieces": len(repair.pieces(whole)),
+        "euler_number": triangles.euler_number(whole),
         "warnings": brain.warnings,
     }
     return PialSurface(whole, sides.get("left"), sides.get("right"), fissure_x, pose, report)
@@ -501,34 +419,34 @@ def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: P
     """Return the pial surface of a brain, upright and cut into its hemispheres."""
     mesh, is_cap, is_kept = _without_islands(surface, {"left": is_left, "right": ~is_left}, pose.of_file(), brain)
     is_left = is_left[is_kept]
-    matrix, angle = upright(plane, mesh.vertices.mean(axis=0))
-    whole = transformed(mesh, matrix)
+    matrix, angle = fissure.upright(plane, mesh.vertices.mean(axis=0))
+    whole = triangles.transformed(mesh, matrix)
     for cap, sign in ((is_cap & is_left, 1.0), (is_cap & ~is_left, -1.0)):
-        _require_medial(submesh(whole, cap)[0], sign)
-    left, right = cut_sides(submesh(whole, ~is_cap)[0], is_left[~is_cap])
+        _require_medial(triangles.submesh(whole, cap)[0], sign)
+    left, right = fissure.cut_sides(triangles.submesh(whole, ~is_cap)[0], is_left[~is_cap])
     # x of the plane, which may be tilted by less than half a degree, at the brain's centre
     normal = matrix[:3, :3] @ plane.normal
     offset = plane.offset + normal @ matrix[:3, 3]
     fissure_x = float((offset - normal[1:] @ whole.vertices.mean(axis=0)[1:]) / normal[0])
     if not left.vertices[:, 0].mean() < fissure_x < right.vertices[:, 0].mean():
         brain.warn(["the mid-plane is not between the unequal hemispheres: the middle of their cut is used"])
-        fissure_x = cut_middle(left, right)
+        fissure_x = fissure.cut_middle(left, right)
     if plane.fissure_points == 0:
         brain.warn(["no fissure was found between facing walls: the plane of mirror symmetry is used"])
     if plane.asymmetry_mm > MAX_USUAL_ASYMMETRY * float(np.ptp(whole.vertices[:, 0])):
         brain.warn([f"the brain is far from mirror-symmetric ({plane.asymmetry_mm:.1f} mm): check its pose"])
-    brain.warn(proportion_warnings(np.ptp(whole.vertices, axis=0)))
-    areas = sorted((area(left), area(right)))
+    brain.warn(plausible.proportion_warnings(np.ptp(whole.vertices, axis=0)))
+    areas = sorted((triangles.area(left), triangles.area(right)))
     if areas[1] > MAX_AREA_RATIO * areas[0]:
         found = f"areas of {areas[0] * CM2_PER_MM2:.2f} and {areas[1] * CM2_PER_MM2:.2f} cm²"
         raise InputError("one hemisphere is too small", found=found, expected=f"a ratio of at most {MAX_AREA_RATIO:g}")
-    if areas[1] > DOUBTFUL_RATIO * areas[0]:
+    if areas[1] > plausible.DOUBTFUL_RATIO * areas[0]:
         brain.warn([f"the hemispheres' areas differ by {100 * (areas[1] / areas[0] - 1):.0f} %: check the midline"])
-    share = cut_share(left, right)
-    brain.warn(cut_warnings(share, brain.week))
+    share = fissure.cut_share(left, right)
+    brain.warn(plausible.cut_warnings(share, brain.week))
     brain.report |= {
         "cut_share": share,
-        "usual_cut_share": max_cut_share(brain.week),
+        "usual_cut_share": plausible.max_cut_share(brain.week),
         "rotation_deg": angle,
         "fissure_points": plane.fissure_points,
         "asymmetry_mm": plane.asymmetry_mm,
@@ -541,12 +459,12 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
     brain.warn(pose.warnings)
     every = np.ones(len(surface.mesh.faces), dtype=bool)
     mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
-    whole = pial = transformed(mesh, pose.of_file())
+    whole = pial = triangles.transformed(mesh, pose.of_file())
     if is_cap.any():
-        _require_medial(submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
-        pial = submesh(whole, ~is_cap)[0]
+        _require_medial(triangles.submesh(whole, is_cap)[0], 1.0 if side == "left" else -1.0)
+        pial = triangles.submesh(whole, ~is_cap)[0]
     x = whole.vertices[:, 0]
-    fissure_x = float(x.max() + WALL_DISTANCE_MM if side == "left" else x.min() - WALL_DISTANCE_MM)
+    fissure_x = float(x.max() + posing.WALL_DISTANCE_MM if side == "left" else x.min() - posing.WALL_DISTANCE_MM)
     brain.report["rotation_deg"] = angle_deg(pose.of_file()[:3, :3])
     return _pial_surface(whole, {side: pial}, fissure_x, pose, brain)
 
@@ -554,26 +472,17 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
 def _without_islands(
     surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
 ) -> tuple[TriangleMesh, Mask, Mask]:
-    """Leave out what is not connected to a hemisphere's largest piece.
-
-    Return the surface, the mask of its caps, and that of the faces that remain.
-    """
-    is_kept, warnings = largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
+    """Leave out what is apart from a side's largest piece; return the surface, masks of its caps and faces kept."""
+    is_kept, warnings = fissure.largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)
-    return submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
+    return triangles.submesh(surface.mesh, is_kept)[0] if warnings else surface.mesh, is_cap[is_kept], is_kept
 
 
 def _require_medial(cap: TriangleMesh, sign: float) -> None:
     """Raise MeshError if the cap of a posed hemisphere does not face the other one, in the direction `sign` x."""
-    normal = area_vectors(cap).sum(axis=0)
+    normal = triangles.area_vectors(cap).sum(axis=0)
     if sign * normal[0] < MIN_AXIS_COSINE * np.linalg.norm(normal):
         problem = "the surface has a hole that is too large to close, and is not the medial wall of a hemisphere"
         found = f"a hole {np.ptp(cap.vertices, axis=0).max():.1f} mm across"
         raise MeshError(problem, found=found, expected="a closed surface, or hemispheres open at medial walls only")
-
-
-def _labelled_sides(tissue: Labels, scheme: LabelScheme) -> list[Side]:
-    cortex = scheme.cortex or scheme.cerebrum
-    labels = {"left": scheme.left, "right": scheme.right}
-    return [side for side in SIDES if np.isin(tissue, np.intersect1d(labels[side], cortex)).any()]

@@ -1,7 +1,4 @@
-"""Check that a surface or volume can be the cerebrum of its week: size, number and similarity of hemispheres.
-
-An impossible size reveals files in metres, micrometres or centimetres.
-"""
+"""Check that a surface or volume can be the cerebrum of its week: size, unit, number and similarity of hemispheres."""
 
 import logging
 from collections.abc import Iterable
@@ -21,8 +18,7 @@ log = logging.getLogger(__name__)
 EARLY, LATE = (25.4, 92.0), (36.6, 304.0)
 # accepted ratio to it: from small fetuses with pathologies to adults, and the log-linear growth is coarse
 MIN_RATIO, MAX_RATIO = 0.2, 6.0
-# beyond these ratios it is doubtful. Atlases from 21 to 36 GW have 0.57 to 1.27; a brain with 0.8 mm voxels whose
-# coordinates are voxel indices has 1.95
+# beyond these it is doubtful: atlases from 21 to 36 GW have 0.57 to 1.27, coordinates in voxels of 0.8 mm give 1.95
 MIN_USUAL_RATIO, MAX_USUAL_RATIO = 0.55, 1.45
 # width and height over length are 0.74 to 0.83 and 0.63 to 0.72 in atlases
 WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
@@ -59,10 +55,7 @@ def expected_volume_ml(week: float) -> float:
 
 
 def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
-    """Return a warning if a cerebrum's volume is below 0.55 or above 1.45 of the published volume of its week.
-
-    InputError, with a guess of the unit, if it is less than a fifth or more than six times.
-    """
+    """Return warnings of an unusual volume for the week; InputError with a guess of the unit if impossible."""
     expected = expected_volume_ml(week)
     volume = volume_mm3 * ML_PER_MM3
     share = volume / expected
@@ -83,10 +76,7 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
 
 
 def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
-    """Raise InputError, with a guess of the unit, if a map's positive values times a factor are no thickness in mm.
-
-    Their median counts.
-    """
+    """Raise InputError, with a guess of the unit, if positive values are no thickness by their median."""
     known = values[np.isfinite(values) & (values > 0)]
     median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
     if low <= median <= high:
@@ -143,10 +133,7 @@ def require_single_hemisphere(mesh: TriangleMesh) -> None:
 
 
 def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> list[str]:
-    """Return a warning if the surface of a whole brain, given as a "surface" or a "volume", is narrow.
-
-    InputError if it is that of one hemisphere, unless `refuses` is false.
-    """
+    """Return a warning if a whole brain's surface, a "surface" or "volume", is narrow; InputError for one side."""
     shape = narrowness(mesh)
     if refuses and shape < MIN_NARROWNESS:
         raise InputError(
@@ -159,10 +146,7 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
 
 
 def require_left_and_right(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> None:
-    """Raise InputError if the centroid of the left of two surfaces in RAS+ is not at the smaller x.
-
-    `coordinates` are those of the configuration, "ras", "lps" or "auto".
-    """
+    """Raise InputError if the left of two surfaces in RAS+ is not at the smaller x; `coordinates` are named."""
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
         raise InputError(
@@ -174,11 +158,7 @@ def require_left_and_right(left: TriangleMesh, right: TriangleMesh, coordinates:
 
 
 def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coordinates: str) -> list[str]:
-    """Return a warning if two surfaces in RAS+ are hardly the left and right hemisphere of one brain.
-
-    InputError as for `require_left_and_right`, or if the volumes differ by more than `max_ratio`. Volumes of one fetus
-    differ by a few percent, those of successive weeks by 15 %; unilateral pathology goes further.
-    """
+    """Return a warning if two surfaces in RAS+ are hardly one brain's; InputError if swapped or beyond `max_ratio`."""
     require_left_and_right(left, right, coordinates)
     volumes = signed_volume(left), signed_volume(right)
     ratio = max(volumes) / min(volumes)
@@ -195,10 +175,7 @@ def require_pair(left: TriangleMesh, right: TriangleMesh, max_ratio: float, coor
 
 
 def facing_warnings(left: TriangleMesh, right: TriangleMesh, to_right: Floats) -> list[str]:
-    """Return a warning if the centres of two hemispheres are shifted against each other along the mid-plane.
-
-    `to_right` (3,) is the unit normal of the plane.
-    """
+    """Return a warning if hemispheres are shifted along the mid-plane, whose unit normal is `to_right` (3,)."""
     between = right.vertices.mean(axis=0) - left.vertices.mean(axis=0)
     shift = float(np.linalg.norm(between - (between @ to_right) * to_right))
     if shift <= MAX_USUAL_SHIFT * float(np.cbrt(abs(signed_volume(left)))):
@@ -207,10 +184,7 @@ def facing_warnings(left: TriangleMesh, right: TriangleMesh, to_right: Floats) -
 
 
 def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
-    """Raise InputError if two hemispheres are not mirror images of each other in any plane.
-
-    `asymmetry_mm` is the mean distance to the mirror image.
-    """
+    """Raise InputError if two hemispheres are further from their mirror image than `max_mm`, on average."""
     if asymmetry_mm > max_mm:
         raise InputError(
             "the hemispheres are not posed as one brain",
@@ -221,10 +195,7 @@ def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
 
 
 def thickness_jumps(series: Iterable[tuple[str, float, float]]) -> list[str]:
-    """Return warnings of successive brains of a growth series whose thickness differs as only labels do.
-
-    `series` has each brain's name, week and mean thickness in mm, which may be NaN.
-    """
+    """Return warnings of brains (name, week, mean mm or NaN) next in age with very different thickness."""
     measured = sorted((brain for brain in series if brain[2] > 0), key=lambda brain: brain[1])
     warnings = []
     for (first, week, before), (second, later, after) in pairwise(measured):

@@ -1,7 +1,4 @@
-"""Estimate the pose of a surface from its shape: two hemispheres, a single hemisphere, or a whole brain.
-
-Files that are well posed keep their pose. Left hemispheres are mirrored here and treated as right ones.
-"""
+"""Estimate the pose of a surface from its shape. Left hemispheres are mirrored here and treated as right ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,17 +11,9 @@ from ..geometry.alignment import MIRROR, RigidFit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
 from ..geometry.triangles import Floats, TriangleMesh, transformed
 from ..settings.terms import SIDES
+from . import template
 from .hindbrain import MIN_TURN_DEG, pose_from_rotation
-from .template import (
-    MAX_DEPTH,
-    PointCloud,
-    brains,
-    hemispheres,
-    medial_wall,
-    register,
-    register_from_all_sides,
-    shape_of,
-)
+from .template import PointCloud
 
 # a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
 # atlases of 21 to 38 GW, 1.1 in their whole brains), and its own residual is at most this, in sizes
@@ -50,8 +39,7 @@ class Hemisphere:
     """A right hemisphere, or a mirrored left one, with the pose estimated from its shape.
 
     `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
-    is the distance from the template relative to the size. `confidence` is the residual of the next best pose divided
-    by this residual, `side_ratio` that of the mirrored shape.
+    is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape.
     """
 
     shape: PointCloud
@@ -68,10 +56,10 @@ class Hemisphere:
 
 def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
     """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape, even if it is not clear."""
-    shape = shape_of(mesh)
-    fit, confidence = register_from_all_sides(shape, hemispheres())
-    mirrored, _ = register_from_all_sides(shape.mirrored(), hemispheres())
-    normal, offset = medial_wall(shape, -fit.rotation[0])
+    shape = template.shape_of(mesh)
+    fit, confidence = template.register_from_all_sides(shape, template.hemispheres())
+    mirrored, _ = template.register_from_all_sides(shape.mirrored(), template.hemispheres())
+    normal, offset = template.medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
@@ -81,23 +69,21 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
     """Return the pose of a brain from two closed, outward hemispheres, each in any rigid pose.
 
-    Each is registered to the template, and the mirrored left one to the right one. If both share coordinates close to
-    RAS or LPS, the file's pose is kept. If they share other coordinates, one rigid motion poses both. Otherwise each
-    gets its own, with the medial walls next to x = 0. `declared` is whether both files name the same coordinate system.
-
-    If a shape fits several poses, both are taken as RAS+ with a warning. InputError if it does not fit RAS+ either, and
-    if the two seem to be swapped or of one side.
+    Common coordinates close to RAS or LPS are kept; other common ones get one rigid motion, else each gets its own,
+    with the medial walls next to x = 0. `declared` is whether both files name one coordinate system. If a shape fits
+    several poses, both are taken as RAS+ with a warning. InputError if that does not fit, or the two seem swapped or of
+    one side.
     """
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
     if not all(hemisphere.is_clear for hemisphere in shapes):
         poses = [
-            _pose_as_ras(hemisphere, hemispheres(), f"{side} hemisphere")
+            _pose_as_ras(hemisphere, template.hemispheres(), f"{side} hemisphere")
             for hemisphere, side in zip(shapes, SIDES, strict=True)
         ]
         return poses[0]
     mirrored_left, own_right = shapes
-    fit = register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
+    fit = template.register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
     # mean of the right one's own estimate and of that from the left one
     middle = Rotation.from_matrix([own_right.rotation, mirrored_left.rotation @ fit.rotation.T]).mean().as_matrix()
     pair = replace(mirrored_left, rotation=middle @ fit.rotation), replace(own_right, rotation=middle)
@@ -118,7 +104,13 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         },
         "mirror_residual": round(fit.residual, DIGITS),
     }
-    doubts = [] if together else [_apart_warning(*motions, mirrored_left)]
+    doubts = []
+    if not together:
+        angle, shift = _difference(*motions, mirrored_left)
+        doubts.append(
+            f"the medial walls do not face each other in the files' coordinates: {np.linalg.norm(shift):.1f} mm and "
+            f"{angle:.0f}° off: each was posed by its own shape. Are both files in one space?"
+        )
     if _mean_side_ratio(shapes) < MIN_SIDE_RATIO:
         doubts.append("left and right are those of the configuration: the shapes do not show if the files are swapped")
     # volumes of the brain are in RAS+
@@ -129,16 +121,6 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
         together,
         evidence,
         tuple(doubts),
-    )
-
-
-def _apart_warning(to_left: Floats, to_right: Floats, left: Hemisphere) -> str:
-    centre, difference = MIRROR[:3, :3] @ left.shape.centre, to_left - to_right
-    distance = float(np.linalg.norm(difference[:3, :3] @ centre + difference[:3, 3]))
-    angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
-    return (
-        f"the medial walls do not face each other in the files' coordinates: {distance:.1f} mm and {angle:.0f}° off: "
-        "each was posed by its own shape. Are both files in one space?"
     )
 
 
@@ -161,11 +143,8 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
 
 
 def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: str) -> Pose:
-    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+.
-
-    Few random poses are this close to RAS+, so this is evidence if the shape is ambiguous.
-    """
-    fit = register(hemisphere.shape, targets, np.eye(3))
+    """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+."""
+    fit = template.register(hemisphere.shape, targets, np.eye(3))
     fits_ras = fit.residual < MIN_CONFIDENCE * hemisphere.residual and fit.residual <= MAX_RESIDUAL
     if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
         next_best = f"the next best pose has {hemisphere.confidence:.2f} times as much"
@@ -189,13 +168,18 @@ def _motions(left: Hemisphere, right: Hemisphere, fit: RigidFit) -> tuple[Floats
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
+def _difference(to_left: Floats, to_right: Floats, left: Hemisphere) -> tuple[float, Floats]:
+    """Return the angle between two motions, and their shift (3,) in mm at the left hemisphere's centre."""
+    difference = to_right - to_left
+    shift = difference[:3, :3] @ MIRROR[:3, :3] @ left.shape.centre + difference[:3, 3]
+    return angle_deg(to_right[:3, :3].T @ to_left[:3, :3]), shift
+
+
 def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere, declared: bool) -> bool:
-    angle = angle_deg(to_right[:3, :3].T @ to_left[:3, :3])
+    angle, shift_mm = _difference(to_left, to_right, left)
     if declared and angle < DECLARED_TURN_DEG:
         return True
-    centre = MIRROR[:3, :3] @ left.shape.centre
-    difference = to_right - to_left
-    shift = np.abs(difference[:3, :3] @ centre + difference[:3, 3]) / right.shape.size_mm
+    shift = np.abs(shift_mm) / right.shape.size_mm
     return bool(angle < COMMON_DEG and shift[0] < COMMON_DISTANCE and np.hypot(*shift[1:]) < COMMON_OFFSET)
 
 
@@ -222,11 +206,7 @@ def pitch_deg(rotation: Floats) -> float:
 
 
 def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> list[str]:
-    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps".
-
-    If sides and coordinates are correct, the surfaces are in RAS+. If both are wrong, the hemispheres still lie side by
-    side, but their mirror images fit better.
-    """
+    """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps"."""
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
         named = coordinates.upper()
@@ -239,22 +219,17 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
 
 
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
-    """Return the pose of a whole brain's surface in coordinates "ras", "lps" or "auto".
-
-    Named coordinates are kept, with a warning if the shape clearly contradicts them. InputError with "auto" if the
-    shape is ambiguous.
-    """
-    shape = shape_of(mesh, max_depth=MAX_DEPTH)
-    fit, confidence = register_from_all_sides(shape, brains())
+    """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto"; InputError if this is unclear."""
+    shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
+    fit, confidence = template.register_from_all_sides(shape, template.brains())
     brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
-    return _choose_pose(brain, brain.rotation, coordinates, "brain", brains())
+    return _choose_pose(brain, brain.rotation, coordinates, "brain", template.brains())
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
-    """Return the pose of a label volume from the surface of its cerebrum, in the coordinates of the volume.
+    """Return the pose of a label volume from the surface of its cerebrum, in the volume's coordinates.
 
-    The file's pose is kept, with a warning, if the shape is within 60° of it or ambiguous. `has_sides` is whether left
-    and right are labelled.
+    The file's is kept, with a warning, if it is within 60° or unclear. `has_sides` is whether the sides are labelled.
     """
     unchecked = Pose(warnings=("neither labels nor shape determine the pose: it is the file's, unchecked",))
     try:
@@ -267,10 +242,9 @@ def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
 def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_volume: bool = False) -> Pose:
     """Return the pose of a single, clean hemisphere in coordinates "ras", "lps" or "auto".
 
-    With "auto", the axes of the file are kept if its shape fits RAS or LPS within 35°, and the medial wall is then set
-    upright. Otherwise the pose of the shape is taken. `of_volume`: the surface comes from a label volume, and other
-    volumes of the brain are assumed to have the same axes. InputError if the pose is ambiguous or the shape is the
-    other hemisphere's.
+    With "auto", axes of the file that fit RAS or LPS within 35° are kept and the medial wall is set upright, else the
+    pose is that of the shape. `of_volume`: the surface is that of a label volume, whose axes other volumes have, too.
+    InputError if the pose is ambiguous or the shape is the other hemisphere's.
     """
     mirror = MIRROR if side == "left" else np.eye(4)
     hemisphere = hemisphere_by_shape(transformed(mesh, mirror))
@@ -282,7 +256,7 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
             found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
         )
-    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", hemispheres(), of_volume=of_volume)
+    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", template.hemispheres(), of_volume=of_volume)
     if side_ratio < MIN_SIDE_RATIO:
         doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
         pose = replace(pose, warnings=(doubt, *pose.warnings))

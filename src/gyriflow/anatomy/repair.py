@@ -1,7 +1,4 @@
-"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them through voxels.
-
-Every repair is counted.
-"""
+"""Repair surfaces: clean them, remove stalks, remesh, restore the volume, or rebuild them; every repair is counted."""
 
 import logging
 from collections.abc import Mapping
@@ -14,36 +11,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ..errors import MeshError
+from ..geometry import remeshing, triangles
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on, surface_mask
-from ..geometry.remeshing import (
-    REMESHING_ROUNDS,
-    SHARP_DEG,
-    from_meshlab,
-    in_meshlab,
-    pymeshlab,
-    remesh,
-    self_intersecting_faces,
-    untangle,
-)
-from ..geometry.triangles import (
-    Ints,
-    TriangleMesh,
-    area,
-    corners,
-    edges,
-    euler_number,
-    face_components,
-    is_closed,
-    mean_length,
-    merged,
-    signed_volume,
-    smallest_patch,
-    split_sheets,
-    submesh,
-    vertex_areas,
-    vertex_normals,
-)
+from ..geometry.triangles import Ints, TriangleMesh
 from ..settings.terms import MAX_HOLE_MM
 from ..units import ML_PER_MM3
 from .extraction import COMPARABLE as COMPARABLE_PARTS
@@ -85,10 +56,7 @@ INSIDE_LEVEL = 0.8
 
 @dataclass(frozen=True, eq=False)
 class RepairedSurface:
-    """A surface after repairs, with a report in plain values for JSON and warnings.
-
-    `is_cap` is the (m,) mask of the faces that close medial walls, empty if the surface was made of labels.
-    """
+    """A surface after repairs, a plain report, warnings, and the (m,) mask of medial caps, empty for labels."""
 
     mesh: TriangleMesh
     report: dict[str, Any]
@@ -101,12 +69,11 @@ def sound_pieces(
 ) -> RepairedSurface:
     """Clean a surface of one or two pieces (only the largest with `single`) and remove parts on stalks.
 
-    With `caps_walls`, one hole of each hemisphere may be larger, and is capped. Whether it faces the other hemisphere
-    can be checked only after posing.
+    With `caps_walls`, one larger hole of each hemisphere is capped; after posing it must face the other one.
     """
-    lengths = np.linalg.norm(np.diff(mesh.vertices[edges(mesh)[0]], axis=1), axis=2)
+    lengths = np.linalg.norm(np.diff(mesh.vertices[triangles.edges(mesh)[0]], axis=1), axis=2)
     mesh, repairs, is_cap = clean(mesh, max_hole_mm, single=single, caps_walls=caps_walls)
-    warnings, dropped, remaining = [], repairs["area_dropped_mm2"], area(mesh)
+    warnings, dropped, remaining = [], repairs["area_dropped_mm2"], triangles.area(mesh)
     if lengths.max() > max(SPIKE_MM, SPIKE_FACTOR * np.median(lengths)):
         warnings.append(f"an edge is {lengths.max():.0f} mm long: is a vertex far off the surface?")
     if dropped > REPORTED_LOSS * remaining:
@@ -122,7 +89,7 @@ def sound_pieces(
     whole = mesh
     mesh, stalks = surface_without_stalks(mesh)
     if stalks:
-        is_cap = is_cap[nearest_on(corners(mesh).mean(axis=1), whole)[1]]
+        is_cap = is_cap[nearest_on(triangles.corners(mesh).mean(axis=1), whole)[1]]
     warnings += [
         f"a part of {stalk['volume_mm3']:.0f} mm³ on a stalk of {stalk['stalk_mm2']:.0f} mm² was cut off"
         for stalk in stalks
@@ -133,8 +100,7 @@ def sound_pieces(
 def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
     """Smooth and remesh a surface so that each piece is a sphere without self-intersections.
 
-    If the triangles cannot be repaired, the surface is rebuilt through voxels of half an edge length; the report of
-    `rebuild` is in "remade". MeshError if self-intersections remain.
+    Else it is rebuilt through voxels ("remade" in the report). MeshError if self-intersections remain.
     """
     smooth, cutting = make_even(mesh, edge_length_mm)
     report: dict[str, Any] = {"self_intersections": cutting}
@@ -148,17 +114,17 @@ def make_sound(mesh: TriangleMesh, edge_length_mm: float) -> RepairedSurface:
 
 def make_pieces_sound(clean: RepairedSurface, edge_length_mm: float) -> RepairedSurface:
     """Make each piece of a clean surface sound by itself, since hemispheres may share their medial wall."""
-    component, report = face_components(clean.mesh), dict[str, Any]()
+    component, report = triangles.face_components(clean.mesh), dict[str, Any]()
     parts, caps = list[RepairedSurface](), list[Mask]()
     for number, piece in enumerate(pieces(clean.mesh)):
         even = make_sound(piece, edge_length_mm)
         report |= {f"{key}_{number + 1}" if number else key: value for key, value in even.report.items()}
-        is_cap = clean.is_cap[component == number][nearest_on(corners(even.mesh).mean(axis=1), piece)[1]]
+        is_cap = clean.is_cap[component == number][nearest_on(triangles.corners(even.mesh).mean(axis=1), piece)[1]]
         # the pial surface around a cap is in one piece
-        is_cap[~is_cap] = face_components(submesh(even.mesh, ~is_cap)[0]) > 0
+        is_cap[~is_cap] = triangles.face_components(triangles.submesh(even.mesh, ~is_cap)[0]) > 0
         parts, caps = [*parts, even], [*caps, is_cap]
     warnings = [warning for part in parts for warning in part.warnings]
-    return RepairedSurface(merged(*(part.mesh for part in parts)), report, warnings, np.concatenate(caps))
+    return RepairedSurface(triangles.merged(*(part.mesh for part in parts)), report, warnings, np.concatenate(caps))
 
 
 def require_sound(mesh: TriangleMesh) -> None:
@@ -170,10 +136,10 @@ def require_sound(mesh: TriangleMesh) -> None:
 
 def faults(mesh: TriangleMesh) -> str:
     """Return the faults of a surface that should be closed spheres without self-intersections; empty if none."""
-    euler = [euler_number(piece) for piece in pieces(mesh)]
-    crossing = int(self_intersecting_faces(mesh).sum())
+    euler = [triangles.euler_number(piece) for piece in pieces(mesh)]
+    crossing = int(remeshing.self_intersecting_faces(mesh).sum())
     problems = [
-        "edges without two faces" if not is_closed(mesh) else "",
+        "edges without two faces" if not triangles.is_closed(mesh) else "",
         f"Euler numbers {euler}" if any(number != 2 for number in euler) else "",
         f"{crossing} self-intersecting faces" if crossing else "",
     ]
@@ -181,24 +147,23 @@ def faults(mesh: TriangleMesh) -> str:
 
 
 def make_even(mesh: TriangleMesh, edge_length_mm: float) -> tuple[TriangleMesh, int]:
-    """Smooth, remesh and untangle a surface; return it and the number of self-intersecting faces before untangling.
+    """Smooth (Taubin 1995, λ = 0.5, μ = −0.53), remesh and untangle a surface; also count crossing faces before.
 
-    Taubin smoothing keeps the volume (Taubin 1995, λ = 0.5, μ = −0.53). Walls of a narrow slit that keep crossing are
-    not smoothed.
+    Walls of a narrow slit that keep crossing are not smoothed.
     """
-    document = in_meshlab(mesh)
+    document = remeshing.in_meshlab(mesh)
     document.apply_coord_taubin_smoothing(stepsmoothnum=SMOOTHING_ITERATIONS)
-    smooth = from_meshlab(document)
-    even, crossing, remaining = untangle(remesh(smooth, edge_length_mm))
+    smooth = remeshing.from_meshlab(document)
+    even, crossing, remaining = remeshing.untangle(remeshing.remesh(smooth, edge_length_mm))
     if remaining:
-        even, _, _ = untangle(remesh(_without_crossings(mesh, smooth), edge_length_mm))
+        even, _, _ = remeshing.untangle(remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm))
     return even, crossing
 
 
 def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
     """Reset self-intersecting faces of a smoothed surface, and some rings around them, to their original places."""
     for _ in range(N_RESETS):
-        reset = self_intersecting_faces(smooth)
+        reset = remeshing.self_intersecting_faces(smooth)
         if not reset.any():
             break
         for _ in range(N_RESET_RINGS):
@@ -215,22 +180,21 @@ def clean(
     """Return the surface as closed, outward, manifold pieces of similar size, counts of repairs, and the mask of caps.
 
     Equal vertices are merged, degenerate and duplicate faces removed, edges of more than two faces split, holes up to
-    `max_hole_mm` across closed, faces oriented outward, small pieces and pieces inside others dropped, with `single`
-    all but the largest; with `caps_walls`, larger holes are capped as in `sound_pieces`. MeshError for other larger
-    holes and for surfaces that stay open.
+    `max_hole_mm` closed, faces turned outward, and small or inner pieces dropped; `single` and `caps_walls` as in
+    `sound_pieces`. MeshError for other holes and surfaces that stay open.
     """
     # before vertices are merged, which may join pieces; without shared vertices, each face is a piece
     mesh, turned = _turn_outward(mesh, 2)
     mesh, doubles = _drop_doubles(mesh)
     # after merging, since faces that meet in copies of a vertex would count
-    crossing = int(self_intersecting_faces(mesh).sum())
+    crossing = int(remeshing.self_intersecting_faces(mesh).sum())
     mesh, opened = _make_manifold(mesh)
     mesh, dropped = _main_pieces(mesh, single)
     # a brain in one piece has no medial walls that could be open
     mesh, holes, is_cap = _fill_holes(mesh, max_hole_mm, caps_walls and (single or dropped["pieces"] > 1))
     mesh, turned_later = _turn_outward(mesh, dropped["pieces"])
-    if not is_closed(mesh):
-        found = f"{int((edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair"
+    if not triangles.is_closed(mesh):
+        found = f"{int((triangles.edges(mesh)[1] != 2).sum())} edges without exactly two faces after repair"
         raise MeshError("the surface cannot be closed", found=found, expected="a closed surface")
     counts = {"faces_that_cut_others": crossing, "pieces_turned_outward": turned + turned_later}
     return mesh, doubles | opened | dropped | holes | counts, is_cap
@@ -238,15 +202,17 @@ def clean(
 
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     """Return the connected pieces of a surface, the largest area first."""
-    component = face_components(mesh)
-    return [submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
+    component = triangles.face_components(mesh)
+    return [triangles.submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
 
 
 def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
     """Turn the `count` largest pieces outward if they are closed; return the surface and how many were turned."""
-    component = face_components(mesh)
-    parts = [submesh(mesh, component == number)[0] for number in range(min(component.max() + 1, count))]
-    inward = [number for number, part in enumerate(parts) if is_closed(part) and signed_volume(part) < 0]
+    component = triangles.face_components(mesh)
+    parts = [triangles.submesh(mesh, component == number)[0] for number in range(min(component.max() + 1, count))]
+    inward = [
+        number for number, part in enumerate(parts) if triangles.is_closed(part) and triangles.signed_volume(part) < 0
+    ]
     is_inward = np.isin(component, inward)[:, None]
     return TriangleMesh(mesh.vertices, np.where(is_inward, mesh.faces[:, ::-1], mesh.faces)), len(inward)
 
@@ -260,7 +226,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     lowest_first = (np.argmin(faces, axis=1)[:, None] + [0, 1, 2]) % 3
     _, first = np.unique(np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True)
     distinct = TriangleMesh(vertices, faces[np.sort(first)])
-    result, used_vertices = submesh(distinct, ~_duplicate_opposites(distinct))
+    result, used_vertices = triangles.submesh(distinct, ~_duplicate_opposites(distinct))
     return result, {
         "degenerate_faces_removed": int(flat.sum()),
         "double_faces_removed": len(faces) - len(result.faces),
@@ -271,8 +237,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
     """Return the (m,) mask of faces that repeat an earlier one in the opposite orientation, except shared walls.
 
-    A wall that two closed pieces share has both orientations, and each of its edges has as many faces in one direction
-    as in the other.
+    Each edge of a wall that two closed pieces share has as many faces in one direction as in the other.
     """
     _, first, face, count = np.unique(
         np.sort(mesh.faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
@@ -286,7 +251,7 @@ def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
         direction = np.bincount(edge, np.where(start < end, 1.0, -1.0).ravel())
         single = np.bincount(edge, np.repeat(~is_double, 3))
         edge = edge.reshape(-1, 3)[is_double]
-        region = face_components(submesh(mesh, is_double)[0])
+        region = triangles.face_components(triangles.submesh(mesh, is_double)[0])
         # a surface whose faces are all double has no single ones around
         is_wall = np.bincount(region, (single[edge] > 0).any(axis=1)) > 0
         is_wall &= np.bincount(region, (direction[edge] != 0).any(axis=1)) == 0
@@ -296,12 +261,12 @@ def _duplicate_opposites(mesh: TriangleMesh) -> Mask:
 
 
 def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
-    non_manifold = int((edges(mesh)[1] > 2).sum())
-    split = split_sheets(mesh)
-    if (edges(split)[1] > 2).any():
-        document = in_meshlab(split)
+    non_manifold = int((triangles.edges(mesh)[1] > 2).sum())
+    split = triangles.split_sheets(mesh)
+    if (triangles.edges(split)[1] > 2).any():
+        document = remeshing.in_meshlab(split)
         document.meshing_repair_non_manifold_edges(method="Remove Faces")
-        split = split_sheets(from_meshlab(document))
+        split = triangles.split_sheets(remeshing.from_meshlab(document))
     faces, _ = igl.bfs_orient(split.faces)
     turned = int((faces != split.faces).any(axis=1).sum())
     return TriangleMesh(split.vertices, faces), {
@@ -313,14 +278,17 @@ def _make_manifold(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
 
 def _main_pieces(mesh: TriangleMesh, single: bool) -> tuple[TriangleMesh, dict[str, Any]]:
     parts = pieces(mesh)
-    areas = [area(piece) for piece in parts]
+    areas = [triangles.area(piece) for piece in parts]
     main = [parts[0]]
     for piece, size in zip(parts[1:], areas[1:], strict=True):
         inside = np.median(np.abs(igl.fast_winding_number(parts[0].vertices, parts[0].faces, piece.vertices))) > 0.5
         if size >= COMPARABLE * areas[0] and not (inside or single):
             main.append(piece)
-    dropped = {"pieces_dropped": len(parts) - len(main), "area_dropped_mm2": sum(areas) - sum(map(area, main))}
-    return merged(*main), {"pieces": len(main)} | dropped
+    dropped = {
+        "pieces_dropped": len(parts) - len(main),
+        "area_dropped_mm2": sum(areas) - sum(map(triangles.area, main)),
+    }
+    return triangles.merged(*main), {"pieces": len(main)} | dropped
 
 
 def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tuple[TriangleMesh, dict[str, Any], Mask]:
@@ -329,7 +297,7 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
     )
     sizes, loops = [size for size, _ in by_size], [np.asarray(loop) for _, loop in by_size]
     small = sum(size <= max_hole_mm for size in sizes)
-    wide, component = sizes[small:], face_components(mesh)
+    wide, component = sizes[small:], triangles.face_components(mesh)
     pieces_with_wide = {int(component[(mesh.faces == loop[0]).any(axis=1)][0]) for loop in loops[small:]}
     if wide and not (caps_walls and len(pieces_with_wide) == len(wide)):
         can_cover = "or raise surface.max_hole_mm if the opening may be covered."
@@ -356,14 +324,18 @@ def _fill_holes(mesh: TriangleMesh, max_hole_mm: float, caps_walls: bool) -> tup
 def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mask]:
     """Close loops by patches of the smallest area, and remesh these; return the surface and the mask of the caps."""
     rims = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
-    patches = [smallest_patch(mesh, loop) for loop in loops]
-    document = in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))
+    patches = [triangles.smallest_patch(mesh, loop) for loop in loops]
+    document = remeshing.in_meshlab(TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *patches])))
     document.compute_selection_by_condition_per_face(condselect=f"fi >= {len(mesh.faces)}")
-    length = pymeshlab.PureValue(mean_length(mesh.vertices, rims))
+    length = remeshing.pymeshlab.PureValue(triangles.mean_length(mesh.vertices, rims))
     document.meshing_isotropic_explicit_remeshing(
-        iterations=REMESHING_ROUNDS, targetlen=length, featuredeg=SHARP_DEG, checksurfdist=False, selectedonly=True
+        iterations=remeshing.REMESHING_ROUNDS,
+        targetlen=length,
+        featuredeg=remeshing.SHARP_DEG,
+        checksurfdist=False,
+        selectedonly=True,
     )
-    return from_meshlab(document), np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
+    return remeshing.from_meshlab(document), np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
 
 
 def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[str, Any]]]:
@@ -377,9 +349,9 @@ def surface_without_stalks(mesh: TriangleMesh) -> tuple[TriangleMesh, list[dict[
         return mesh, []
     # a face belongs to the same side of a cut as the nearest voxel inside
     nearest = ndimage.distance_transform_edt(labels == 0, return_distances=False, return_indices=True)
-    voxel = np.rint(voxel_index(corners(mesh).mean(axis=1), affine)).astype(int)
+    voxel = np.rint(voxel_index(triangles.corners(mesh).mean(axis=1), affine)).astype(int)
     is_kept = remaining[tuple(nearest[(slice(None), *voxel)])]
-    cut_open, _ = submesh(mesh, is_kept)
+    cut_open, _ = triangles.submesh(mesh, is_kept)
     return clean(cut_open, MAX_CUT_MM)[0], report
 
 
@@ -406,7 +378,7 @@ def surface_of_mask(
     smooth = without_terraces(even.mesh, grid, sample(before, grid, even.mesh.vertices) > INSIDE_LEVEL)
     added = int((simple > LEVEL).sum()) - int((field > LEVEL).sum())
     repaired_mm3 = volume_mm3 + added * float(abs(np.linalg.det(affine[:3, :3])))
-    mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, area(rough))
+    mesh, smoothing = with_volume(smooth, repaired_mm3 - taken_mm3, triangles.area(rough))
     moved = np.linalg.norm(smooth.vertices - even.mesh.vertices, axis=1)
     smoothing |= {"terraces_moved_mm": float(moved.mean()), "terraces_moved_most_mm": float(moved.max())}
     warnings = [*even.warnings, *filled_warning(topology, affine)]
@@ -426,18 +398,17 @@ def filled_warning(topology: Mapping[str, Any], affine: Floats) -> list[str]:
 def with_volume(mesh: TriangleMesh, volume_mm3: float, area_mm2: float) -> tuple[TriangleMesh, dict[str, Any]]:
     """Move a closed surface along its normals until it encloses a volume; return it and a report in plain values.
 
-    Smoothing and remeshing move a convex surface inward by some hundredths of a mm, which ΔV/A restores. Walls that
-    would cross each other are not moved, nor is the whole surface if more than 5 % of the volume is missing or if it
-    would still cross itself. `area_mm2` is the area of the mask's isosurface before smoothing and remeshing.
+    Walls that would cross are not moved, nor is a surface that lacks more than 5 % or still would cross itself.
+    `area_mm2` is the area before smoothing and remeshing.
     """
-    before = signed_volume(mesh) / volume_mm3 - 1.0
+    before = triangles.signed_volume(mesh) / volume_mm3 - 1.0
     moved = _move_along_normals(mesh, volume_mm3) if abs(before) <= MAX_RESTORED else mesh
-    change = signed_volume(moved) / volume_mm3 - 1.0
+    change = triangles.signed_volume(moved) / volume_mm3 - 1.0
     report = {
         "volume_expected_mL": volume_mm3 * ML_PER_MM3,
         "volume_change": change,
         "volume_change_before_correction": before,
-        "area_change": area(moved) / area_mm2 - 1.0,
+        "area_change": triangles.area(moved) / area_mm2 - 1.0,
     }
     log.info("volume changed by %.2f %%, area by %.2f %% through smoothing", 100 * change, 100 * report["area_change"])
     return moved, report
@@ -448,10 +419,10 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
     for _ in range(N_RESETS + 1):
         moved = mesh
         for _ in range(ROUNDS):
-            share = float(vertex_areas(moved)[free].sum())
-            offset = (volume_mm3 - signed_volume(moved)) / share * free
-            moved = TriangleMesh(moved.vertices + offset[:, None] * vertex_normals(moved), moved.faces)
-        if not (crossing := self_intersecting_faces(moved)).any():
+            share = float(triangles.vertex_areas(moved)[free].sum())
+            offset = (volume_mm3 - triangles.signed_volume(moved)) / share * free
+            moved = TriangleMesh(moved.vertices + offset[:, None] * triangles.vertex_normals(moved), moved.faces)
+        if not (crossing := remeshing.self_intersecting_faces(moved)).any():
             return moved
         near = np.isin(mesh.faces, mesh.faces[crossing]).any(axis=1)
         free[mesh.faces[near]] = False
@@ -461,11 +432,7 @@ def _move_along_normals(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
 
 
 def rebuild(mesh: TriangleMesh, voxel_mm: float) -> tuple[TriangleMesh, dict[str, Any]]:
-    """Rebuild a surface through voxels, without handles or self-intersections; return it and a report.
-
-    The winding number separates inside from outside even where the surface crosses itself. Details below the voxel size
-    are lost.
-    """
+    """Rebuild a surface through voxels by winding numbers, free of handles and crossings; return it and a report."""
     ends = np.array([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)])
     labels, affine = surface_mask(mesh, voxel_mm, ends + voxel_mm * np.array([[-MARGIN_VOXELS], [MARGIN_VOXELS]]))
     inside = labels > 0

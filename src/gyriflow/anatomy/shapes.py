@@ -24,8 +24,7 @@ def shape_surface(
 ) -> TriangleMesh:
     """Return an ellipsoid as a closed, outward surface of even triangles, with smooth bumps along the normal.
 
-    The bumps, from which folding starts, have the root mean square height `noise_mm`; their pattern depends on `seed`,
-    not on the edge length. InputError if the edges are longer than half the smallest radius of curvature.
+    They have the root mean square height `noise_mm` and a pattern of the `seed`. InputError if the edges are too long.
     """
     size = np.array(semi_axes_mm, dtype=float)
     longest = 0.5 * size.min() ** 2 / size.max()

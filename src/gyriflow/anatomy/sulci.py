@@ -1,7 +1,6 @@
 """Open fused sulci where fronts from the white matter of two banks meet within the cortex.
 
-The cortex of two fused banks is one thick sheet, and the sulcus is its middle (Han et al. 2004, doi
-10.1016/j.neuroimage.2004.06.043). There the nearest point of white matter changes from one bank to the other.
+There the nearest white matter changes from one bank to the other (Han et al. 2004, 10.1016/j.neuroimage.2004.06.043).
 """
 
 import heapq
@@ -20,13 +19,11 @@ from .fissure import sample
 
 # voxels are refined to at most this size before a slit is cut; voxels of about 0.5 mm are kept
 MAX_VOXEL_MM = 0.55
-# the nearest points of white matter on both sides of a sulcus are at least this many cortical thicknesses apart;
-# under a bend or a thick crest they are closer
+# white matter of two banks is at least this many cortical thicknesses apart, closer under a bend or a thick crest
 MIN_BANK_DISTANCE = 1.4
 # the cortex of a bank has at least this share of its usual thickness
 MIN_BANK = 0.75
-# smaller sheets are roughness of the labels; sheets less deep than this (in cortical thicknesses) are the rounded
-# bottom of an open sulcus
+# smaller sheets are roughness of the labels; less deep ones (in thicknesses) the rounded bottom of an open sulcus
 MIN_SHEET_MM2 = 8.0
 MIN_SHEET_DEPTH = 1.5
 # margin around a brain
@@ -46,12 +43,10 @@ def open_fused_sulci(
 ) -> tuple[NDArray[np.float32], Floats, dict[str, Any]]:
     """Open the fused sulci of a cerebrum's smoothed mask by slits; return the field, its affine, and a report.
 
-    The (i, j, k) `field` is cropped to the brain and refined to voxels of at most 0.55 mm. Its voxels are those of the
-    mask `core`, the tissue inside the cortex, or an integer fraction of these. Slits grow inward from outside over
-    simple points, so they add neither handles nor cavities, and end where both banks have the same white matter. Slits
-    between the hemispheres, whose sides are the signs of `side_mm` in the voxels of `core`, are not sulci. The field
-    is returned unchanged if no sulcus is fused, or if much cortex is far from all white matter. In the latter case the
-    report has the reason as "stays_fused".
+    The (i, j, k) `field` is refined to voxels of at most 0.55 mm; they are those of `core`, the tissue inside the
+    cortex, or an integer fraction. Slits grow inward over simple points, so they add no handles, and end where both
+    banks have the same white matter; between hemispheres (signs of `side_mm`) there are none. The field is unchanged if
+    no sulcus is fused, or if much cortex is far from white matter: "stays_fused" in the report.
     """
     factor = int(np.ceil(np.linalg.norm(affine[:3, :3], axis=0).max() / MAX_VOXEL_MM))
     every = field.shape[0] // core.shape[0]
@@ -103,10 +98,7 @@ def _around_brain(field: NDArray[np.float32], every: int) -> tuple[tuple[slice, 
 def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
     """Return the median depth in mm of the cortex at the surface around (n, 3) points, at most that of the brain.
 
-    Above many fused sulci the surface is further from white matter than the cortex is thick.
-
-    `depth` (m,) is that at the (m, 3) points of the surface; no coordinate is negative. The median is taken within
-    `NEARBY_MM` of places `PLACES_MM` apart, and is that of the nearest place.
+    `depth` (m,) is at the (m, 3) surface points; medians are within `NEARBY_MM` of places `PLACES_MM` apart.
     """
     every = max(1, len(surface) // N_DEPTHS)
     tree, depth = cKDTree(surface[::every]), depth[::every]
@@ -118,10 +110,7 @@ def _usual_thickness(points: Floats, surface: Floats, depth: Floats) -> Floats:
 
 
 def _deep_sheets(sheet: Mask, at_surface: Mask, size_mm: Floats, is_deep: Mask) -> tuple[Mask, int]:
-    """Return the large parts of a mask that reach from the surface to deep places, and their number.
-
-    `is_deep` (n,) is whether a voxel of the mask is deep, `at_surface` the mask of voxels at the surface.
-    """
+    """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,) holds, and their number."""
     number, count = ndimage.label(sheet, OUTSIDE)
     part, parts = number[sheet], np.arange(count + 1)
     large = np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3) >= MIN_SHEET_MM2
@@ -142,8 +131,7 @@ def _mark_sheet(
 ) -> None:
     """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
 
-    Different banks are further apart than `min_mm` (i, j, k). It is set in the voxels that the plane half-way between
-    the banks passes, which are connected through faces.
+    These are further apart than `min_mm`; voxels that the plane half-way between them passes are set.
     """
     step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))

@@ -1,7 +1,4 @@
-"""Register surfaces to an upright template: the rotation to RAS+ and its confidence.
-
-The template is the shipped atlas at three weeks, `atlases/spina-bifida/right.week*.surf.gii`.
-"""
+"""Register surfaces to the shipped atlas at three weeks: the rotation to RAS+ and its confidence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,15 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from ..geometry.alignment import (
-    CUBE_ROTATIONS,
-    MIRROR,
-    Planes,
-    RigidFit,
-    fits_from_all_sides,
-    follow_planes,
-    residual_ratio,
-)
+from ..geometry import alignment
+from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, Planes, RigidFit
 from ..geometry.triangles import Floats, TriangleMesh, corners, face_areas, face_normals, merged, transformed, unit
 from ..io.surfaces import read_surface
 from ..shipped import SHIPPED
@@ -46,8 +36,7 @@ BEND_DEG = 1.0
 class PointCloud:
     """Points on a closed surface, independent of its position and size.
 
-    (n, 3) `points` are relative to the `centre` of volume (3,) in mm and divided by the size, the cube root of the
-    volume; `normals` are their outward unit normals.
+    (n, 3) `points` are relative to the `centre` of volume (3,) in mm, over the size, the cube root of the volume.
     """
 
     points: Floats
@@ -71,11 +60,7 @@ class PointCloud:
 
 
 def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
-    """Sample points of a closed, outward surface at random, in proportion to area.
-
-    Points deeper than `max_depth` sizes below the convex hull are left out: in whole brains the depth of the fissure,
-    which may be open or fused.
-    """
+    """Sample a closed, outward surface by area, but for points deeper than `max_depth` sizes below its hull."""
     triangles, areas = corners(mesh), face_areas(mesh)
     volumes = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0
     centre = 0.75 * volumes @ triangles.mean(axis=1) / volumes.sum()
@@ -120,11 +105,10 @@ def register(
 def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) -> tuple[RigidFit, float]:
     """Return the best fit of a shape to one of several targets from 24 starts, and its confidence.
 
-    The confidence is the residual of the best pose more than 40° away over that of the best fit. Near 1, as for a body
-    of revolution, the shape does not determine the pose.
+    This is the residual of the best pose more than 40° away over that of the best: near 1 the pose is unclear.
     """
     middle = targets[len(targets) // 2]
-    fits = fits_from_all_sides(
+    fits = alignment.fits_from_all_sides(
         CUBE_ROTATIONS,
         lambda start: _descend(shape, middle, start, None, COARSE, 12, 8),
         lambda fit: register(shape, targets, fit.rotation, fit.shift),
@@ -132,7 +116,7 @@ def register_from_all_sides(shape: PointCloud, targets: Sequence[PointCloud]) ->
         DISTINCT_DEG,
     )
     best = min(fits, key=lambda fit: fit.residual)
-    confidence = residual_ratio(fits, best, DISTINCT_DEG)
+    confidence = alignment.residual_ratio(fits, best, DISTINCT_DEG)
     fine = [_descend(shape, target, best.rotation, best.shift, FINE, 30, 1) for target in targets]
     return min(fine, key=lambda fit: fit.residual), confidence
 
@@ -142,8 +126,7 @@ def _descend(
 ) -> RigidFit:
     """Return the fit after `rounds` of iterative closest points, with every `every`-th point.
 
-    Steps follow the symmetric point-to-plane distance, Rusinkiewicz 2019 (doi 10.1145/3306346.3323037), with
-    Geman-McClure weights.
+    Symmetric point-to-plane steps (Rusinkiewicz 2019, doi 10.1145/3306346.3323037), Geman-McClure weights.
     """
     points, normals = shape.points[::every], shape.normals[::every]
 
@@ -159,7 +142,9 @@ def _descend(
     def is_converged(_: Floats, turn: Floats, move: Floats) -> bool:
         return bool(np.hypot(np.linalg.norm(turn - np.eye(3)), np.linalg.norm(move)) < 1e-3)
 
-    rotation, shift = follow_planes(rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged)
+    rotation, shift = alignment.follow_planes(
+        rotation, np.zeros(3) if shift is None else shift, planes, rounds, is_converged
+    )
     forward, _ = target.tree.query(target.features(points @ rotation.T + shift, normals @ rotation.T))
     target_points, facing = target.points[::every], target.normals[::every]
     backward, _ = shape.tree.query(shape.features((target_points - shift) @ rotation, facing @ rotation))
@@ -168,10 +153,7 @@ def _descend(
 
 
 def medial_wall(shape: PointCloud, normal: Floats) -> tuple[Floats, float]:
-    """Fit the plane normal·p = offset to a hemisphere's medial wall, given its approximate unit normal.
-
-    The normal (3,) is outward; the offset is in sizes of the hemisphere.
-    """
+    """Fit normal·p = offset (in sizes) to a hemisphere's medial wall, given its approximate outward normal (3,)."""
     facing = shape.normals @ normal > WALL_COSINE
     points, normals = shape.points[facing], shape.normals[facing]
     heights = points @ normal

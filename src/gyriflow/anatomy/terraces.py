@@ -29,11 +29,9 @@ MIN_COSINE, MIN_SHAPE_RATIO = 0.5, 0.75
 def without_terraces(mesh: TriangleMesh, voxels: Floats, fixed: NDArray[np.bool_] | bool = False) -> TriangleMesh:
     """Remove the terraces of a smoothed mask's surface; `voxels` is the mask's (4, 4) affine to mm.
 
-    Among all surfaces that leave each voxel's centre on its side of the surface, the one with the least roughness
-    ∫ |Δ²x|² dA is approximated by the alternating direction method of multipliers (Boyd et al. 2011, doi
-    10.1561/2200000016); each round is an implicit step (1 + t² Δ⁴) x = z. A final step of inverse diffusion restores
-    the height of folds that this and the Gaussian removed. Vertices that are `fixed` (n,) do not move, nor do vertices
-    of faces that would cross others or degenerate.
+    Among surfaces that leave each voxel's centre on its side, the least rough, ∫ |Δ²x|² dA, is approximated by ADMM
+    (Boyd et al. 2011, doi 10.1561/2200000016) with steps (1 + t² Δ⁴) x = z. Inverse diffusion restores the height of
+    folds. Vertices that are `fixed` (n,), or of faces that would cross others or degenerate, do not move.
     """
     size = float(np.cbrt(abs(np.linalg.det(voxels[:3, :3]))))
     mass, stiffness = vertex_areas(mesh), stiffness_matrix(mesh.vertices, mesh.faces)

@@ -23,8 +23,7 @@ from .repair import make_sound, sound_pieces, surface_of_mask
 
 log = logging.getLogger(__name__)
 
-# a vertex has cortex under it if a voxel of cortex is closer than this, and lies on the labels' own surface if a voxel
-# outside is closer than that
+# a vertex has cortex under it if a voxel of it is closer than this, and lies at the labels if one outside is
 NEAR_VOXELS = 1.0
 MAX_OUTSIDE_VOXELS = 1.5
 # an opened fissure is this close to its plane
@@ -48,10 +47,9 @@ OUTSIDE_MM, MAX_OUTSIDE_SHARE = 0.5, 0.01
 
 @dataclass(frozen=True, eq=False)
 class Thickness:
-    """Cortical thickness on a surface.
+    """Cortical thickness on a surface; the report has means and shares, in plain values for JSON.
 
-    `is_measured` (n,) is the mask of vertices where it was measured; the others have the value of the nearest measured
-    vertex in `values_mm` (n,). The report has means and shares, in plain values for JSON.
+    Vertices that are not `is_measured` (n,) have the value of the nearest measured one in `values_mm` (n,).
     """
 
     values_mm: Floats
@@ -69,14 +67,10 @@ def cortical_thickness(
 ) -> Thickness:
     """Return the cortical thickness at the vertices of a pial surface; InputError if it has no cortex under it.
 
-    The inner border is the surface of the cerebrum without its cortex, which lies between voxels as the pial surface
-    does. The thickness at a vertex is that of `layer_thickness`. It is not measured where the surface has no cortex
-    under it (corpus callosum, brainstem), nor where a hidden fissure or fused sulci were opened; with `fissure_x_mm`,
-    it is measured in sulci.
-
-    `pial` is in mm in the coordinates to which the (4, 4) affine leads from the (i, j, k) masks of the cerebrum and of
-    its cortex; it was made with the same smoothing. The report has the "area_ratio", too: the pial area over that of a
-    complete surface around the cortex's volume, (1 + mean curvature × thickness) × volume / thickness.
+    It is the `layer_thickness` to the surface of the cerebrum without its cortex. It is not measured without cortex
+    below, nor where a hidden fissure or fused sulci were opened (in sulci it is with `fissure_x_mm`). The (4, 4) affine
+    leads from the (i, j, k) masks to the coordinates of `pial` in mm. The report's "area_ratio" is the pial area over
+    that of a complete surface around the cortex, (1 + mean curvature × thickness) × volume / thickness.
     """
     inner = border(cerebrum & ~cortex, affine)
     values = layer_thickness(pial, inner)
@@ -109,10 +103,7 @@ def cortical_thickness(
 
 
 def border(mask: Mask, affine: Floats) -> TriangleMesh:
-    """Return the surface in mm around the main parts of an (i, j, k) mask, with the volume of their voxels.
-
-    It is the isosurface of the smoothed mask, moved along its normals: smoothing moves a convex surface inward.
-    """
+    """Return the surface in mm around the main parts of an (i, j, k) mask, moved to enclose their volume."""
     field = smooth_mask(mask)
     kept, _, _ = main_parts(field > LEVEL)
     field = np.where(kept, np.maximum(field, LEVEL + 1e-3), np.minimum(field, LEVEL - 1e-3))
@@ -122,10 +113,7 @@ def border(mask: Mask, affine: Floats) -> TriangleMesh:
 
 
 def voxels_through_cortex(cerebrum: Mask, inner: TriangleMesh, affine: Floats) -> float:
-    """Return the median thickness of the cortex over the longest edge of a voxel.
-
-    The cortex lies between the border of the (i, j, k) mask of the cerebrum and its inner border.
-    """
+    """Return the median cortical thickness, from mask to `inner` surface, over a voxel's longest edge."""
     outer = border(cerebrum, affine)
     points = outer.vertices[:: max(1, len(outer.vertices) // N_SAMPLES)]
     inward, _, nearest = nearest_on(points, inner)
@@ -150,10 +138,9 @@ def thickness_from_labels(
     pose: Pose,
     fissure_x_mm: float | None = None,
 ) -> Thickness:
-    """Return the cortical thickness at the vertices of the pial surface that `from_labels` made of the same labels.
+    """Return the cortical thickness on the whole `surface` that `from_labels` made of the same labels.
 
-    `surface` is the whole one, posed by `pose` with its fissure at `fissure_x_mm`; the scheme has to separate cortex
-    from the tissue inside.
+    `pose` and `fissure_x_mm` are the surface's; the scheme has to separate cortex from the tissue inside.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     cortex = np.isin(cerebrum.tissue, scheme.cortex)
@@ -188,11 +175,10 @@ def summary(values: Floats, is_measured: Mask, areas: Floats) -> dict[str, Any]:
 def thickness_from_white(
     surface: TriangleMesh, pose: Pose, fissure_x_mm: float, whites: Mapping[str, TriangleMesh]
 ) -> Thickness:
-    """Return the cortical thickness on a pial surface from its distance to the white surface, as `cortical_thickness`.
+    """Return the cortical thickness on a pial surface from its distance to the white surface.
 
-    `surface` is the whole pial surface with its `pose` and fissure. `whites` are the white surfaces by side ("left" and
-    "right", or "whole"), in the coordinates of the pial surface's files. InputError if one is in the other hemisphere
-    or crosses the pial surface.
+    `surface` is the whole one with its `pose` and fissure; `whites` are by side, or "whole", in its files' coordinates.
+    InputError if one is in the other hemisphere or crosses the pial surface.
     """
     posed = posed_whites(pose, whites)
     for side, white in posed.items():
@@ -243,8 +229,7 @@ def white_from_labels(
 ) -> dict[Side, TriangleMesh]:
     """Return by side the surface around the tissue within the cortex of an (i, j, k) label volume.
 
-    It is made like the pial surface in `pial.from_labels`, in the same pose. Where the cerebrum has no cortex, as on
-    the medial wall, both surfaces coincide. MeshError if it keeps self-intersections.
+    It is made like the pial surface, which it equals without cortex. MeshError if it keeps self-intersections.
     """
     cerebrum = read_cerebrum(labels, pose.world @ affine, scheme)
     core = cerebrum.mask & ~np.isin(cerebrum.tissue, scheme.cortex)
@@ -262,10 +247,7 @@ def white_from_surfaces(
     max_hole_mm: float = 3.0,
     edge_length_mm: float = 1.0,
 ) -> dict[Side, TriangleMesh]:
-    """Pose and remesh white surfaces of "left" and "right" or of the "whole"; return them by side.
-
-    MeshError if one cannot be made a closed surface without handles and self-intersections.
-    """
+    """Pose and remesh white surfaces of the sides or the "whole"; return them by side. MeshError if not sound."""
     even = {
         name: make_sound(sound_pieces(mesh, max_hole_mm).mesh, edge_length_mm).mesh
         for name, mesh in posed_whites(pose, whites).items()

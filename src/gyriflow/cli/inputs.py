@@ -189,6 +189,6 @@ def _check_map(name: str, value: Any) -> None:
         sides = SIDES if len(paths) == 2 else (None,)
         values = [read_surface_map(*files)[1] for files in zip(paths, surfaces, sides, strict=True)]
     else:
-        values = [read_volume_map(path).values.ravel() for path in paths]
+        values = [read_volume_map(path)[0].ravel() for path in paths]
     if name == "thickness_mm":
         require_plausible_thickness(np.concatenate(values), mean_of_curve(value), ", ".join(paths))

@@ -13,6 +13,7 @@ from .triangles import Floats, TriangleMesh, face_normals, transformed
 CUBE_ROTATIONS: Floats = np.array(sorted(Rotation.create_group("O").as_matrix(), key=lambda turn: -np.trace(turn)))
 """The 24 rotations of a cube, the identity first. Every rotation is within 63 degrees of one of them."""
 
+IDENTITY: Floats = np.eye(3)
 MIRROR: Floats = np.diag([-1.0, 1.0, 1.0, 1.0])
 """The (4, 4) reflection that exchanges left and right in RAS coordinates."""
 
@@ -36,13 +37,10 @@ STALL_ROUNDS, STALL_TOL = 5, 1e-3
 """Surfaces that differ never stop moving, so rounds also end when this many reduced the distance by less than this."""
 
 
-def motion(rotation: ArrayLike | None = None, shift: ArrayLike | None = None) -> Floats:
+def motion(rotation: ArrayLike = IDENTITY, shift: ArrayLike = 0.0) -> Floats:
     """Return the (4, 4) motion p → rotation p + shift. The default of each is the identity."""
     matrix = np.eye(4)
-    if rotation is not None:
-        matrix[:3, :3] = rotation
-    if shift is not None:
-        matrix[:3, 3] = shift
+    matrix[:3, :3], matrix[:3, 3] = rotation, shift
     return matrix
 
 
@@ -52,10 +50,7 @@ def angle_deg(rotation: Floats) -> float:
 
 
 def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
-    """Return the (4, 4) rigid motion of (n, 3) points onto matched ones by weighted least squares.
-
-    Kabsch 1976, doi 10.1107/S0567739476001873.
-    """
+    """Return the (4, 4) least-squares motion of (n, 3) points onto others (Kabsch 1976, 10.1107/S0567739476001873)."""
     source, target = (np.average(group, axis=0, weights=weights) for group in (points, onto))
     turn, _ = Rotation.align_vectors(onto - target, points - source, weights=weights)
     return motion(turn.as_matrix(), target - turn.apply(source))
@@ -72,9 +67,8 @@ def step_towards_planes(
 ) -> tuple[Floats, Floats]:
     """Return the rotation and shift that minimise the squared distances of (n, 3) points from planes.
 
-    One step of the point-to-plane iteration (Chen and Medioni 1992). The planes have unit `normals` and lie at the
-    signed `distances` (n,) along these; `weights` (n,) are optional. Undetermined directions, such as the rotations of
-    a sphere, are not changed.
+    One step of Chen and Medioni 1992. The planes have unit `normals` and lie at signed `distances` (n,) along these.
+    Undetermined directions, such as the rotations of a sphere, are not changed.
     """
     centre = points.mean(axis=0)
     rows = np.hstack([np.cross(points - centre, normals), normals])
@@ -93,8 +87,7 @@ def follow_planes(
 ) -> tuple[Floats, Floats]:
     """Return the rotation and shift after at most `rounds` steps of iterative closest points.
 
-    `planes` gives the moved points and their target planes for a rotation and shift. `is_converged` decides from the
-    points of a step, its rotation and its shift whether to stop.
+    `planes` gives the moved points and their planes; `is_converged` gets a step's points, rotation and shift.
     """
     for _ in range(rounds):
         points, normals, distances, weights = planes(rotation, shift)
@@ -119,10 +112,7 @@ def _nearest_planes(mesh: TriangleMesh) -> Callable[[Floats], tuple[Floats, Floa
 
 
 def fit_onto(mesh: TriangleMesh, onto: TriangleMesh) -> Floats:
-    """Return the (4, 4) rigid motion that aligns a surface to another in a similar pose, by iterative closest points.
-
-    Points of both surfaces move towards the planes of the nearest faces of the other surface.
-    """
+    """Return the (4, 4) rigid motion that aligns a surface to one in a similar pose: point to plane, both ways."""
     history: list[float] = []
     nearest_of_a, nearest_of_b = _nearest_planes(mesh), _nearest_planes(onto)
     points_a, points_b = (surface.vertices[:: max(1, len(surface.vertices) // N_POINTS)] for surface in (mesh, onto))
@@ -163,9 +153,8 @@ def fits_from_all_sides(
 ) -> list[RigidFit]:
     """Return refined fits of an alignment whose initial rotation is unknown, that from the first start first.
 
-    An iteration converges to a local minimum. A coarse fit is therefore made from each of the (3, 3) rotations
-    `starts`. The best `candidates` of those that differ by more than `distinct_deg`, and that from the first start, are
-    refined in the same way, so that their residuals can be compared.
+    A coarse fit from each (3, 3) rotation of `starts` finds the local minima. That from the first start and the best
+    `candidates` of those that differ by more than `distinct_deg` are refined.
     """
     coarse = [coarse_fit(start) for start in starts]
     distinct: list[int] = []
@@ -176,9 +165,6 @@ def fits_from_all_sides(
 
 
 def residual_ratio(fits: Iterable[RigidFit], best: RigidFit, distinct_deg: float) -> float:
-    """Return the smallest residual in another pose over that of the best fit; infinity without another pose.
-
-    A ratio close to 1 means that the pose is ambiguous.
-    """
+    """Return the least residual in another pose over that of the best fit, ∞ without; near 1 it is ambiguous."""
     alternatives = [fit.residual for fit in fits if angle_deg(fit.rotation @ best.rotation.T) > distinct_deg]
     return float(min(alternatives, default=np.inf) / best.residual)

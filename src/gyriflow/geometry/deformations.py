@@ -30,10 +30,7 @@ class Deformation:
 
 @dataclass(frozen=True, eq=False)
 class MatchedSurfaces:
-    """Surfaces of two brains with the same triangles and corresponding vertices.
-
-    These are the first brain's surface in mm and the (n, 3) positions of its vertices in the second brain.
-    """
+    """The first brain's surface in mm, and the (n, 3) positions of its vertices in the second brain."""
 
     first: TriangleMesh
     second: Floats
@@ -74,10 +71,7 @@ def carry(deformation: Deformation, points: Floats) -> Floats:
 
 
 def determinants(deformation: Deformation) -> Floats:
-    """Return the (i, j, k) Jacobian determinant of the map on its grid: the local change of volume.
-
-    Central differences of the displacement are used. The determinant is 0 or less where the map folds.
-    """
+    """Return the (i, j, k) local change of volume on the map's grid (central differences); ≤ 0 where it folds."""
     gradient = np.stack(np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2)), axis=-1)
     gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])
     return np.asarray(np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3]))

@@ -6,6 +6,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import cg
 
 from .tetrahedra import volumes_between
 from .triangles import Floats, TriangleMesh, face_areas
@@ -14,6 +15,7 @@ SMOOTH_TOL = 1e-3
 """Relative tolerance of smoothing in one step."""
 STEPS = 8
 """Number of implicit steps; their product has the Gaussian's variance and almost its shape."""
+MAX_ITERATIONS = 10_000
 
 
 def cell_sizes(vertices: Floats, cells: NDArray[np.integer]) -> Floats:
@@ -35,8 +37,7 @@ def diffuse(
     """Smooth (n,) or (n, k) values along the mesh, as a Gaussian of standard deviation `sigma_mm` would.
 
     Implicit steps of the heat equation over the time σ²/2, with linear finite elements and lumped mass, preserve the
-    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted. `tolerance` is
-    that of `conjugate_gradients`.
+    integral. `vertices` are (n, 3) in mm, `cells` (m, 3) triangles or (m, 4) tetrahedra, none inverted.
     """
     if sigma_mm == 0:
         return values.copy()
@@ -70,10 +71,7 @@ def smooth_integrals(vertices: Floats, cells: NDArray[np.integer], integrals: Fl
 def harmonic_continuation(
     vertices: Floats, cells: NDArray[np.integer], fixed: NDArray[np.integer], tolerance: float = 1e-8
 ) -> Callable[[Floats], Floats]:
-    """Return a function that extends values (m, k) at the `fixed` vertices to (n, k) harmonically along a mesh.
-
-    The rest of the boundary is free; `tolerance` is that of `conjugate_gradients`.
-    """
+    """Return a function that extends (m, k) values at `fixed` vertices to (n, k); the other boundary is free."""
     free = np.setdiff1d(np.unique(cells), fixed)
     rows = stiffness_matrix(vertices, cells)[free]
     matrix, to_fixed = rows[:, free], rows[:, fixed]
@@ -90,35 +88,16 @@ def harmonic_continuation(
 def conjugate_gradients(matrix: sparse.csr_matrix, right: Floats, start: Floats, tolerance: float) -> Floats:
     """Solve for all (n, k) columns by conjugate gradients with the Jacobi preconditioner.
 
-    The residual of each column is reduced below `tolerance` times its right-hand side. ValueError if it is not, as with
-    degenerate cells.
+    `tolerance` is relative to the right-hand side. ValueError if it is not reached, as with degenerate cells.
     """
-    # one row for each column: products with single vectors take half the time of a product with all
-    right, solution = np.ascontiguousarray(right.T), start.T.copy()
-    inverse = 1.0 / matrix.diagonal()
-
-    def product(rows: Floats) -> Floats:
-        return np.stack([matrix @ row for row in rows])
-
-    residual = right - product(solution)
-    limits = tolerance * np.linalg.norm(right, axis=1)
-    preconditioned = inverse * residual
-    direction = preconditioned.copy()
-    slope = np.einsum("ij,ij->i", residual, preconditioned)
-    for _ in range(10_000):
-        active = np.linalg.norm(residual, axis=1) > limits
-        if not active.any():
-            return np.ascontiguousarray(solution.T)
-        steps = product(direction)
-        # columns that are solved have no search direction
-        length = (slope / np.where(active, np.einsum("ij,ij->i", direction, steps), np.inf))[:, None]
-        solution += np.multiply(length, direction, out=preconditioned)
-        residual -= np.multiply(length, steps, out=steps)
-        np.multiply(inverse, residual, out=preconditioned)
-        before, slope = slope, np.einsum("ij,ij->i", residual, preconditioned)
-        direction *= (slope / np.where(active, before, np.inf))[:, None]
-        direction += preconditioned
-    raise ValueError("diffusion does not converge: the mesh has degenerate cells")
+    jacobi = sparse.diags(1.0 / matrix.diagonal())
+    columns = [
+        cg(matrix, column, guess, rtol=tolerance, maxiter=MAX_ITERATIONS, M=jacobi)
+        for column, guess in zip(right.T, start.T, strict=True)
+    ]
+    if any(code for _, code in columns):
+        raise ValueError("diffusion does not converge: the mesh has degenerate cells")
+    return np.stack([solution for solution, _ in columns], axis=1)
 
 
 def stiffness_matrix(vertices: Floats, cells: NDArray[np.integer]) -> sparse.csr_matrix:

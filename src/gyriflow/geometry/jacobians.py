@@ -1,9 +1,7 @@
 """Bounds of the Jacobian determinant of ten-node tetrahedra, over the whole element.
 
-Such an element may have curved sides, so the determinant of the map from the regular element varies: it is a cubic
-polynomial in the barycentric coordinates. In Bernstein form it is a weighted mean of its 20 coefficients, with positive
-weights that sum to 1, so it lies between the smallest and the largest of them (Johnen, Remacle and Geuzaine 2013,
-J. Comput. Phys. 233, 359-372).
+With curved sides the determinant is a cubic polynomial in the barycentric coordinates. It lies between the smallest and
+the largest of its 20 Bernstein coefficients (Johnen, Remacle and Geuzaine 2013, J. Comput. Phys. 233, 359-372).
 """
 
 import math
@@ -18,7 +16,8 @@ from .triangles import Floats
 # corners of the edges whose midpoints are nodes 4 to 9, in the order of VTK
 EDGES = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
 # the eight parts of an element between its nodes: one at each corner, four around the axis from node 4 to node 9
-PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
+CORNER_PARTS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
+PARTS = (*CORNER_PARTS, (4, 6, 7, 9), (4, 7, 8, 9), (4, 8, 5, 9), (4, 5, 6, 9))
 NODES = np.array([np.eye(4)[i] for i in range(4)] + [(np.eye(4)[a] + np.eye(4)[b]) / 2 for a, b in EDGES])
 """Barycentric coordinates (10, 4) of the nodes."""
 POWERS = np.array([powers for powers in product(range(4), repeat=4) if sum(powers) == 3])
@@ -86,18 +85,14 @@ def jacobians(vertices: Floats, tets: NDArray[np.integer], slopes: Floats) -> Fl
 
 
 def coefficients(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return the (m, 20) Bernstein coefficients of the Jacobian determinants of (m, 10) elements.
-
-    Their mean is six times the element's volume.
-    """
+    """Return the (m, 20) Bernstein coefficients of (m, 10) elements' determinants; their mean is 6 volumes."""
     return jacobians(vertices, tets, LATTICE_SLOPES) @ FROM_VALUES.T
 
 
 def lower_bounds(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Return a lower bound of the Jacobian determinant of each (m, 10) element.
+    """Return a lower bound of the Jacobian determinant of each (m, 10) element: if positive, it folds nowhere.
 
-    The element folds over nowhere if it is positive. Elements whose coefficients are inconclusive are subdivided up to
-    three times, since the bounds of smaller parts are tighter.
+    Inconclusive elements are subdivided up to three times, since the bounds of smaller parts are tighter.
     """
     whole = coefficients(vertices, tets)
     bounds = whole.min(axis=1)
@@ -121,9 +116,8 @@ def inverted_on_the_way(
 ) -> NDArray[np.bool_]:
     """Return whether each (m, 4) or (m, 10) element is inverted anywhere on the straight way of its vertices.
 
-    The volume of a linear element is a cubic of the way. It is positive if all Bernstein coefficients are; else the
-    roots of the cubic decide. With `least` it must stay above that fraction of the volume before. A quadratic element
-    is checked by bounds (`lower_bounds`) at the quarters of the way.
+    The volume of a linear element is a cubic of the way, decided by its Bernstein coefficients, else its roots; it must
+    stay above the fraction `least` of that before. Quadratic ones are checked by `lower_bounds` at quarters of the way.
     """
     if tets.shape[1] == len(NODES):
         on_way = (before + part * (after - before) for part in (0.25, 0.5, 0.75, 1.0))
@@ -134,15 +128,8 @@ def inverted_on_the_way(
         # rows of one end, with one or two of the other
         mixed = [np.where(np.isin(range(3), rows)[:, None], last, first) for rows in ((0,), (1,), (2,))]
         opposite = [np.where(np.isin(range(3), rows)[:, None], first, last) for rows in ((0,), (1,), (2,))]
-        bernstein_values = np.stack(
-            [
-                determinants(first),
-                sum(map(determinants, mixed)) / 3,
-                sum(map(determinants, opposite)) / 3,
-                determinants(last),
-            ],
-            axis=1,
-        )
+        ends = [first], mixed, opposite, [last]
+        bernstein_values = np.stack([sum(map(determinants, maps)) / len(maps) for maps in ends], axis=1)
         bernstein_values -= least * np.maximum(bernstein_values[:, :1], 0.0)
         undecided = np.flatnonzero(bernstein_values.min(axis=1) <= 0)
         inverted[chunk.start + undecided] = [_has_root(*values) for values in bernstein_values[undecided]]

@@ -51,8 +51,7 @@ def surface_distance(ways: Iterable[tuple[Floats, Floats]], share: float = 0.95)
 def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
     """Return the (n,) thickness in mm of the layer between two surfaces, at the vertices of the outer one.
 
-    It is the mean of two distances: from the vertex to the nearest point of the inner surface, and from there to the
-    nearest point of the outer one (Fischl and Dale 2000, doi 10.1073/pnas.200033797).
+    The mean distance to the nearest inner point and back (Fischl and Dale 2000, doi 10.1073/pnas.200033797).
     """
     inward, _, nearest = nearest_on(outer.vertices, inner)
     outward, _, _ = nearest_on(nearest, outer)
@@ -60,10 +59,7 @@ def layer_thickness(outer: TriangleMesh, inner: TriangleMesh) -> Floats:
 
 
 def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
-    """Return a label volume with 1 inside a closed surface, and its (4, 4) affine.
-
-    The volume covers the surface, or the (2, 3) corners of a box, plus a margin of four voxels.
-    """
+    """Return a volume, 1 inside a closed surface, and its affine; 4 voxels around it or a (2, 3) `box`."""
     low, high = (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)) if box is None else box
     low = low - 4 * voxel_mm
     shape = np.ceil((high - low) / voxel_mm + 4).astype(int) + 1
@@ -73,10 +69,7 @@ def surface_mask(mesh: TriangleMesh, voxel_mm: float, box: Floats | None = None)
 
 
 def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], affine: Floats) -> NDArray[np.int32]:
-    """Return an (i, j, k) label volume with 2 in the layer of (n,) thickness in mm below a closed surface, 1 deeper.
-
-    `affine` (4, 4) leads from voxels to mm. Parts outside the volume are cut off.
-    """
+    """Return labels in a volume's grid, its (4, 4) affine in mm: 2 less deep than (n,) thickness in mm, 1 deeper."""
     inside = np.argwhere(_inside(mesh, shape, affine))
     depth, faces, _ = nearest_on(inside @ affine[:3, :3].T + affine[:3, 3], mesh)
     labels = np.zeros(shape, dtype=np.int32)
@@ -87,9 +80,8 @@ def layer_labels(mesh: TriangleMesh, thickness: Floats, shape: tuple[int, ...], 
 def _inside(mesh: TriangleMesh, shape: tuple[int, ...], affine: Floats) -> NDArray[np.bool_]:
     """Return the (i, j, k) mask of the voxels whose centres lie inside a closed surface, by winding numbers.
 
-    These change by ±1 where a line of voxels along k crosses a face. On which side of an edge a line passes is computed
-    alike for both of its faces, and a line through an edge or vertex counts as shifted by (ε, ε²), ε → 0. So no
-    crossing is missed or counted twice.
+    These change by ±1 where a line of voxels along k crosses a face. Both faces of an edge agree on which side a line
+    passes, and a line through an edge or vertex counts as shifted by (ε, ε²), ε → 0, so each crossing counts once.
     """
     index = transformed(mesh, np.linalg.inv(affine))
     flat, heights, faces = index.vertices[:, :2], index.vertices[:, 2], index.faces

@@ -46,13 +46,11 @@ def path_through(
     step_gw: float = 1 / 7,
     stops: Collection[float] = (),
 ) -> Path:
-    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, as a run with steps of `step_gw` takes
-    it.
+    """Return a path through (n, 3) shapes of a mesh in mm at ascending weeks, for a run with steps of `step_gw`.
 
-    Each shape is first aligned rigidly to the one before. Shapes observed at almost the same time are merged
-    (`merged_shapes`); `stops` are the weeks of shapes that were not observed but lie between. The velocity is
-    continuous, that of `limited_velocities`. Near elements that a straight step of the run would invert, the path is
-    straight from shape to shape instead, so that the velocity may jump there at the two weeks.
+    Each shape is aligned rigidly to the one before; shapes at almost the same time are merged (`merged_shapes`).
+    `stops` are weeks of shapes that were not observed. Velocities are `limited_velocities`; near elements that a step
+    would invert the path is straight from shape to shape, so that the velocity may jump at the weeks.
     """
     sizes = vertex_sizes(shapes[0], linear_pieces(mesh))
     aligned = [shapes[0]]
@@ -62,14 +60,8 @@ def path_through(
     velocities = limited_velocities(at, places)
     # by interval, since velocities may differ on the two sides of a week: control points of Bernstein's polynomials
     lengths = np.diff(at)[:, None, None]
-    control = np.stack(
-        [
-            places[:-1],
-            places[:-1] + velocities[:-1] * lengths / 3,
-            places[1:] - velocities[1:] * lengths / 3,
-            places[1:],
-        ]
-    )
+    first, last = places[:-1], places[1:]
+    control = np.stack([first, first + velocities[:-1] * lengths / 3, last - velocities[1:] * lengths / 3, last])
     inverted = []
     for i, length in enumerate(np.diff(at)):
         steps = max(1, int(np.ceil(length / step_gw - 1e-6)))
@@ -119,21 +111,17 @@ def merged_shapes(weeks: Floats, places: Floats, stops: Collection[float] = ()) 
             (early, first), (late, last) = means[max(number - 1, 0)], means[min(number + 1, len(groups) - 1)]
             week, mean = means[number]
             merged[group] = mean + ((weeks[group] - week) / (late - early))[:, None, None] * (last - first)
-            around = slice(observed[max(np.searchsorted(observed, group[0]) - 1, 0)], _next(observed, group[-1]))
+            before, after = np.searchsorted(observed, [group[0], group[-1]]) + [-1, 1]
+            end = observed[after] if after < len(observed) else group[-1] + 1
+            around = slice(observed[max(before, 0)], end)
             kept[around] &= np.isin(np.arange(len(weeks))[around], observed)
     return weeks[kept], merged[kept]
-
-
-def _next(observed: Ints, last: int) -> int:
-    later = observed[observed > last]
-    return int(later[0]) if len(later) else last + 1
 
 
 def limited_velocities(weeks: Floats, places: Floats) -> Floats:
     """Return the (k, n, 3) velocities at k weeks of points on their way through (k, n, 3) places.
 
-    At each week it is that of the parabola through this place and its neighbours, at the ends the mean velocity to the
-    neighbour; limited in length, so that noise of two shapes at almost the same time does not bend the path after them.
+    It is the parabola's through a place and its neighbours, the mean velocity at the ends, limited in length.
     """
     velocities = np.gradient(places, weeks, axis=0)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(weeks)[:, None]

@@ -70,9 +70,6 @@ def pose_from(plain: Mapping[str, Any]) -> Pose:
 
 
 def turned(rotation: Floats, by: str, coordinates: str = "ras", *warnings: str) -> Pose:
-    """Return the pose of a file that a (3, 3) rotation about the origin brings to RAS+.
-
-    Volumes of the brain are in RAS+, whatever the `coordinates` of its surface file.
-    """
+    """Return the pose of a file that a (3, 3) rotation brings to RAS+; the brain's volumes are in RAS+ already."""
     whole = motion(rotation)
     return Pose(whole @ CONVENTIONS[coordinates], {"whole": whole}, by, warnings=warnings)

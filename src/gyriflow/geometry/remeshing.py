@@ -19,10 +19,7 @@ SHARP_DEG = 30.0
 
 
 def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """Return the (m,) mask of the faces that cut other faces.
-
-    Unlike in `matching.faces_that_cross`, faces that only touch or overlap in a plane do not count.
-    """
+    """Return the (m,) mask of faces that cut others; unlike in `faces_that_cross`, contacts do not count."""
     document = in_meshlab(mesh)
     document.compute_selection_by_self_intersections_per_face()
     return np.asarray(document.current_mesh().face_selection_array(), dtype=bool)
@@ -31,10 +28,7 @@ def self_intersecting_faces(mesh: TriangleMesh) -> NDArray[np.bool_]:
 def remesh(
     mesh: TriangleMesh, edge_length_mm: float, rounds: int = REMESHING_ROUNDS, sharp_deg: float = SHARP_DEG
 ) -> TriangleMesh:
-    """Return the surface with triangles close to equilateral, edges of about `edge_length_mm`.
-
-    Edges at which faces meet at more than `sharp_deg` are kept.
-    """
+    """Return the surface with even triangles of an edge length (mm); edges sharper than `sharp_deg` are kept."""
     document = in_meshlab(mesh)
     length = pymeshlab.PureValue(edge_length_mm)
     # MeshLab remembers `selectedonly` of an earlier call
@@ -59,10 +53,9 @@ def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
 
 
 def untangle(mesh: TriangleMesh) -> tuple[TriangleMesh, int, int]:
-    """Remove self-intersections by Laplacian smoothing of the faces concerned.
+    """Remove self-intersections by Laplacian smoothing of the faces concerned, ever wider, in the same topology.
 
-    The number of vertices and the topology are kept. Each round smooths a wider neighbourhood. Also return the number
-    of self-intersecting faces before, and of those that remain.
+    Also return the number of self-intersecting faces before, and of those that remain.
     """
     counts = []
     for round_ in range(UNTANGLING_ROUNDS + 1):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .jacobians import EDGES, chunks, coefficients, shape_values
+from .jacobians import CORNER_PARTS, EDGES, chunks, coefficients, determinants, shape_values
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
@@ -16,8 +16,7 @@ KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0
 NODES_OF_ORDER = {1: 4, 2: 10}
 MIN_RADIUS_RATIO = 0.02
 """Least accepted quality of an element (`radius_ratios`)."""
-# the face opposite to each corner, counter-clockwise from outside; and its four triangles if its edges have nodes: at
-# its corners in turn, and between the nodes
+# the face opposite to each corner, outward; and its four triangles if its edges have nodes: at its corners, between
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 FINE_FACES = (
     ((1, 5, 8), (5, 2, 9), (8, 9, 3), (5, 9, 8)),
@@ -26,16 +25,7 @@ FINE_FACES = (
     ((0, 6, 4), (6, 2, 5), (4, 5, 1), (6, 5, 4)),
 )
 # the linear elements between the nodes of a quadratic one: at its corners, and around the diagonal from node 6 to 8
-PIECES = (
-    (0, 4, 6, 7),
-    (4, 1, 5, 8),
-    (6, 5, 2, 9),
-    (7, 8, 9, 3),
-    (6, 8, 4, 5),
-    (6, 8, 5, 9),
-    (6, 8, 9, 7),
-    (6, 8, 7, 4),
-)
+PIECES = (*CORNER_PARTS, (6, 8, 4, 5), (6, 8, 5, 9), (6, 8, 9, 7), (6, 8, 7, 4))
 PIECES_OF_ORDER = {1: 1, 2: 4}
 """Number of triangles of a face; with nodes on its edges, one at each corner and one in the middle."""
 
@@ -57,10 +47,9 @@ LATTICE_TRIANGLES = np.array(
 
 @dataclass(frozen=True, eq=False)
 class TetrahedralMesh:
-    """A tetrahedral mesh of linear or of quadratic elements: (n, 3) nodes in mm, and (m, 4) or (m, 10) elements.
+    """A tetrahedral mesh: (n, 3) nodes in mm, and (m, 4) linear or (m, 10) quadratic elements of positive volume.
 
-    Elements are indices of nodes in the order of VTK: four corners, and the nodes on the edges 01, 12, 02, 03, 13, 23.
-    Volumes are positive.
+    Nodes are in the order of VTK: four corners, and those on the edges 01, 12, 02, 03, 13, 23.
     """
 
     vertices: Floats
@@ -90,10 +79,8 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
         return np.asarray(coefficients(vertices, tets).mean(axis=1) / 6)
     volumes = np.empty(len(tets))
     for part in chunks(len(tets)):
-        a, b, c, d = (np.take(vertices, corners, axis=0) for corners in tets[part].T)
-        # the triple product is written out, since NumPy's cross product is slower
-        (b0, b1, b2), (c0, c1, c2), (d0, d1, d2) = ((end - a).T for end in (b, c, d))
-        volumes[part] = ((b1 * c2 - b2 * c1) * d0 + (b2 * c0 - b0 * c2) * d1 + (b0 * c1 - b1 * c0) * d2) / 6.0
+        places = np.take(vertices, tets[part], axis=0)
+        volumes[part] = determinants(places[:, 1:] - places[:, :1]) / 6.0
     return volumes
 
 
@@ -103,10 +90,7 @@ def signed_volumes(mesh: TetrahedralMesh) -> Floats:
 
 
 def radius_ratios(mesh: TetrahedralMesh) -> Floats:
-    """Return the (m,) ratios 3 × inscribed / circumscribed radius: 1 for the regular element, 0 for a flat one.
-
-    For quadratic elements they are computed from the corners.
-    """
+    """Return the (m,) ratios 3 × inscribed / circumscribed radius of the corners: 1 regular, 0 flat."""
     ratios = np.empty(len(mesh.tets))
     for part in chunks(len(ratios)):
         a, b, c, d = mesh.vertices[mesh.corners[part].T]
@@ -142,10 +126,7 @@ def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:
 
 
 def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
-    """Add a node at the midpoint of each edge of a linear mesh: quadratic elements with straight sides.
-
-    Corners keep their numbers.
-    """
+    """Add nodes at the midpoints of a linear mesh's edges; corners keep their numbers."""
     pairs = np.sort(mesh.tets[:, EDGES], axis=2).reshape(-1, 2)
     names, place = np.unique(pairs @ [len(mesh.vertices), 1], return_inverse=True)
     ends = np.stack(np.divmod(names, len(mesh.vertices)), axis=1)
@@ -154,10 +135,7 @@ def quadratic(mesh: TetrahedralMesh) -> TetrahedralMesh:
 
 
 def linear_pieces(mesh: TetrahedralMesh) -> Ints:
-    """Return the (p, 4) linear tetrahedra between the nodes of a mesh: its elements, or eight for each quadratic one.
-
-    Elements with straight sides and positive volume give pieces of positive volume.
-    """
+    """Return the (p, 4) linear tetrahedra between the nodes: the elements, or eight for each quadratic one."""
     return mesh.tets if mesh.order == 1 else np.asarray(mesh.tets[:, PIECES]).reshape(-1, 4)
 
 

@@ -151,9 +151,8 @@ def face_components(mesh: TriangleMesh) -> Ints:
 def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
     """Split a surface into manifold sheets at edges of more than two faces, and at vertices where sheets meet.
 
-    At such an edge, as of the wall that two closed pieces share, two faces belong to one sheet if they use the edge in
-    opposite directions and have the inside between them: those with the smallest sum of angles inside are paired. The
-    sheet of a face without partner ends there. A manifold surface is returned unchanged.
+    At such an edge two faces belong to one sheet if they use it in opposite directions and have the inside between
+    them: those with the smallest sum of angles inside are paired. A manifold surface is returned unchanged.
     """
     faces, count = mesh.faces, len(mesh.vertices)
     # half-edge 3 f + k starts at corner k of face f

@@ -28,11 +28,8 @@ def require_checksums(recorded: Mapping[str, tuple[str, str]]) -> None:
 def fetch(path: AnyPath, url: str, report: Report, *, sha256: str | None = None, size: int | None = None) -> None:
     """Fetch a file from a URL, check it and put it under `path`, or check the one there, which is never replaced.
 
-    `report` is called with a line about the file. Without a known checksum, a GIFTI or NIfTI file has to be readable
-    to its end. There has to be room for the size in bytes, if it is known.
-
-    StorageError where the server cannot be reached, lacks the file or sends something else, the file that is there is
-    another one, or the folder cannot be written. Nothing is left under `path` then.
+    `report` gets a line about the file. Without a checksum, a GIFTI or NIfTI file has to be readable to its end. There
+    has to be room for the size in bytes, if known. StorageError otherwise, with nothing new under `path`.
     """
     import pooch
 

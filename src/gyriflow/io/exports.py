@@ -14,7 +14,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
-from ..quantities import VERTEX_MAPS, VertexMap
+from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
 from .made_files import making_files, require_own_data_set
@@ -80,10 +80,9 @@ BidsNames = Mapping[str, tuple[str, str | None]]
 class ExportedBrain:
     """A brain at a week and its files by side; regions may be empty.
 
-    The run is "real" for observed brains. The subject is the scanned person, or the brain if none is named. For a
-    simulated brain, everything but run, week and files is that of its start brain. The report has the pose of its
-    surface. `template_maps` are at the vertices of another brain. Simulated brains of labels have a `volume`: the start
-    brain's `labels`, whose grid is used, and the `surface` and `thickness` of the whole brain.
+    The run is "real" for observed brains; simulated ones have brain, subject and covariates of their start.
+    `template_maps` are at another brain's vertices. Simulated brains of labels have a `volume`: the start's `labels`,
+    whose grid is used, and `surface` and `thickness` of the whole brain.
     """
 
     brain: str
@@ -111,10 +110,9 @@ def export_bids(
 ) -> None:
     """Write a BIDS derivative: a file for each map, simulated brains under `desc-RUNgwWEEK`, tables as TSV.
 
-    Subjects and sessions keep their names. Brains of no named session have their week's, where a subject has several.
-    Surfaces lie in the world of the brain's own volumes, unless its hemispheres were posed separately. `tables` have
-    the columns subject, run and week; `columns` has the metric's description and unit of each in `metrics_wide`.
-    InputError where two brains have one name.
+    Brains of no named session have their week's, where a subject has several. Surfaces lie in the world of the brain's
+    volumes, unless its sides were posed separately. `tables` have the columns subject, run and week; `columns` has
+    description and unit of each in `metrics_wide`. InputError where two brains have one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]
@@ -218,7 +216,8 @@ def _write_maps(
             for name, values in read_vertex_maps(path).items():
                 quantity = VERTEX_MAPS[name]
                 suffix, sign = quantity.bids_suffix, quantity.export_sign
-                sidecars["_".join(filter(None, (entity, suffix)))] = {**_described(quantity), **more}
+                described = {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
+                sidecars["_".join(filter(None, (entity, suffix)))] = {**described, **more}
                 density = f"_{entity}_den-{len(values)}" if entity else ""
                 named = f"{prefix}_hemi-{side[0].upper()}{density}{desc}_{suffix}.shape.gii"
                 write_vertex_maps(named, {suffix if sign < 0 else name: sign * values}, STRUCTURES[side])
@@ -301,10 +300,6 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
     for name, table in tables.items():
         columns = {str(key): PEOPLE.get(str(key), OF_INPUT) for key in table if key not in first[:2]}
         write_json(folder / f"{name}.json", columns)
-
-
-def _described(quantity: VertexMap) -> dict[str, Any]:
-    return {"Description": quantity.description, "Units": bids_unit(quantity.unit)}
 
 
 def bids_unit(unit: str) -> str:

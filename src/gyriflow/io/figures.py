@@ -28,10 +28,7 @@ TABLE_LOOK = (
 
 
 def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
-    """Write a figure twice, as pixels, `DPI` to the inch, and as vectors.
-
-    Pictures within the vectors keep all of their pixels.
-    """
+    """Write a figure as pixels, `DPI` to the inch, and as vectors, in which pictures keep their pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):
@@ -48,30 +45,22 @@ def write_html(path: AnyPath, body: str) -> None:
 
 
 def picture_addresses(paths: Sequence[AnyPath], budget_bytes: float) -> list[tuple[str, float]]:
-    """Return pictures as data addresses for a page, WebP coded, each with the width in inches that it has in print.
-
-    All have as many pixels as fit into a number of bytes.
-    """
+    """Return pictures as data addresses (WebP) that together fit `budget_bytes`, and their widths in print (inches)."""
     for width in WIDTHS:
         coded = [_coded(path, width) for path in paths]
-        if sum(map(len, coded)) <= budget_bytes:
+        if sum(len(address) for address, _ in coded) <= budget_bytes:
             break
-    return [(f"data:image/webp;base64,{content}", _inches(path)) for content, path in zip(coded, paths, strict=True)]
+    return coded
 
 
-def _inches(path: AnyPath) -> float:
+def _coded(path: AnyPath, width: int) -> tuple[str, float]:
     with Image.open(path) as picture:
-        return float(picture.width / picture.info["dpi"][0])
-
-
-def _coded(path: AnyPath, width: int) -> str:
-    with Image.open(path) as picture:
-        image = picture.convert("RGB")
+        image, inches = picture.convert("RGB"), float(picture.width / picture.info["dpi"][0])
     if image.width > width:
         image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
     content = BytesIO()
     image.save(content, "WEBP", quality=QUALITY, method=4)
-    return b64encode(content.getvalue()).decode("ascii")
+    return f"data:image/webp;base64,{b64encode(content.getvalue()).decode('ascii')}", inches
 
 
 def read_body(path: AnyPath) -> str:

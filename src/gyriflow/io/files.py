@@ -39,10 +39,7 @@ TEXT_COLUMNS = (
     *("measure", "quantity", "proxy", "unit", "model", "kind", "growth_of", "parameter", "result", "place", "pose_by"),
     *("verdict", "cause", "outcome", "flag", "resolution", "level", "message", "warnings", "stage", "rule"),
 )
-"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids.
-
-Other columns hold numbers, true or false, or texts that are never like these. A cell without a value is empty.
-"""
+"""The columns of text in the tables that gyriflow writes, also where all texts look like numbers, such as ids."""
 
 
 def companion_files(path: AnyPath) -> list[str]:
@@ -72,10 +69,7 @@ def require_content(path: AnyPath) -> None:
 
 @contextmanager
 def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str | None = AGAIN) -> Iterator[None]:
-    """Turn what a reader raises on a missing, torn or foreign file into an InputError: it cannot be read as `kind`.
-
-    A file of a known other format is named as such, with what to do.
-    """
+    """Turn what a reader raises into an InputError: the file cannot be read as `kind`, or is of another format."""
     require_content(path)
     try:
         yield
@@ -101,10 +95,7 @@ def require_finite(values: np.ndarray, path: AnyPath, what: str, of: str) -> Non
 
 @contextmanager
 def atomic_write(path: AnyPath) -> Iterator[Path]:
-    """Yield a temporary path next to `path` that replaces it when the block succeeds.
-
-    After an error an earlier file is unchanged. Missing folders are made. StorageError if the system refuses to write.
-    """
+    """Yield a temporary path that replaces `path` if the block succeeds; StorageError if the system refuses."""
     path = Path(path)
     temporary = path.with_name(f".{uuid.uuid4().hex[:12]}.{path.name}")
     try:
@@ -165,8 +156,7 @@ def write_table(path: AnyPath, table: "pd.DataFrame") -> None:
 def read_text_table(path: AnyPath) -> list[dict[str, str]]:
     """Return the rows of a table with a heading, separated by tabs, semicolons or commas, as texts by column.
 
-    It may be in UTF-8 or UTF-16, and name its separator first (`sep=;`), as Excel does. InputError for other files, and
-    if a column occurs twice with different values.
+    UTF-8 or UTF-16, and Excel's first line `sep=;`. InputError otherwise, and if a column has two values in a row.
     """
     with reading(path, "a table of text", "text in UTF-8 or UTF-16", remedy=None):
         content = Path(path).read_bytes()
@@ -256,8 +246,7 @@ def sha256_of(path: AnyPath) -> str:
 def contents(files: Iterable[AnyPath], earlier: Mapping[str, Any]) -> dict[str, list[Any]]:
     """Return SHA-256, size, times and `companion_files` of each file that can be read, companions included, by path.
 
-    A file with the same size (bytes) and times of writing and of any change (ns since the epoch) as in `earlier`, an
-    earlier result, is not read again.
+    Files with the size (bytes) and times of writing and change (ns) of an `earlier` result are not read again.
     """
     by_path: dict[str, list[Any]] = {}
     paths = list(map(str, files))
@@ -291,10 +280,7 @@ def files_in(folder: AnyPath, *left_out: str) -> list[Path]:
 
 
 def files_below(folder: AnyPath) -> list[Path]:
-    """Return the files of a folder and those in it, in order; links are followed, and no folder is entered twice.
-
-    A folder that cannot be read is returned in place of its files.
-    """
+    """Return all files below a folder, in order, links followed once; unreadable folders stand for theirs."""
     entered: set[str] = set()
     found: list[Path] = []
 

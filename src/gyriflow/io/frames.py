@@ -1,9 +1,8 @@
 """Frames of a simulation: one HDF5 file, with an XDMF file that ParaView opens as a time series.
 
-Layout of the HDF5 file: `tets` (m, 4), of quadratic elements (m, 10), once; per output week a group `week_21.00` with
-`positions` (n, 3) in mm, fields at the vertices, and in its group `cell_fields` those of the elements. Positions are in
-double precision: metrics and displacements are computed from them. Fields are in single precision, about seven digits,
-at half the size.
+It has `tets` (m, 4) or (m, 10), and for each output week a group `week_21.00` with `positions` (n, 3) in mm, fields at
+the vertices, and in `cell_fields` those of elements. Positions, from which metrics are computed, are in double
+precision, fields in single.
 """
 
 from collections.abc import Mapping, Sequence

@@ -9,10 +9,7 @@ UNLOCKABLE: set[str] = set()
 
 
 def lock_file(file: IO, *, wait: bool = False) -> bool:
-    """Lock an open file until it is closed; return False if another process has locked it.
-
-    With `wait`, wait for that process. Without locks, as on some NFS and Lustre, warn once and go on.
-    """
+    """Lock an open file until it is closed (`wait` for it, or return False); without locks, warn once and go on."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:

@@ -18,11 +18,10 @@ REGISTER_AGAIN = "Register the brains, or match their surfaces, again."
 
 
 def write_correspondence(path: AnyPath, pair: Correspondence, report: Mapping[str, Any]) -> None:
-    """Write what takes one brain to another; the `report` is kept as JSON in an attribute of that name.
+    """Write what takes one brain to another, and the `report` as JSON in an attribute.
 
-    A deformation has the data sets matrix (4, 4), displacement (i, j, k, 3) in mm, float32, and affine (4, 4) of its
-    grid: a point p goes to matrix (p + displacement(p)). Matched surfaces have first (n, 3) and second (n, 3) in mm,
-    and faces (m, 3).
+    A deformation has matrix (4, 4), displacement (i, j, k, 3) in mm and affine (4, 4) of its grid: a point p goes to
+    matrix (p + displacement(p)). Matched surfaces have first (n, 3) and second (n, 3) in mm, and faces (m, 3).
     """
     with new_hdf5(path) as file:
         if isinstance(pair, Deformation):
@@ -48,11 +47,10 @@ def read_correspondence(path: AnyPath) -> Correspondence:
 class WeeklyShapes:
     """The shapes that a mesh has, or is to have, at (w,) ascending gestational weeks, its own first.
 
-    `positions` (w, n, 3) of its vertices are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of its
-    boundary; `surfaces` by name w arrays (m, 3) of where simpler predictions put the boundary's vertices, in mm. `ages`
-    is the table of an atlas' ages by size, if they were used. `stops` are those of the weeks at which no brain was
-    observed, and `between` those whose shapes are on the path through the others. `tets` are the mesh's elements, if it
-    has no file of its own.
+    `positions` (w, n, 3) are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of the boundary;
+    `surfaces` by name w arrays (m, 3), in mm, of simpler predictions of it. `ages` is the table of an atlas' ages by
+    size, if used. `stops` are weeks without an observed brain, `between` those on the path through the others. `tets`
+    are the elements of a mesh without a file.
     """
 
     weeks: Floats

@@ -43,9 +43,8 @@ System = tuple[str, str, Floats]
 def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
     """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY, OBJ or OFF file, in the order of corners of the file.
 
-    Coordinates of GIFTI and FreeSurfer files are transformed to scanner space if the file defines how. InputError for
-    missing, truncated or empty files, NaN or infinite coordinates, faces with missing vertices, coordinates of another
-    space than the subject's, and where `side` is "left" or "right" and the file names the other hemisphere.
+    GIFTI and FreeSurfer coordinates go to scanner space if the file defines how. InputError for invalid files,
+    coordinates of another space than the subject's, and the other hemisphere than `side`.
     """
     mesh, _, structure = surface_space_structure(path)
     require_side(path, structure, side)
@@ -53,10 +52,9 @@ def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
 
 
 def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, str | None]:
-    """Return a surface as `read_surface` does, the space of its coordinates and its structure.
+    """Return a surface as `read_surface` does, the space of its coordinates and its structure, None if unknown.
 
-    Both are None if the file has none. The space is a NIfTI transform code's name, such as
-    "NIFTI_XFORM_SCANNER_ANAT", the structure such as "CortexLeft", from the file's content or its name.
+    Such as "NIFTI_XFORM_SCANNER_ANAT" and "CortexLeft", from the file's content or its name.
     """
     path = Path(path)
     found = format_of(path, "surface")
@@ -92,10 +90,7 @@ def require_side(path: AnyPath, structure: str | None, side: str | None) -> None
 
 
 def read_hemispheres(left: AnyPath, right: AnyPath) -> tuple[TriangleMesh, TriangleMesh, bool]:
-    """Return the surfaces of two hemispheres, and whether both files name one and the same coordinate system.
-
-    InputError as for `read_surface`. Warns if only one file names its space, or both name different ones.
-    """
+    """Return two hemispheres as `read_surface`, and whether both files name one space; warn if they differ."""
     read = [surface_space_structure(path) for path in (left, right)]
     for path, (_, _, structure), side in zip((left, right), read, SIDES, strict=True):
         require_side(path, structure, side)
@@ -136,13 +131,9 @@ def write_surface(
 
 
 def write_brain(files: Any, whole: TriangleMesh, left: TriangleMesh | None, right: TriangleMesh | None) -> None:
-    """Write a brain's pial surface and its hemispheres, None for one that is not there.
-
-    `files` has the paths `whole`, those of the hemispheres that are there by their names, and `stl` if it is wanted.
-    """
+    """Write a brain's surface and its hemispheres to `files`: `whole`, `left` and `right` if present, `stl`."""
     write_surface(files.whole, whole)
-    sides: dict[Side, TriangleMesh | None] = {"left": left, "right": right}
-    for side, mesh in sides.items():
+    for side, mesh in zip(SIDES, (left, right), strict=True):
         if mesh is not None:
             write_surface(files[side], mesh, STRUCTURES[side], "Pial")
     if stl := files.get("stl"):
@@ -173,9 +164,8 @@ def read_vertex_maps(path: AnyPath) -> dict[str, Floats]:
 def read_surface_map(path: AnyPath, surface_path: AnyPath, side: str | None = None) -> tuple[TriangleMesh, Floats]:
     """Return a surface and the values of a GIFTI shape or func file at its vertices.
 
-    InputError for missing or truncated files, more than one array, another number of values than of vertices, NaN and
-    infinite values, STL surfaces, which have no order of vertices, and where map and surface name different hemispheres
-    or another one than `side`.
+    InputError for invalid files, more than one array, another number of values than of vertices, NaN and infinite
+    values, STL surfaces, which do not number vertices, and other hemispheres than the surface's or `side`.
     """
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
@@ -200,10 +190,7 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath, side: str | None = No
 
 
 def read_surface_maps(paths: Sequence[AnyPath], surface_paths: Sequence[AnyPath]) -> tuple[TriangleMesh, Floats]:
-    """Return surfaces side by side as one and the values of their maps, each read as by `read_surface_map`.
-
-    Two are those of left and right.
-    """
+    """Return surfaces, two are left and right, as one and their maps, each read as by `read_surface_map`."""
     sides = SIDES if len(paths) == 2 else (None,)
     pieces = [read_surface_map(*files) for files in zip(paths, surface_paths, sides, strict=True)]
     return merged(*(surface for surface, _ in pieces)), np.concatenate([values for _, values in pieces])
@@ -247,21 +234,13 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
 
 
-def _read_vtk_surface(path: Path) -> RawSurface:
-    points, faces = read_vtk(path)
-    return np.asarray(points, dtype=float), faces, None, None
-
-
 def read_pose(path: AnyPath) -> Pose:
     """Read the pose in a `surface.json`."""
     return pose_from(read_json(path)["pose"])
 
 
 def connectivity(path: Path) -> tuple[int, int, str]:
-    """Return the numbers of vertices and of triangles of a surface file, and a digest of its triangles.
-
-    Neither the order of the triangles nor that of their corners matters. InputError as for `read_surface`.
-    """
+    """Return a surface file's numbers of vertices and triangles, and a digest of the triangles in any order."""
     return _connectivity(path, (path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None)
 
 
@@ -282,8 +261,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 def read_vertex_labels(path: AnyPath, side: str | None = None) -> tuple[Ints, dict[int, str]]:
     """Return the (n,) labels of a GIFTI label file and the names of its table, without those of no region.
 
-    InputError for missing or truncated files, for other than one array, for non-integer values, and where `side` is
-    "left" or "right" and the file names the other hemisphere.
+    InputError for other files, non-integer values, and the other hemisphere than `side`.
     """
     image = load_gifti(path)
     require_side(path, structure_of(image, path), side)
@@ -349,8 +327,7 @@ def _coordinate_systems(path: AnyPath) -> list[System]:
 def _to_scanner_space(systems: list[System], path: AnyPath) -> tuple[Floats, str | None]:
     """Return the (4, 4) matrix that brings coordinates to scanner space, and the space they are in then.
 
-    A rigid matrix into scanner or aligned space is applied. None is where the coordinates are in one of these already.
-    Those that lead to Talairach or MNI space are not, since these have other sizes; each that is not applied is logged.
+    A rigid matrix into scanner or aligned space is applied; others, as to MNI space of other size, are logged.
     InputError for matrices into scanner space that change sizes.
     """
     moving = [system for system in systems if not np.allclose(system[2], np.eye(4), atol=1e-6)]
@@ -399,9 +376,7 @@ REAL_RAS = b"\0\0\0\2\0\0\0\1"
 def _read_freesurfer_surface(path: Path) -> RawSurface:
     """Return vertices (mm) and faces of a FreeSurfer file such as lh.pial, their space and structure.
 
-    Its coordinates are relative to the centre of a volume (tkr RAS), unless it is marked as in scanner space. They are
-    transformed to scanner space by the volume's geometry at the end of the file; without it they stay relative to that
-    centre, with a warning.
+    From the volume's centre (tkr RAS) they go to scanner space by the geometry at the end of the file, if it is there.
     """
     # its warnings are about missing geometry, which is reported
     with warnings.catch_warnings(action="ignore", category=UserWarning):
@@ -421,11 +396,8 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
 
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "GIFTI": _read_gifti_surface,
-    "VTK": _read_vtk_surface,
-    "STL": _read_with_trimesh,
-    "PLY": _read_with_trimesh,
-    "OBJ": _read_with_trimesh,
-    "OFF": _read_with_trimesh,
+    "VTK": lambda path: (*read_vtk(path), None, None),
+    **dict.fromkeys(("STL", "PLY", "OBJ", "OFF"), _read_with_trimesh),
     "FreeSurfer": _read_freesurfer_surface,
 }
 """The reader of each format of surfaces."""

@@ -1,9 +1,8 @@
 """Tetrahedral meshes as XDMF with HDF5, the form that ParaView and dolfinx read. Files hold mm.
 
-The start mesh of a run stands in one file with its regions, which ParaView shows as two blocks: `mesh`, the elements
-with all fields and tags, and `facets`, the pial triangles with theirs. dolfinx reads the mesh by `read_mesh()`, and
-tags by `read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: a second domain, which ParaView leaves out, has a grid for
-each tag, since dolfinx before 0.10 reads a grid's first tag only.
+A run's start mesh has its regions in one file, for ParaView as two blocks: `mesh`, the elements with fields and tags,
+and `facets`, the pial triangles. dolfinx reads tags by `read_meshtags(mesh, NAME, xpath="/Xdmf/Domain[2]")`: this
+second domain has a grid for each tag, since dolfinx before 0.10 reads a grid's first only.
 """
 
 from collections.abc import Iterable, Mapping
@@ -75,10 +74,7 @@ def write_tetrahedral_mesh(
 
 
 def read_tetrahedral_mesh(path: AnyPath) -> TetrahedralMesh:
-    """Read a mesh written by `write_tetrahedral_mesh` to `path`, from its .h5 file.
-
-    InputError where the file cannot be read, or holds points that are not numbers, or flat or inverted elements.
-    """
+    """Read a mesh of `write_tetrahedral_mesh`; InputError for other files, and flat or inverted elements."""
     data = Path(path).with_suffix(".h5")
     with reading_hdf5(data, "a tetrahedral mesh", "XDMF with its .h5 file") as file:
         mesh = TetrahedralMesh(file["vertices"][:], file["tets"][:])
@@ -95,8 +91,7 @@ Tags = Mapping[str, NDArray[np.int32]]
 class Regions:
     """A tetrahedral mesh in mm with (f, 3) facets of its boundary, and fields (n,) or (n, 3) at its vertices by name.
 
-    Tags are (m,) of the elements and (f,) of the facets, by name; a name in both is read by dolfinx from the grid
-    `facet_NAME` for the facets.
+    Tags by name are (m,) of elements and (f,) of facets, which dolfinx reads as `facet_NAME` if both have the name.
     """
 
     mesh: TetrahedralMesh

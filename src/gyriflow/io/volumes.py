@@ -56,14 +56,6 @@ class LabelVolume:
         return {int(number): int(count) * voxel_ml for number, count in zip(numbers, voxels, strict=True)}
 
 
-@dataclass(frozen=True, eq=False)
-class ScalarVolume:
-    """The (i, j, k) values of the voxels, NaN if undefined, and the (4, 4) affine to RAS+ mm."""
-
-    values: Floats
-    affine: Floats
-
-
 class LabelSource(NamedTuple):
     """A file of tissue labels, which of NIfTI's two matrices counts, and what its labels mean."""
 
@@ -78,12 +70,10 @@ class LabelSource(NamedTuple):
 
 
 def read_label_volume(path: AnyPath, affine_from: AffineSource = "auto", *, cropped: bool = False) -> LabelVolume:
-    """Return the label volume of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
+    """Return the label volume of a NIfTI or MGH file, in RAS+ mm, ending a voxel beyond its labels if `cropped`.
 
-    A `cropped` one ends a voxel beyond its labels, so that an empty border takes no memory.
-
-    `affine_from` selects one of NIfTI's two matrices; "auto" takes the one that is set and refuses two that disagree.
-    InputError for missing or truncated files, non-integer values, NaN, and ambiguous orientation.
+    `affine_from` selects one of NIfTI's matrices; "auto" takes the one that is set and refuses two that disagree.
+    InputError for invalid files, non-integer values, NaN, and ambiguous orientation.
     """
     values, affine = read_values(path, affine_from, "labels")
     if cropped:
@@ -104,10 +94,7 @@ def _without_empty_border(values: NDArray[np.number], affine: Floats) -> tuple[N
 
 
 class VolumeHeader(NamedTuple):
-    """The numbers of voxels along three axes, their sizes in mm, the unit of length ("unknown": mm) and the space.
-
-    The space is the name of a NIfTI code, such as "scanner" or "mni"; MGH has mm and scanner space always.
-    """
+    """Numbers of voxels along three axes, their sizes in mm, the unit ("unknown": mm) and space, such as "mni"."""
 
     shape: tuple[int, ...]
     voxel_mm: tuple[float, ...]
@@ -129,16 +116,25 @@ def read_header(path: AnyPath) -> VolumeHeader:
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
 
-    `content` names the values in messages: "labels". InputError for missing or truncated files, other numbers
-    of axes, unclear orientation.
+    `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
     """
     image = _load(path, content)
     with reading(path, "an image", _expected(content)):
         if nib.is_proxy(image.dataobj):
             _require_its_size(image, path)
         values = _stored_values(image, path)
-    values = _three_axes(values, path, content)
-    return values, _checked_affine(np.array(_affine(image, affine_from, path), dtype=float), path)
+    shape = tuple(n for axis, n in enumerate(values.shape) if axis < 3 or n != 1)
+    if len(shape) != 3 or values.dtype.kind not in "biuf":
+        form, problem = f"shape {values.shape}, type {values.dtype}", f"is not a volume of {content}"
+        expected = "three axes (further ones of length 1) of numbers"
+        raise InputError(problem, path=path, found=form, expected=expected)
+    affine = np.array(_affine(image, affine_from, path), dtype=float)
+    sizes = np.linalg.norm(affine[:3, :3], axis=0)
+    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
+        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
+    if sizes.max() > ANISOTROPY_WARNED * sizes.min():
+        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
+    return values.reshape(shape), affine
 
 
 VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}
@@ -159,14 +155,10 @@ def _expected(content: str) -> str:
     return f"a whole volume of {content} ({', '.join(VOLUME_SUFFIXES)})"
 
 
-def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> ScalarVolume:
-    """Return the values of a NIfTI or MGH file, in RAS+ mm whatever its units and storage order.
-
-    `affine_from` as in `read_label_volume`. InputError for missing or truncated files, more than three axes that are
-    longer than 1, unclear orientation.
-    """
+def read_volume_map(path: AnyPath, affine_from: AffineSource = "auto") -> tuple[Floats, Floats]:
+    """Return (i, j, k) values of a NIfTI or MGH file, NaN if undefined, and the affine, as `read_label_volume`."""
     values, affine = read_values(path, affine_from, "numbers")
-    return ScalarVolume(values.astype(float), affine)
+    return values.astype(float), affine
 
 
 def write_label_volume(path: AnyPath, volume: LabelVolume) -> None:
@@ -280,24 +272,6 @@ def _length_unit(header: nib.Nifti1Header, path: AnyPath) -> str:
         problem, expected = "has a unit of length that is not in NIfTI", "2 (mm), 1 (metres), 3 (micrometres) or 0"
         raise InputError(problem, path=path, found=f"xyzt_units {code}", expected=expected)
     return unit
-
-
-def _checked_affine(affine: Floats, path: AnyPath) -> Floats:
-    sizes = np.linalg.norm(affine[:3, :3], axis=0)
-    if not np.isfinite(affine).all() or abs(np.linalg.det(affine[:3, :3])) < 1e-6 * sizes.prod() or not sizes.all():
-        raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
-    if sizes.max() > ANISOTROPY_WARNED * sizes.min():
-        log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
-    return affine
-
-
-def _three_axes(values: NDArray, path: AnyPath, content: str) -> NDArray:
-    shape = values.shape
-    shape3d = tuple(n for axis, n in enumerate(shape) if axis < 3 or n != 1)
-    if len(shape3d) != 3 or values.dtype.kind not in "biuf":
-        form, expected = f"shape {shape}, type {values.dtype}", "three axes (further ones of length 1) of numbers"
-        raise InputError(f"is not a volume of {content}", path=path, found=form, expected=expected)
-    return values.reshape(shape3d)
 
 
 def _whole_numbers(values: NDArray, path: AnyPath) -> NDArray[np.int32]:

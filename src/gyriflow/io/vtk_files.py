@@ -19,10 +19,7 @@ LEGACY_POLYGONS = re.compile(rb"\s*POLYGONS\s+(\d+)\s+(\d+)\s*?\n")
 
 
 def read_vtk(path: Path) -> tuple[NDArray, NDArray]:
-    """Return the (n, 3) points and (m, 3) triangles of a VTK surface (.vtk, .vtp).
-
-    InputError if it holds something else or its reader crashes.
-    """
+    """Return (n, 3) points and (m, 3) triangles of a VTK surface (.vtk, .vtp); InputError for other content."""
     if arrays := _little_endian_surface(path.read_bytes()):
         return arrays
     process = subprocess.run(

@@ -23,9 +23,8 @@ MAX_SURFACE_STEP = 0.05
 def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Return a linear mesh whose flattest elements are improved; the mesh itself if none is flat.
 
-    A vertex of a flat element is moved to or from the opposite face, or along the line between its middle edges, if
-    that raises the least radius ratio of all elements around the vertex, none of which is inverted. Vertices of the
-    surface move less than a twentieth of an edge.
+    A vertex is moved from the opposite face or along the line between middle edges if that raises the least radius
+    ratio around it; vertices of the surface move less than a twentieth of an edge.
     """
     flat = np.flatnonzero(radius_ratios(mesh) < MIN_RADIUS_RATIO)
     if not 0 < len(flat) <= MAX_FLAT:
@@ -37,14 +36,10 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
         for _ in range(ROUNDS):
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break
-            moves = [
-                move
-                for vertex in mesh.tets[element]
-                if (move := _best_move(vertices, mesh.tets, element, vertex, on_surface))
-            ]
-            if not moves:
+            moves = [_best_move(vertices, mesh.tets, element, vertex, on_surface) for vertex in mesh.tets[element]]
+            if not any(moves):
                 break
-            _, vertex, place = max(moves, key=lambda move: move[0])
+            _, vertex, place = max(filter(None, moves), key=lambda move: move[0])
             vertices[vertex] = place
     improved = TetrahedralMesh(vertices, mesh.tets)
     before, after = (float(radius_ratios(m)[flat].min()) for m in (mesh, improved))

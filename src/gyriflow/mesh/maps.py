@@ -16,8 +16,7 @@ log = logging.getLogger(__name__)
 
 FARTHEST_MM = 5.0
 QUANTILE = 0.95
-"""The surface of a map may be this far from this part of the mesh's surface: pial, white and midthickness surfaces of
-the same brain are nearer, and a few places where one of them is cut differently do no harm."""
+"""A map's surface may be this far from the mesh's: all surfaces of one brain are nearer, but where they are cut."""
 NEIGHBOURS = 8
 TIE = 1e-9
 """Relative difference below which two distances count as equal."""
@@ -28,12 +27,10 @@ def vertex_map_on_mesh(
 ) -> Floats:
     """Return a map on a surface as (n,) values at the vertices of a mesh.
 
-    A vertex on the mesh's own surface takes the value at the nearest point of the surface, linear in its triangle; an
-    inner vertex takes that of the nearest vertex on the mesh's surface, ties going to smaller coordinates.
-
-    `mesh_vertices_mm` (n, 3) and the outer facets `pial_facets` (f, 3) are the mesh's; `values` (k,) are at the
-    vertices of `surface`, which is in the mesh's coordinates, of any number of pieces. InputError, with the map's
-    `path`, where a twentieth of the mesh's surface is more than 5 mm from the map's.
+    Vertices on the mesh's surface, of `pial_facets` (f, 3), take the value at the nearest point of `surface`, linear in
+    its triangles; inner ones that of the nearest of these vertices, ties going to smaller coordinates. All is in the
+    mesh's coordinates. InputError, with the `path`, where a twentieth of the mesh's surface is more than 5 mm from the
+    map's.
     """
     pial = np.unique(pial_facets)
     points = mesh_vertices_mm[pial]
@@ -54,9 +51,8 @@ def vertex_map_on_mesh(
 def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike, path: str | None = None) -> Floats:
     """Return a volume's (n,) values at the vertices of a mesh, linear between the centres of voxels.
 
-    In the outer half of the outermost voxels the value is constant outwards. `data` are (i, j, k), `affine` (4, 4)
-    leads to the mesh's coordinates. InputError, with the volume's `path`, if vertices lie outside it, or between
-    voxels with NaN or infinite values.
+    `data` are (i, j, k), `affine` (4, 4) leads to the mesh's coordinates. InputError, with the volume's `path`, if
+    vertices lie outside it, or between voxels with NaN or infinite values.
     """
     matrix = np.asarray(affine, dtype=float)
     index = np.linalg.solve(matrix[:3, :3], (mesh_vertices_mm - matrix[:3, 3]).T).T
@@ -78,10 +74,7 @@ def volume_map_on_mesh(mesh_vertices_mm: Floats, data: Floats, affine: ArrayLike
 
 
 def require_within(values: Floats, bounds: Mapping[str, float], path: str) -> None:
-    """Raise InputError where values of a map are not within the bounds (gt, ge, le) of its parameter.
-
-    `values` are (n,) at the vertices of the mesh, in the unit of the parameter.
-    """
+    """Raise InputError where (n,) values of a map are not within the bounds (gt, ge, le) of its parameter."""
     holds = {"gt": np.greater, "ge": np.greater_equal, "le": np.less_equal}
     signs = {"gt": ">", "ge": "≥", "le": "≤"}
     outside = ~np.logical_and.reduce([holds[name](values, bound) for name, bound in bounds.items()])

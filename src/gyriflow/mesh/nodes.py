@@ -1,7 +1,6 @@
-"""Quadratic elements whose outer nodes are moved onto the smooth surface.
+"""Quadratic elements whose outer nodes are moved onto the smooth surface, as far as elements stay sound.
 
-Facets are bumps of the size of an element, and bumps grow with the cortex: nodes on the middles of outer edges would
-keep them. A node goes to the nearest place of the surface only as far as its elements stay sound.
+Facets are bumps of the size of an element, which grow with the cortex if nodes stay on the middles of edges.
 """
 
 import logging
@@ -9,11 +8,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..geometry import tetrahedra
 from ..geometry.jacobians import coefficients
 from ..geometry.matching import faces_that_cross, nearest_on
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, quadratic, signed_volumes
+from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Mask, TriangleMesh, edges, face_normals, vertex_normals
-from .quality import jacobian_ratios, radius_ratios
+from .quality import jacobian_ratios
 
 log = logging.getLogger(__name__)
 MIN_NORMAL_COSINE = 0.5
@@ -30,18 +30,19 @@ WORSE = 0.5
 
 
 def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh:
-    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth surface where they can.
+    """Return a linear mesh as quadratic elements whose outer nodes lie on a smooth surface (mm) where they can.
 
-    Corners move first, with straight sides; then the nodes on the middles of outer edges leave their chords. Where
-    an element would become unsound, or the surface of the mesh cross itself, moves are halved and then given up. The
-    surface is closed and outward, near to that of the mesh; both are in mm.
+    Corners move first, with straight sides; then nodes on the middles of outer edges. Where an element would become
+    unsound, or the surface cross itself, moves are halved and then given up.
     """
-    before = radius_ratios(mesh)
+    before = tetrahedra.radius_ratios(mesh)
 
     def spoilt(placed: TetrahedralMesh) -> Mask:
-        return np.asarray((signed_volumes(placed) <= 0) | (radius_ratios(placed) < WORSE * before))
+        return np.asarray(
+            (tetrahedra.signed_volumes(placed) <= 0) | (tetrahedra.radius_ratios(placed) < WORSE * before)
+        )
 
-    straight = quadratic(_move(mesh, *_project(mesh, surface), spoilt)[0])
+    straight = tetrahedra.quadratic(_move(mesh, *_project(mesh, surface), spoilt)[0])
     target, way = _project(straight, surface)
     middles = way & (np.arange(len(way)) >= len(mesh.vertices))
 
@@ -53,14 +54,14 @@ def curve_edges(mesh: TetrahedralMesh, surface: TriangleMesh) -> TetrahedralMesh
     log.info(
         "quadratic elements: %d of %d nodes on middles of outer edges on the surface, least ratio of Jacobians %.2f",
         int(left.sum()),
-        int((np.unique(boundary_faces(straight)[0]) >= len(mesh.vertices)).sum()),
+        int((np.unique(tetrahedra.boundary_faces(straight)[0]) >= len(mesh.vertices)).sum()),
         jacobian_ratios(result).min(),
     )
     return result
 
 
 def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask]:
-    boundary, outer = boundary_surface(mesh)
+    boundary, outer = tetrahedra.boundary_surface(mesh)
     distance, face, place = nearest_on(boundary.vertices, surface)
     ends, _ = edges(boundary)
     length = np.linalg.norm(np.diff(boundary.vertices[ends], axis=1)[:, 0], axis=1)
@@ -78,7 +79,7 @@ def _move(
     mesh: TetrahedralMesh, target: Floats, way: Mask, unsound: Callable[[TetrahedralMesh], Mask]
 ) -> tuple[TetrahedralMesh, Mask]:
     part = way.astype(float)
-    triangles, _ = boundary_faces(mesh)
+    triangles, _ = tetrahedra.boundary_faces(mesh)
     used, local = np.unique(triangles, return_inverse=True)
     faces = local.reshape(-1, 3)
     crossed = faces_that_cross(TriangleMesh(mesh.vertices[used], faces))

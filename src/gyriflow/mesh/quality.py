@@ -11,25 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
+from ..geometry import tetrahedra, triangles
 from ..geometry.jacobians import lower_bounds
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance
-from ..geometry.tetrahedra import (
-    MIN_RADIUS_RATIO,
-    TetrahedralMesh,
-    boundary_surface,
-    radius_ratios,
-    signed_volumes,
-)
-from ..geometry.triangles import (
-    Floats,
-    TriangleMesh,
-    area,
-    corners,
-    face_areas,
-    face_normals,
-    mean_edge_length,
-    signed_volume,
-)
+from ..geometry.tetrahedra import MIN_RADIUS_RATIO, TetrahedralMesh
+from ..geometry.triangles import Floats, TriangleMesh
 
 QUANTILE = 0.99
 GAP_MM = 3.0
@@ -40,20 +26,19 @@ OFF_MM = 1e-4
 """A ray starts so far above its own face."""
 STILL_OPEN = 0.5
 """A gap counts as kept where so much of its width is left."""
+# in reverse, these are the opposite ones
 SIDES_OF_ELEMENT = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 MIN_JACOBIAN_RATIO = 0.1
 """Least accepted Jacobian determinant of a quadratic element over its mean: 1 straight, 0 folded over."""
 MIN_GAP_KEPT = 0.95
 """Least accepted part of the fissure and other gaps, by the area of their walls, that stays open."""
-OPPOSITE = ((2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1))
 
 
 @dataclass(frozen=True, eq=False)
 class GapWalls:
     """Faces of a closed surface that face a parallel wall across a narrow gap.
 
-    The (g, 3) `middle` of the gap before each face in mm, its unit `normal`, the (g,) `width` to the wall opposite in
-    mm and the `area` of the face in mm².
+    The (g, 3) `middle` of the gap in mm, the face's `normal` and `area` (mm²), and the `width` (g,) to the wall in mm.
     """
 
     middle: Floats
@@ -63,11 +48,10 @@ class GapWalls:
 
 
 def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
-    """Return how far two surfaces are from each target, in mm.
+    """Return how far two surfaces are from each other, in mm.
 
-    `hausdorff99` is the distance within which 99 % of either surface's area lies from the other surface, the larger of
-    both directions; `hausdorff` is the largest distance found. Every face is sampled at the centroids of the four
-    triangles between its corners and the middles of its edges, and for the largest distance at its corners.
+    Within `hausdorff99` lies 99 % of either's area; `hausdorff` is the largest distance. Every face is sampled at the
+    centroids of its four parts, and for the largest distance at its corners.
     """
     ways = [_distances(mesh, target), _distances(target, mesh)]
     return {
@@ -77,24 +61,22 @@ def fidelity(mesh: TriangleMesh, target: TriangleMesh) -> dict[str, float]:
 
 
 def gap_walls(mesh: TriangleMesh) -> GapWalls:
-    """Return the walls of narrow gaps of a closed surface, such as the fissure and sulci.
-
-    From every face's centroid a ray goes outwards; where it meets a parallel wall within 3 mm, there is a gap.
-    """
-    normals = face_normals(mesh)
-    start = corners(mesh).mean(axis=1) + OFF_MM * normals
+    """Return the walls of narrow gaps of a closed surface: rays from centroids meet parallel walls within 3 mm."""
+    normals = triangles.face_normals(mesh)
+    start = triangles.corners(mesh).mean(axis=1) + OFF_MM * normals
     face, distance = _first_hits(mesh, start, normals)
     facing = face >= 0
     facing[facing] = np.einsum("ij,ij->i", normals[facing], normals[face[facing]]) < PARALLEL
     half = 0.5 * distance[facing, None] * normals[facing]
-    return GapWalls(start[facing] + half, normals[facing], OFF_MM + distance[facing], face_areas(mesh)[facing])
+    return GapWalls(
+        start[facing] + half, normals[facing], OFF_MM + distance[facing], triangles.face_areas(mesh)[facing]
+    )
 
 
 def gap_summary(walls: GapWalls) -> dict[str, float | None]:
-    """Return the widths of gaps and the area of their walls.
+    """Return the area of gaps' walls, and below which widths in mm 1 % and half of it lies (None without a gap).
 
-    `percentile1` and `median` are widths in mm below which 1 % and half of the walls' area lies (None where there is
-    no gap; the minimum is not given, since the width is 0 at the bottom of every gap), `area_mm2` is that area.
+    The minimum is not given, since the width is 0 at the bottom of every gap.
     """
     widths: list[float | None] = [None, None]
     if len(walls.width):
@@ -105,8 +87,7 @@ def gap_summary(walls: GapWalls) -> dict[str, float | None]:
 def gap_kept(walls: GapWalls, mesh: TriangleMesh) -> float | None:
     """Return the share of the walls' area before which another surface leaves the gap open; None without a gap.
 
-    It is open where its middle is outside the closed surface `mesh`, and the gap of `mesh` there is at least half as
-    wide.
+    There its middle is outside the closed surface `mesh`, whose gap is at least half as wide.
     """
     if not len(walls.width):
         return None
@@ -130,27 +111,24 @@ def _first_hits(mesh: TriangleMesh, start: Floats, direction: Floats) -> tuple[N
 
 
 def _distances(mesh: TriangleMesh, target: TriangleMesh) -> tuple[Floats, Floats]:
-    a, b, c = corners(mesh).transpose(1, 0, 2)
+    a, b, c = triangles.corners(mesh).transpose(1, 0, 2)
     centroids = [(a + b + c) / 3, (4 * a + b + c) / 6, (a + 4 * b + c) / 6, (a + b + 4 * c) / 6]
     distance, _, _ = nearest_on(np.concatenate([*centroids, mesh.vertices]), target)
-    return distance, np.concatenate([np.tile(face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
+    return distance, np.concatenate([np.tile(triangles.face_areas(mesh) / 4, 4), np.zeros(len(mesh.vertices))])
 
 
 def jacobian_ratios(mesh: TetrahedralMesh) -> NDArray[np.float64]:
-    """Return for each of (m,) elements a lower bound of the determinant of its map, over the mean.
-
-    It is 1 for straight sides with nodes on their middles, and positive only where the element folds over nowhere.
-    """
+    """Return (m,) lower bounds of elements' determinants over the mean: 1 straight, not positive if folded."""
     if mesh.order == 1:
         return np.ones(len(mesh.tets))
-    return lower_bounds(mesh.vertices, mesh.tets) / (6 * signed_volumes(mesh))
+    return lower_bounds(mesh.vertices, mesh.tets) / (6 * tetrahedra.signed_volumes(mesh))
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
     """Return the (m, 6) angles in degrees between the faces at each edge, taken as flat between corners."""
     corner = mesh.vertices[mesh.corners]
     angles = np.empty((len(mesh.tets), 6))
-    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, OPPOSITE, strict=True)):
+    for i, ((a, b), (c, d)) in enumerate(zip(SIDES_OF_ELEMENT, reversed(SIDES_OF_ELEMENT), strict=True)):
         edge = corner[:, b] - corner[:, a]
         first, second = (np.cross(edge, corner[:, k] - corner[:, a]) for k in (c, d))
         sine = np.linalg.norm(np.cross(first, second), axis=1)
@@ -161,28 +139,26 @@ def dihedral_angles(mesh: TetrahedralMesh) -> NDArray[np.float64]:
 def quality_summary(mesh: TetrahedralMesh, surface: TriangleMesh) -> dict[str, Any]:
     """Return counts, extreme and mean qualities, edge lengths and areas of a mesh, ready for JSON.
 
-    `surface` is the one that was filled: `surface_distance_mm` is that of the mesh's surface from it, `volume_change`
-    that of the volume, relative to the one inside it. Of quadratic elements all of them are taken on the triangles
-    between nodes. `gap_mm` holds the gaps of both, and `gap_kept` the share of the
-    given one's gaps that the mesh leaves open, None where it has none (see `fidelity`).
+    `surface` is the one that was filled; distance, change of volume and gaps are relative to it (see `fidelity`).
+    Quadratic elements are measured on the triangles between nodes. `gap_kept` is None without gaps.
     """
-    ratios, angles, volumes = radius_ratios(mesh), dihedral_angles(mesh), signed_volumes(mesh)
-    boundary, _ = boundary_surface(mesh)
+    ratios, angles, volumes = tetrahedra.radius_ratios(mesh), dihedral_angles(mesh), tetrahedra.signed_volumes(mesh)
+    boundary, _ = tetrahedra.boundary_surface(mesh)
     walls = gap_walls(surface)
     return {
         "order": mesh.order,
         "tets": len(mesh.tets),
         "vertices": len(mesh.vertices),
         "pial_faces": len(boundary.faces),
-        "pial_edge_mm": mean_edge_length(boundary),
-        "pial_area_mm2": area(boundary),
-        "smallest_pial_face_mm2": float(face_areas(boundary).min()),
+        "pial_edge_mm": triangles.mean_edge_length(boundary),
+        "pial_area_mm2": triangles.area(boundary),
+        "smallest_pial_face_mm2": float(triangles.face_areas(boundary).min()),
         "crossing_faces": crossing_faces(boundary),
         "surface_distance_mm": fidelity(boundary, surface),
         "gap_mm": {"input": gap_summary(walls), "mesh": gap_summary(gap_walls(boundary))},
         "gap_kept": gap_kept(walls, boundary),
         "volume_mm3": float(volumes.sum()),
-        "volume_change": float(volumes.sum() / signed_volume(surface) - 1),
+        "volume_change": float(volumes.sum() / triangles.signed_volume(surface) - 1),
         "min_radius_ratio": float(ratios.min()),
         "mean_radius_ratio": float(ratios.mean()),
         "median_radius_ratio": float(np.median(ratios)),
@@ -204,12 +180,11 @@ def refuse_bad_mesh(
 ) -> None:
     """Raise MeshError where a mesh with this `quality_summary` passes one of the limits, all of them named.
 
-    For elements the message has the number of bad ones and the worst place. Faces of the mesh's surface that cross
-    each other are always refused. `path` is for the message: where the mesh can be looked at.
+    It has the number of bad elements and the worst place. `path` is where the mesh can be looked at.
     """
     faults = []
     for name, values, least in (
-        ("radius ratio", radius_ratios(mesh), min_radius_ratio),
+        ("radius ratio", tetrahedra.radius_ratios(mesh), min_radius_ratio),
         ("ratio of Jacobians", jacobian_ratios(mesh), MIN_JACOBIAN_RATIO),
     ):
         bad, worst = values < least, values.argmin()

@@ -34,11 +34,7 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 def edge_length_at(
     depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> NDArray[np.float64]:
-    """Return the requested edge length in mm of elements of an order at depths in mm below the surface.
-
-    It is that of the surface down to a depth, and then grows to that of the core. With depth, elements of both orders
-    have the same node distance.
-    """
+    """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both orders are as far apart."""
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 
@@ -46,10 +42,9 @@ def edge_length_at(
 def background_mesh(
     surface: TriangleMesh, surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> tuple[TetrahedralMesh, NDArray[np.float64]]:
-    """Return a regular tetrahedral grid over the inside of the surface and the requested edge length in mm.
+    """Return a regular tetrahedral grid over the inside of the surface and the edge lengths in mm at its vertices.
 
-    The lengths are those at the grid's vertices. fTetWild also fills the box around the surface, with elements that are
-    removed in the end; beyond the grid, which ends a cell from the surface, they are as long as those of the core.
+    fTetWild also fills the box around it with elements as long as those of the core, which are removed in the end.
     """
     spacing = max(2 * surface_edge_mm, 1.0)
     low = surface.vertices.min(axis=0) - spacing
@@ -74,16 +69,11 @@ def tetrahedralise(
 ) -> TetrahedralMesh:
     """Return a tetrahedral mesh of the inside of a closed, outward surface in mm, of one or more components.
 
-    `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside: the edge
-    length of linear elements (`order` 1), half of that of quadratic ones (2), which are curved to follow the surface.
-    So both orders have about as many nodes. The mesher is stopped after `time_limit_s`.
-
-    "pytetwild" (fTetWild) makes a surface of its own within `envelope_mm`, and sizes elements by their depth. "tetgen"
-    keeps its surface exactly, which is the given one remeshed; elements grow from it inwards as fast as their
-    quality allows.
-
-    MeshError where the surface is open or inside out, the mesher fails or takes too long, or its mesh is not the inside
-    of the surface: other components or handles, inverted elements, a volume that differs by more than 5 %.
+    `surface_edge_mm` and `core_edge_mm` are distances of neighbouring nodes at the surface and deep inside, for linear
+    elements (`order` 1) and quadratic ones (2), which are curved to follow the surface. "pytetwild" (fTetWild) makes a
+    surface within `envelope_mm`, and sizes elements by depth; "tetgen" keeps the remeshed surface exactly, and elements
+    grow from it as fast as their quality allows. MeshError where the surface is open or inside out, the mesher fails or
+    takes longer than `time_limit_s`, or its mesh is not the inside of the surface.
     """
     if not is_closed(surface) or signed_volume(surface) <= 0:
         # the mesher would fill holes without a word
@@ -111,10 +101,7 @@ def tetrahedralise(
 
 
 def even_surface(surface: TriangleMesh, edge_mm: float) -> TriangleMesh:
-    """Remesh a surface with even triangles, fit to be the boundary of a mesh as it is.
-
-    MeshError where it cuts itself.
-    """
+    """Remesh a surface with even triangles, fit to bound a mesh as it is; MeshError where it cuts itself."""
     even = remesh(surface, edge_mm)
     crossing = crossing_faces(even)
     if crossing:

@@ -221,9 +221,9 @@ def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path
     values[0, 0, 0] = np.nan
     oblique = rigid(20, -30, 40) @ AFFINE
     metres = np.diag([1e-3, 1e-3, 1e-3, 1.0]) @ oblique
-    volume = read_volume_map(saved(tmp_path / "a.nii.gz", values[..., None], metres, "meter"))
-    np.testing.assert_array_equal(volume.values, values)
-    assert volume.affine == pytest.approx(oblique, abs=1e-5)
+    found, affine = read_volume_map(saved(tmp_path / "a.nii.gz", values[..., None], metres, "meter"))
+    np.testing.assert_array_equal(found, values)
+    assert affine == pytest.approx(oblique, abs=1e-5)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2])

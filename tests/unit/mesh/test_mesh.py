@@ -12,7 +12,13 @@ from shapes import box_mesh, moved, sphere
 
 from gyriflow.errors import MeshError
 from gyriflow.geometry.matching import crossing_faces, nearest_on
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, boundary_surface, signed_volumes
+from gyriflow.geometry.tetrahedra import (
+    TetrahedralMesh,
+    boundary_faces,
+    boundary_surface,
+    radius_ratios,
+    signed_volumes,
+)
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, merged, signed_volume
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import write_surface
@@ -26,7 +32,6 @@ from gyriflow.mesh.quality import (
     gap_walls,
     jacobian_ratios,
     quality_summary,
-    radius_ratios,
     refuse_bad_mesh,
 )
 from gyriflow.mesh.tetrahedralisation import edge_length_at, even_surface, tetrahedralise
