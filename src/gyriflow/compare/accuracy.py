@@ -24,23 +24,12 @@ ATLAS_MARGIN = 0.02
 
 @dataclass(frozen=True)
 class ErrorInTests:
-    """The error of a prediction by tests, as logarithm of predicted over observed.
+    """The error of a prediction by tests of `starts` start brains, as logarithm of predicted over observed.
 
-    Attributes
-    ----------
-    starts
-        Number of start brains with a test.
-    largest
-        Half the width of the interval: the largest error of these starts, about `bias` if it is corrected.
-    bias
-        Mean error of the starts.
-    is_corrected
-        Whether the bias is larger than its error, so that the interval is centred at the value less the bias.
-    coverage
-        Share of starts that such an interval contains at most, by counting: k/(k + 1) for the largest error of k
-        starts, `LEVEL` from `MIN_STARTS` on.
-    is_beyond
-        Whether no test went as far, in weeks predicted or in horizon.
+    `largest` is half the width of the interval: the largest error of these starts, about `bias`, their mean error, if
+    it is larger than its own error (`is_corrected`). `coverage` is the share of starts that such an interval contains
+    at most, by counting: k/(k + 1) for the largest error of k starts, `LEVEL` from `MIN_STARTS` on. `is_beyond`: no
+    test went as far, in weeks predicted or in horizon.
     """
 
     starts: int
@@ -188,11 +177,8 @@ def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple
 def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week: float) -> dict[str, Any]:
     """Describe the errors of tests for the report of a prediction of a week.
 
-    Returns
-    -------
-    dict
-        errors: by metric, the words of its tested error; held: by metric, how often intervals held when each start was
-        left out; advantage: a sentence where the atlas' own brain was better, or ""; starts: the tested brains.
+    Returns errors (by metric, the words of its tested error), held (by metric, how often intervals held when each start
+    was left out), advantage (a sentence where the atlas' own brain was better, or "") and starts (the tested brains).
     """
     horizon, errors = week - start_week, {}
     for metric in QUANTITIES:

@@ -49,17 +49,9 @@ GROUPS: tuple[Group, ...] = ("size", "distance", "folds", "quality", "intervals"
 class ObservedBrain:
     """An observed brain that predicted surfaces are compared with.
 
-    Attributes
-    ----------
-    id
-        Its id, or another name of it.
-    surface
-        Its closed pial surface in mm, as it is.
-    prepared
-        The same, prepared for comparison.
-    baselines
-        Brains prepared for comparison with it: `start`, the start brain scaled to its volume, which has no new folds,
-        and `adjacent`, the observed brain of the week before; needed for the intervals.
+    `surface` is its closed pial surface in mm as it is, `prepared` the same prepared for comparison. `baselines` are
+    brains prepared for comparison with it, needed for the intervals: `start`, the start brain scaled to its volume,
+    which has no new folds, and `adjacent`, the observed brain of the week before.
     """
 
     id: str

@@ -36,25 +36,17 @@ def interval_table(
 ) -> pd.DataFrame:
     """Return the intervals of whole brains by week and metric.
 
+    The tables have the metrics (week, hemisphere, metric, value, unit) of the run, of all its members, and of the
+    observed brains of its weeks, which may be empty. `tests` are the rows of `norms/predictions.yaml`, empty if the run
+    is no prediction.
+
     The spread of the members and the largest error of the tests are added in logarithms, as √(spread² + error²), about
     the mean of the members less the bias of the tests if that is corrected. Those of later weeks are never narrower.
 
-    Parameters
-    ----------
-    run, members, observed
-        Metrics with columns week, hemisphere, metric, value, unit; of the run, of all its members, and of the observed
-        brains of its weeks. `observed` may be empty.
-    tests
-        Of a prediction, the rows of `norms/predictions.yaml`; empty if the run is no prediction.
-
-    Returns
-    -------
-    DataFrame
-        Columns week, metric, unit, run (its value), members (number of values), mean, sd (NaN for one), tested_starts,
-        largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without tests), is_corrected, coverage (share
-        of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of further members without tests),
-        low, high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
-        there.
+    Columns week, metric, unit, run (its value), members (number of values; one that did not reach a week has none),
+    mean, sd (NaN for one), tested_starts, largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without
+    tests), is_corrected, coverage (share of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of
+    further members without tests), low, high, observed (NaN without a brain) and contains_observed.
     """
     keys = ["week", "metric"]
     own, varied, brains = (
@@ -97,15 +89,10 @@ def ensemble_maps(
 ) -> dict[str, Floats]:
     """Return maps (n,) of the spread of an ensemble at the vertices of a run's hemisphere.
 
-    Vertices of `members` correspond to those of the run. Positions are compared after a rigid alignment with the run.
-    `shape_indices` (n,) are those of the run and of the members.
-
-    Returns
-    -------
-    dict
-        position_sd_mm, the root mean square distance of the members from their mean position, with n − 1, NaN for
-        fewer than two; and sulcus_probability and gyrus_probability, the shares of run and members in which the
-        vertex is sulcus or gyrus.
+    Vertices of `members` correspond to those of the run; `shape_indices` (n,) are those of the run and of the members.
+    position_sd_mm is the root mean square distance of the members, aligned rigidly with the run, from their mean
+    position, with n − 1, NaN for fewer than two; sulcus_probability and gyrus_probability are the shares of run and
+    members in which the vertex is sulcus or gyrus.
     """
     areas = vertex_areas(run)
     motions = [rigid_fit(member.vertices, run.vertices, areas) for member in members]

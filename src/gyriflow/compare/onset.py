@@ -74,21 +74,10 @@ def name_sulci(
 ) -> tuple[Ints, dict[int, str]]:
     """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
 
-    Names are like "left central", then "left central 2" for the second largest part in that region. Parts outside all
-    regions are named by the number of their valley, like "left 4".
-
-    Parameters
-    ----------
-    sulci
-        (n,) numbers of `find_sulci`.
-    labels, names
-        (n,) labels of the vertices, and names of the labels that are regions. Without names, sulci are "left 1" and so
-        on.
-
-    Returns
-    -------
-    tuple
-        (n,) numbers of the parts, 1 for the largest, 0 outside of sulci, and their names.
+    Sulci are the (n,) numbers of `find_sulci`, labels (n,) those of the vertices; `names` are those of labels that are
+    regions. Returns the (n,) numbers of the parts, 1 for the largest, 0 outside of sulci, and their names, like "left
+    central", then "left central 2" for the second largest part in that region. Parts outside all regions are named by
+    the number of their valley, like "left 4".
     """
     areas = vertex_areas(mesh)
     named_labels = np.where(np.isin(labels, list(names)), labels, 0)
@@ -135,21 +124,10 @@ def onset_table(
     sulci: NDArray[np.integer],
     names: Mapping[int, str],
 ) -> pd.DataFrame:
-    """Find the week when each sulcus of the last observed brain appears in a series of surfaces.
+    """Find the week when each sulcus of the last observed brain appears in a series of surfaces, as `find_onset`.
 
-    Parameters
-    ----------
-    surfaces
-        A hemisphere by week, in mm.
-    carried
-        For each week the same hemisphere with its vertices carried onto the last observed brain.
-    last, sulci, names
-        Hemisphere of the last observed brain, and the result of `find_named_sulci` on it.
-
-    Returns
-    -------
-    DataFrame
-        As `find_onset`.
+    `surfaces` are a hemisphere by week in mm, and `carried` the same with vertices carried onto the last observed
+    brain. `sulci` and `names` are the result of `find_named_sulci` on the `last` brain's hemisphere.
     """
     reliefs = {}
     for (week, mesh), on_last in zip(surfaces.items(), carried, strict=True):

@@ -46,20 +46,10 @@ class Resampling:
     Folds run across borders of patches, but the modes of a random map are independent. If the brain is its own mirror
     image, the modes are those of its left half with a free rim, and both sides are drawn together.
 
-    Attributes
-    ----------
-    areas : (n,) float
-        Areas of the surface's vertices in mm².
-    sides
-        m points of the surface; if it is symmetric m points of its left half, and their mirror images on the right.
-    side_areas : (m,) float
-        Areas of these points in mm².
-    basis : (m, v) sparse float and (v, k) float
-        Their product has the k modes at the points, orthonormal by area, in the order of their wavelengths.
-    patch : (m,) int
-        Patch of each point.
-    asymmetry_mm
-        Mean distance of the brain from its mirror image.
+    `areas` (n,) of the vertices and `side_areas` (m,) are in mm². `sides` are m points of the surface; if it is
+    symmetric m points of its left half, and their mirror images on the right. The product of `basis`, (m, v) and (v,
+    k), has the k modes at the points, orthonormal by area, in the order of their wavelengths; `patch` (m,) is the patch
+    of each point, and `asymmetry_mm` the mean distance of the brain from its mirror image.
     """
 
     areas: Floats
@@ -167,12 +157,9 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
 def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float | str]:
     """Compare correlations and their bootstrap samples with those of the start brain and of the week before.
 
-    Returns
-    -------
-    dict
-        r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed brain
-        of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
-        interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
+    Columns r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed
+    brain of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
+    interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
     """
     gain, headroom = r - r_start, r_adjacent - r_start
     has_headroom = interval_of(headroom)[1] > 0

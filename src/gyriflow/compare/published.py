@@ -68,12 +68,8 @@ def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTa
     """Return the nearest runs by each measure for which the paper also reports a nearest value.
 
     The paper compares with other brains (a normal atlas). Its spectra are of the shape index, cut at Weyl's number.
-
-    Returns
-    -------
-    DataFrame
-        study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
-        run), run, distance, flag, paper (value that the paper reports), place (in the paper).
+    Columns study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
+    run), run, distance, flag, paper (value that the paper reports), place (in the paper).
     """
     columns = ["subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run", "distance", "flag"]
     tables = [pd.DataFrame(columns=["study", *columns, "paper", "place"])]
@@ -102,26 +98,11 @@ def replication_table(
 ) -> pd.DataFrame:
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
-    Parameters
-    ----------
-    published
-        Content of `fetalfoldsim.yaml`.
-    displacement
-        Rows of one run, with the columns from_week, to_week, nodes, max_mm, mean_mm.
-    sweeps
-        If the sweep of a result is not among them, its verdict is `NOT_RUN`.
-    summary
-        `summary.json` of the same run as the displacement.
-    costs
-        Power and carbon intensity for the costs of the run.
-    rates, used_rate
-        Growth rates from surface areas (columns from_week, to_week, rate_per_s), and the rate used by the same run.
-    from_back
-        `place_of_largest` of the displacement from 24 to 25 GW.
-    mirror_mm
-        `mirror_distance` of the start brain's hemispheres.
-    surfaces
-        Whole pial surfaces of observed brains by id.
+    `published` is the content of `fetalfoldsim.yaml`; the verdict on a result whose sweep is not among `sweeps` is
+    `NOT_RUN`. Of one run are `displacement` (from_week, to_week, nodes, max_mm, mean_mm), its `summary.json`, and the
+    growth rate that it used; `rates` are those from surface areas (from_week, to_week, rate_per_s). `from_back` is
+    `place_of_largest` of the displacement from 24 to 25 GW, `mirror_mm` the `mirror_distance` of the start brain's
+    hemispheres, `surfaces` the whole pial surfaces of observed brains by id.
 
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.

@@ -30,16 +30,10 @@ MAX_VOXELS = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class PreparedSurface:
-    """A surface prepared for comparison, with the curvature at its n vertices.
+    """A closed surface in mm with even triangles, prepared for comparison, with the curvature at its n vertices.
 
-    Attributes
-    ----------
-    mesh
-        Closed surface in mm with even triangles.
-    mean_curvature : (n,) float
-        In 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`.
-    shape_index : (n,) float
-        From −1, a pit, to 1.
+    `mean_curvature` (n,) is in 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`; `shape_index` (n,) is from
+    −1, a pit, to 1.
     """
 
     mesh: TriangleMesh

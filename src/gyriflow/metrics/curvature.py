@@ -168,15 +168,9 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     like an integral and does not depend on the mesh. The weight falls to zero at the rim, and vertices whose normal
     differs by more than 90° do not count. The tangent plane is that of the weighted mean of the normals.
 
-    Returns
-    -------
-    coefficients : (n, 6) float
-        Of z = a x² + b x y + c y² + d x + e y + f: a, b, c in 1/mm, d, e without unit, f in mm; z along the outward
-        normal. 0 where nothing could be fitted.
-    fitted : (n,) bool
-        False where the neighbours do not determine a quadric.
-    one_sided : (n,) bool
-        True where the ball holds a vertex of the boundary of an open surface.
+    Returns the (n, 6) coefficients of z = a x² + b x y + c y² + d x + e y + f in mm, z along the outward normal, 0
+    where nothing could be fitted; whether (n,) the neighbours determine a quadric; and whether (n,) the ball holds a
+    vertex of the boundary of an open surface.
     """
     links, boundary = _links(mesh)
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)

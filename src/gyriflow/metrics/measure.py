@@ -257,30 +257,17 @@ def measure_brain(
     spangy_modes: SpangyModes = SPANGY_MODES,
     spangy_mass: MassMatrix = "mean",
 ) -> BrainMetrics:
-    """Measure a brain.
+    """Measure a brain by its closed pial surface, outward, in mm, and the pial surfaces of its hemispheres.
 
-    A cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
-    curvature within `curvature_radius_mm` of it out of the means. Except for volume and area, values of the whole
-    are those of both hemispheres: Σ area over Σ area of the hulls, and means over both.
+    A hemisphere is closed, or open where a connected brain is cut at the fissure; None if the brain does not have it. A
+    cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
+    curvature within `curvature_radius_mm` of it out of the means. Except for volume and area, values of the whole are
+    those of both hemispheres: Σ area over Σ area of the hulls, and means over both.
 
-    Parameters
-    ----------
-    whole
-        The closed pial surface, outward, in mm.
-    left, right
-        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure; None for a
-        hemisphere that the brain does not have.
-    thickness_mm : (n,) float
-        Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
-    label_volumes_ml
-        Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
-    curvature_radius_mm, spangy_modes, spangy_mass
-        See `curvature.curvature` and `spangy.spectral_basis`.
-
-    Raises
-    ------
-    MeshError
-        Where a surface looks inwards, or a hemisphere is not in one piece.
+    `thickness_mm` (n,) is the cortical thickness at the vertices of `whole`, NaN where it was not measured, None where
+    it is not known; `label_volumes_ml` are the volumes of the labels inside the surface, of which those of
+    `LABEL_VOLUMES` become metrics of the whole. See `curvature.curvature` and `spangy.spectral_basis` for the others.
+    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     _require_outward(whole, *meshes.values())
