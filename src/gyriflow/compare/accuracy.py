@@ -1,7 +1,7 @@
 """Errors of predictions in tests, and the intervals that follow from them. The unit is the start brain."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,10 +86,8 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
         for earlier in weeks[weeks <= week_limit]
         for shorter in horizons[horizons <= horizon_limit]
     ]
-    last = smaller[-1]
-    half = max(found.largest for found in smaller)
     is_beyond = bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6)
-    return ErrorInTests(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
+    return replace(smaller[-1], largest=max(found.largest for found in smaller), is_beyond=is_beyond)
 
 
 def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
@@ -105,10 +103,10 @@ def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests
     for number, values in enumerate(errors):
         others, others_corrected = _bias(np.delete(means, number))
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
+    rank, coverage = len(largest), count / (count + 1)
     if count >= MIN_STARTS:
-        rank = int(np.ceil(round((count + 1) * LEVEL, 6)))
-        return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
-    return ErrorInTests(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
+        rank, coverage = int(np.ceil(round((count + 1) * LEVEL, 6))), LEVEL
+    return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, coverage, is_beyond=False)
 
 
 def _bias(means: Floats) -> tuple[float, bool]:
@@ -123,12 +121,11 @@ def error_words(metric: str, tested: ErrorInTests) -> str:
     """Describe a tested error, such as "largest error of 2 tests, −10 to +11 %: 2 in 3 brains at most"."""
     low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
     ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
-    starts = f"{tested.starts} test{'s' if tested.starts > 1 else ''}"
-    if tested.starts < MIN_STARTS:
-        words = f"largest error of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
-        words += f": {tested.starts} in {tested.starts + 1} brains at most"
-    else:
-        words = f"{100 * LEVEL:.0f} % of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
+    is_few = tested.starts < MIN_STARTS
+    words = "largest error" if is_few else f"{100 * LEVEL:.0f} %"
+    words += f" of {tested.starts} test{'s' if tested.starts > 1 else ''}, {ends} %"
+    words += " of the folding" if metric == FOLDING else ""
+    words += f": {tested.starts} in {tested.starts + 1} brains at most" if is_few else ""
     if tested.is_corrected:
         words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
     return words + ("; no test went as far" if tested.is_beyond else "")

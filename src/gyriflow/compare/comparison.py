@@ -5,23 +5,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import align
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance, values_at
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    area,
-    area_cm2,
-    edges,
-    signed_volume,
-    vertex_areas,
-    vertex_normals,
-    volume_ml,
-)
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..quantities import COMPARED_MAPS
 from ..settings.terms import CURVATURE_RADIUS_MM
 from .placement import (
@@ -168,20 +158,14 @@ def fold_columns(
 
 def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, float]:
     """Return the sizes of two closed surfaces in mm and their differences, the columns of the group size."""
-    sizes, observed_sizes = (
-        {
-            "area_cm2": area_cm2(mesh),
-            "volume_ml": volume_ml(mesh),
-            "relative_area": area(mesh) / signed_volume(mesh) ** (2 / 3),
-        }
-        for mesh in (predicted, observed)
-    )
-    return {
-        **sizes,
-        **{f"observed_{name}": size for name, size in observed_sizes.items()},
-        "area_difference": sizes["area_cm2"] / observed_sizes["area_cm2"] - 1,
-        "volume_difference": sizes["volume_ml"] / observed_sizes["volume_ml"] - 1,
-    }
+    row = {}
+    for prefix, mesh in (("", predicted), ("observed_", observed)):
+        size, volume = area_cm2(mesh), volume_ml(mesh)
+        values = {"area_cm2": size, "volume_ml": volume, "relative_area": size / volume ** (2 / 3)}
+        row |= {prefix + name: value for name, value in values.items()}
+    for name, unit in (("area", "cm2"), ("volume", "ml")):
+        row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"observed_{name}_{unit}"] - 1
+    return row
 
 
 def pairwise_distances(
@@ -239,10 +223,7 @@ def roughness_mm(mesh: TriangleMesh) -> float:
 
     On surfaces with the same even triangles it measures wrinkles as small as a triangle.
     """
-    first, second = edges(mesh)[0].T
-    sums = np.zeros_like(mesh.vertices)
-    np.add.at(sums, first, mesh.vertices[second])
-    np.add.at(sums, second, mesh.vertices[first])
-    count = np.bincount(np.concatenate([first, second]), minlength=len(sums))
-    offsets: Floats = ((sums / count[:, None] - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
+    links = igl.adjacency_matrix(mesh.faces)
+    means = links @ mesh.vertices / np.asarray(links.sum(axis=1))
+    offsets: Floats = ((means - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
     return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))

@@ -50,14 +50,12 @@ def thickness_difference(
     the week compared, over that of the `simulated_start`, at the same vertices. `fitted` is the expected surface
     deformed to fit the observed one of the week.
     """
+
+    def values_on(mesh: TriangleMesh, surface: TriangleMesh, values: Floats) -> Floats:
+        return values_at(match_surface(mesh, surface), values)
+
     surface, start_mm = simulated_start
-    grown = _values_on(surface, start) * expected_mm / start_mm
-    return _values_on(fitted, observed) - grown
-
-
-def _values_on(mesh: TriangleMesh, thickness: SurfaceThickness) -> Floats:
-    surface, values = thickness
-    return values_at(match_surface(mesh, surface), values)
+    return values_on(fitted, *observed) - values_on(surface, *start) * expected_mm / start_mm
 
 
 def deviation_table(
