@@ -15,6 +15,8 @@ from .accuracy import LEVEL, QUANTITIES, ErrorInTests, error_in_tests, from_log,
 SULCUS, GYRUS = -0.375, 0.375
 """Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
 1992."""
+UNTESTED = ErrorInTests(starts=0, largest=0.0, bias=0.0, is_corrected=False, coverage=LEVEL, is_beyond=False)
+"""The intervals of a run without tests are those of its members."""
 
 
 def spread_of_members(values: Floats, level: float) -> float:
@@ -57,14 +59,15 @@ def interval_table(
         errors, widest = log_errors(tests, str(metric)), 0.0
         for at, group in table.groupby("week")["value"]:
             week = float(str(at))
-            tested = error_in_tests(errors, week, week - start) if week > start else None
-            level = tested.coverage if tested else LEVEL
+            tested = (error_in_tests(errors, week, week - start) if week > start else None) or UNTESTED
             logs = log_value(str(metric), group.to_numpy(dtype=float))
-            half = np.hypot(spread_of_members(logs, level), tested.largest if tested else 0.0)
+            half = np.hypot(spread_of_members(logs, tested.coverage), tested.largest)
             widest = max(widest, half) if np.isfinite(half) else half
-            middle = logs.mean() - (tested.bias if tested and tested.is_corrected else 0.0)
+            middle = logs.mean() - tested.bias * tested.is_corrected
             row = {"week": week, "metric": metric, "members": len(group), "mean": group.mean(), "sd": group.std()}
-            row |= tested_columns(tested) | {"coverage": level}
+            largest, bias = np.expm1([tested.largest, tested.bias]) if tested.starts else (np.nan, np.nan)
+            row |= {"tested_starts": tested.starts, "largest_error": largest, "bias": bias}
+            row |= {"is_corrected": tested.is_corrected, "coverage": tested.coverage}
             low, high = (from_log(str(metric), middle + sign * widest) for sign in (-1, 1))
             rows.append(row | {"low": low, "high": high})
     table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(pd.DataFrame(rows), "left", keys)
@@ -74,14 +77,6 @@ def interval_table(
         members=table["members"].fillna(0).astype(int),
         contains_observed=inside.mask(table["observed"].isna() | table["low"].isna()),
     )
-
-
-def tested_columns(tested: ErrorInTests | None) -> dict[str, float | bool]:
-    """Return the columns of `interval_table` that are about tests."""
-    if tested is None:
-        return {"tested_starts": 0, "largest_error": np.nan, "bias": np.nan, "is_corrected": False}
-    errors = {"largest_error": np.expm1(tested.largest), "bias": np.expm1(tested.bias)}
-    return {"tested_starts": tested.starts, **errors, "is_corrected": tested.is_corrected}
 
 
 def ensemble_maps(

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import norm, t
 
 from ..geometry.alignment import MIRROR, align
-from ..geometry.matching import Match, match_points, match_surface, nearest_on, values_at
+from ..geometry.matching import Match, interpolation, match_points, match_surface, nearest_on, values_at
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, submesh, transformed, vertex_areas, vertex_normals
 from ..metrics.laplace_beltrami import laplacian, modes_below
@@ -124,9 +124,7 @@ def make_resampling(surface: PreparedSurface) -> Resampling:
     sides.insert(0, itself)
     coarse, areas = remesh(mesh, MODE_EDGE_MM), vertex_areas(mesh)
     modes = modes_below(*laplacian(coarse), (2 * np.pi / SHORTEST_MODE_MM) ** 2).functions
-    match, rows = match_surface(mesh, coarse), np.repeat(np.arange(len(areas)), 3)
-    shape = len(areas), len(coarse.vertices)
-    places = sparse.csr_matrix((match.weights.ravel(), (rows, match.corners.ravel())), shape=shape)
+    places = interpolation(match_surface(mesh, coarse), len(coarse.vertices))
     # orthonormal on the finer surface, in the same order
     products = modes.T @ (places.T @ places.multiply(areas[:, None]).tocsr() @ modes)
     modes = solve_triangular(cholesky(products, lower=True), modes.T, lower=True).T

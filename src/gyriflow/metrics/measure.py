@@ -102,11 +102,9 @@ def surface_spectra(
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    maps = {name: curvature(mesh, radius_mm=curvature_radius_mm) for name, mesh in meshes.items()}
     return _band_table(
-        {
-            name: hemisphere_spectra(mesh, curvature(mesh, radius_mm=curvature_radius_mm), spangy_modes, spangy_mass)
-            for name, mesh in meshes.items()
-        }
+        {name: hemisphere_spectra(mesh, maps[name], spangy_modes, spangy_mass) for name, mesh in meshes.items()}
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -42,17 +42,9 @@ SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "c
 """Columns of `measured_scores` that follow the value and its unit."""
 
 
-class Norm(Protocol):
-    """The distribution of a quantity by week."""
-
-    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-        """Return z of values (n,) at weeks, and its 90 % interval (2, n), NaN if it is unknown."""
-
-    def values(self, weeks: ArrayLike, z: float) -> Floats:
-        """Return the values with a z at weeks (n,)."""
-
-
-def _scored(norm: Norm, week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)) -> dict[str, Any]:
+def _scored(
+    norm: "PublishedNorm | WeeklyNorm", week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)
+) -> dict[str, Any]:
     """Return the first eight of `SCORES`, with centiles between the given ones."""
     low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
     z, interval = norm.scores([week], [value])
@@ -204,7 +196,7 @@ class CohortNorms:
 
     @property
     def hemispheres(self) -> str:
-        """The hemispheres of its brains, as of `_hemispheres_of`."""
+        """The hemispheres of its brains."""
         return " ".join(sorted({hemisphere for hemisphere, _ in self.norms}))
 
     def volumes_ml(self, weeks: Sequence[float]) -> Floats:
@@ -273,8 +265,11 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
-    is_comparable = same_sides(metrics, reference) if len(reference) else _hemispheres_of(metrics) == cohort.hemispheres
-    table = _with_norm(metrics.assign(is_comparable=is_comparable))
+    # the whole of a brain with one hemisphere is that hemisphere: it has half of the volume and area of others
+    sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
+    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    expected = sides[is_reference] if len(reference) else [cohort.hemispheres]
+    table = _with_norm(metrics.assign(is_comparable=sides.isin(expected)))
     rows = []
     for row in table.to_dict("records"):
         key = row["hemisphere"], row["metric"]
@@ -320,20 +315,6 @@ def _score(
     return score | {"flag": "few brains" if is_small else "ok"}
 
 
-def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
-    """Return for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
-
-    The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
-    """
-    sides = _hemispheres_of(metrics)
-    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    return sides.isin(sides[is_reference])
-
-
-def _hemispheres_of(metrics: pd.DataFrame) -> pd.Series:
-    return metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
-
-
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
     """Return the rows with a value of a metric that has norms, with the column person."""
     has_norm = metrics["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
@@ -357,11 +338,11 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
     for (hemisphere, metric), (unit, norm) in cohort.norms.items():
         weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
-        interval = norm.median_interval(weeks)
-        band = {"week": weeks, "brains": norm.subjects, "expected": expected}
-        band |= {"expected_low": interval[0], "expected_high": interval[1]}
-        spread = {"sd": 0.5 * (high - low)}
-        spread |= {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
-        band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
-        parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
+        band = {"hemisphere": hemisphere, "metric": metric, "unit": unit, "week": weeks, "brains": norm.subjects}
+        band |= zip(
+            ("expected", "expected_low", "expected_high"), (expected, *norm.median_interval(weeks)), strict=True
+        )
+        spread = {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        spread |= {"sd": 0.5 * (high - low)}
+        parts.append(pd.DataFrame(band | (spread if cohort.individuals else dict.fromkeys(spread, np.nan))))
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

@@ -12,12 +12,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-from ..geometry.matching import match_surface
+from ..geometry.matching import interpolation, match_surface
 from ..geometry.remeshing import decimate
-from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, vertex_areas
 from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
 from .curvature import kept_curvature
-from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, lumped, modes_below
+from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand
 
@@ -123,18 +123,14 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     """
     stiffness, matrix = laplacian(mesh, mass)
     first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
-    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
+    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(vertex_areas(mesh)))
     by_name = isinstance(choice, str)
     end = float(band_limits(first)[int(str(choice)[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
     needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
-        match, columns = match_surface(mesh, copy), len(copy.vertices)
-        rows = np.repeat(np.arange(len(mesh.vertices)), 3)
-        places = sparse.csr_matrix(
-            (match.weights.ravel(), (rows, match.corners.ravel())), (len(mesh.vertices), columns)
-        )
+        places = interpolation(match_surface(mesh, copy), len(copy.vertices))
         stiffness, matrix = laplacian(copy, mass)
     number = stiffness.shape[0] // 2
     if by_name and (count := count_below(stiffness, matrix, end)) <= number:
