@@ -96,22 +96,17 @@ def compare(
     `radius_mm` is that of the fitted curvature. Sizes and distances are of the surfaces as they are, aligned rigidly;
     folds are compared after scaling to the observed volume.
 
-    Returns
-    -------
-    row
-        Columns by group:
+    Returns a row with the columns of each group, and with intervals the bootstrap samples of distance_mm and r_… after
+    their values, (1 + N_DRAWS,) each, drawn alike for all surfaces that are compared with this observed brain.
 
-        - size: area_cm2, volume_ml, relative_area (A/V^⅔), the same of the observed brain (observed_…), and
-          area_difference and volume_difference from it, as fractions of its own;
-        - distance: `surface_distances` and cortex_dice;
-        - folds: r_… of each of `COMPARED_MAPS`, matched_share (share of the observed area with a matching point) and
-          `shapes.curvature_differences`;
-        - quality: crossing_faces, and roughness_ratio to the observed surface;
-        - intervals: distance_mm_low and …_high, and with baselines `placement.gain_columns` of each map (gain_…,
-          gain_low_…); asymmetry_mm of the observed brain, is_symmetric and resampled.
-    samples
-        With intervals, the bootstrap samples of distance_mm and r_… after their values, (1 + N_DRAWS,) each, drawn
-        alike for all surfaces that are compared with this observed brain.
+    - size: area_cm2, volume_ml, relative_area (A/V^⅔), the same of the observed brain (observed_…), and area_difference
+      and volume_difference from it, as fractions of its own;
+    - distance: `surface_distances` and cortex_dice;
+    - folds: r_… of each of `COMPARED_MAPS`, matched_share (share of the observed area with a matching point) and
+      `shapes.curvature_differences`;
+    - quality: crossing_faces, and roughness_ratio to the observed surface;
+    - intervals: distance_mm_low and …_high, and with baselines `placement.gain_columns` of each map (gain_…,
+      gain_low_…); asymmetry_mm of the observed brain, is_symmetric and resampled.
     """
     row: dict[str, Any] = {}
     samples: dict[str, Floats] = {}

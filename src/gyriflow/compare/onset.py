@@ -138,18 +138,14 @@ def onset_table(
 
 def measure_relief(
     mesh: TriangleMesh, depth_mm: Floats, sulci: NDArray[np.integer], names: Mapping[int, str]
-) -> pd.DataFrame:
-    """Measure how deep each sulcus is below its neighbouring crowns.
+) -> dict[str, float]:
+    """Return by name how deep in mm each sulcus is below its neighbouring crowns; NaN for sulci without vertices.
 
-    `depth_mm` (n,) is the depth of the vertices below the hull or envelope. Columns: region, bottom_mm, crown_mm,
-    relief_mm (bottom − crown); NaN for sulci without vertices.
+    `depth_mm` (n,) is the depth of the vertices below the hull or envelope.
     """
-    areas = vertex_areas(mesh)
-    rows = []
+    areas, reliefs = vertex_areas(mesh), dict.fromkeys(names.values(), np.nan)
     for number, name in names.items():
-        inside = sulci == number
-        if not inside.any():
-            rows.append((name, np.nan, np.nan, np.nan))
+        if not (inside := sulci == number).any():
             continue
         tree = cKDTree(mesh.vertices[inside])
         distances, _ = tree.query(mesh.vertices, distance_upper_bound=CROWN_DISTANCE_MM)
@@ -157,20 +153,20 @@ def measure_relief(
             float(np.quantile(depth_mm[part], share, weights=areas[part], method="inverted_cdf"))
             for part, share in ((inside, BOTTOM_QUANTILE), (np.isfinite(distances), CROWN_QUANTILE))
         )
-        rows.append((name, bottom, crown, bottom - crown))
-    return pd.DataFrame(rows, columns=["region", "bottom_mm", "crown_mm", "relief_mm"])
+        reliefs[name] = bottom - crown
+    return reliefs
 
 
-def find_onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
-    """Find the week when each sulcus appears, from tables of `measure_relief` by week.
+def find_onset(reliefs: Mapping[float, Mapping[str, float]]) -> pd.DataFrame:
+    """Find the week when each sulcus appears, from the reliefs of `measure_relief` by week.
 
     That is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly from the week before (not interpolated
     if the relief of the week before is NaN). Columns: region, there_at_start, onset_week (NaN if the sulcus was present
     at the start or never appears), first_relief_mm, last_relief_mm.
     """
     weeks, rows = sorted(reliefs), []
-    for name, table in pd.concat([reliefs[week] for week in weeks]).groupby("region", sort=False):
-        depths = table["relief_mm"].to_numpy(dtype=float)
+    for name in reliefs[weeks[0]]:
+        depths = np.array([reliefs[week][name] for week in weeks])
         reached = np.flatnonzero(depths >= MIN_DEPTH_MM)
         week = np.nan
         if len(reached) and reached[0] > 0:

@@ -5,7 +5,7 @@ Normals are outward, so that gyri are positive and sulci negative.
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,7 @@ _MONOMIALS = sorted({(a + c, b + d) for a, b in _POWERS for c, d in _POWERS})
 _NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS])
 
 
-@dataclass(frozen=True, eq=False)
-class Curvature:
+class Curvature(NamedTuple):
     """Curvature per vertex of a surface with n vertices, and the (n,) radius of the ball that each is fitted in.
 
     `maximum` and `minimum` (n,) are the principal curvatures κ1 ≥ κ2 in 1/mm, both 1/R on a sphere of radius R.
@@ -82,9 +81,8 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
-    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning
-    where it is more than a tenth larger. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
-    neighbourhood.
+    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning if it is more than a
+    tenth larger. MeshError where a vertex in a hundred has no usable neighbourhood.
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
     if finest > NOT_MUCH_LARGER * radius_mm:
@@ -117,14 +115,10 @@ def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
 def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:
     """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
 
-    intrinsic_curvature_index
-        1/4π ∫ max(K, 0) dA; 1 for all convex surfaces (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102).
-    folding_index
-        1/4π ∫ |k₁|(|k₁| − |k₂|) dA; 0 for a sphere (the same).
-    mean_curvature_norm
-        The L² norm 1/4π ∫ H² dA; 1 for a sphere (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
-    gaussian_curvature_norm
-        The L² norm 1/4π √(A ∫ K² dA) with A the area; 1 for a sphere (the same).
+    intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and folding_index 1/4π ∫ |k₁|(|k₁| −
+    |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm
+    1/4π ∫ H² dA and gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere (Batchelor et al.
+    2002, IEEE Trans. Med. Imaging 21, 953-965).
     """
     smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
     integrals = {
@@ -141,13 +135,6 @@ def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, f
     values = np.quantile(curvature.mean, QUANTILES, weights=areas, method="inverted_cdf")
     names = (f"mean_curvature_q{round(100 * share):02d}" for share in QUANTILES)
     return dict(zip(names, map(float, values), strict=True))
-
-
-def join(curvatures: list[Curvature]) -> Curvature:
-    """Return the curvature of surfaces side by side."""
-    return Curvature(
-        *(np.concatenate([getattr(part, field.name) for part in curvatures]) for field in fields(Curvature))
-    )
 
 
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
@@ -172,7 +159,10 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     where nothing could be fitted; whether (n,) the neighbours determine a quadric; and whether (n,) the ball holds a
     vertex of the boundary of an open surface.
     """
-    links, boundary = _links(mesh)
+    (pairs, uses), size = edges(mesh), len(mesh.vertices)
+    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
+    links = sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size))
+    boundary = np.isin(np.arange(size), pairs[uses == 1])
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
         _fit(mesh.vertices, normals, areas, radii_mm, centres, balls, boundary)
@@ -180,15 +170,6 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     ]
     coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*fits, strict=True))
     return coefficients, fitted, one_sided
-
-
-def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
-    pairs, uses = edges(mesh)
-    size = len(mesh.vertices)
-    boundary = np.zeros(size, dtype=bool)
-    boundary[pairs[uses == 1]] = True
-    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
-    return sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size)), boundary
 
 
 def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:

@@ -28,7 +28,7 @@ from ..geometry.triangles import (
 from ..quantities import METRICS, WHITE_METRICS
 from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES, MassMatrix
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
+from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, mean_curvature_quantiles
 from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth
 from .spangy import SpangyModes, Spectrum, spectral_basis, spectrum, weyl_number
 from .thickness import at_part
@@ -139,7 +139,7 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
-    curvature_maps = join([side.curvature_maps for side in sides])
+    curvature_maps = Curvature(*map(np.concatenate, zip(*(side.curvature_maps for side in sides), strict=True)))
     weights = areas * curvature_maps.reliable
     if not weights.any():
         reason = "every vertex has the edge of the surface within its radius"
@@ -268,7 +268,10 @@ def measure_brain(
     MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
-    _require_outward(whole, *meshes.values())
+    for mesh in (whole, *meshes.values()):
+        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
+            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
+            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
     folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in meshes.items()}
     spectra = {
         name: hemisphere_spectra(part.mesh, part.curvature_maps, spangy_modes, spangy_mass)
@@ -307,13 +310,6 @@ def measure_brain(
         spectra=_band_table(spectra),
         coefficients=pd.concat([_mode_table(name, part) for name, part in spectra.items()], ignore_index=True),
     )
-
-
-def _require_outward(*meshes: TriangleMesh) -> None:
-    for mesh in meshes:
-        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
-            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
-            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
 
 
 def measure_white(

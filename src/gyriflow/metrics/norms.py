@@ -339,9 +339,8 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
         weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
         band = {"hemisphere": hemisphere, "metric": metric, "unit": unit, "week": weeks, "brains": norm.subjects}
-        band |= zip(
-            ("expected", "expected_low", "expected_high"), (expected, *norm.median_interval(weeks)), strict=True
-        )
+        first, last = norm.median_interval(weeks)
+        band |= {"expected": expected, "expected_low": first, "expected_high": last}
         spread = {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
         spread |= {"sd": 0.5 * (high - low)}
         parts.append(pd.DataFrame(band | (spread if cohort.individuals else dict.fromkeys(spread, np.nan))))
