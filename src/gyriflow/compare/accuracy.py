@@ -142,16 +142,14 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         errors = log_errors(tests, metric)
         for start, own in errors.groupby("start"):
             others = errors[errors["start"] != start]
-            places = own[["week", "horizon"]].to_numpy(dtype=float)
-            found = [error_in_tests(others, week, horizon) for week, horizon in places]
-            inside = [
-                abs(error - interval.bias * interval.is_corrected) <= interval.largest
-                for error, interval in zip(own["error"], found, strict=True)
-                if interval
+            tested = [
+                (error, interval)
+                for week, horizon, error in own[["week", "horizon", "error"]].to_numpy(dtype=float)
+                if (interval := error_in_tests(others, week, horizon))
             ]
-            if inside:
-                at_most = max(interval.coverage for interval in found if interval)
-                rows.append((metric, start, len(inside), sum(inside), at_most))
+            held = sum(abs(error - part.bias * part.is_corrected) <= part.largest for error, part in tested)
+            if tested:
+                rows.append((metric, start, len(tested), held, max(part.coverage for _, part in tested)))
     return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
 
 

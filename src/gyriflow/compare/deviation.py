@@ -16,9 +16,7 @@ from ..settings.terms import MEASURED
 
 SMOOTHING_MM = 3.0
 """Standard deviation of the Gaussian that smooths areas before they are compared."""
-
 SCORES = ["expected", "sd", "z", "centile", "brains", "flag"]
-
 type SurfaceThickness = tuple[TriangleMesh, Floats]
 """A pial surface in mm, and the (n,) cortical thickness at its vertices in mm."""
 

@@ -24,13 +24,11 @@ from ..metrics.gyrification import sulcal_depth
 
 MIN_DEPTH_MM = 2.0
 """A sulcus is present if it is at least this deep below its neighbouring crowns."""
-
 CROWN_DISTANCE_MM = 10.0
 """Distance from a sulcus within which its neighbouring crowns are searched for."""
 
 MIN_AREA_MM2 = 40.0
 """Smallest area of a valley that counts as a sulcus."""
-
 BOTTOM_QUANTILE, CROWN_QUANTILE = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a sulcus and for the crowns around it."""
 

@@ -28,7 +28,6 @@ MODES_PER_BLOCK = 12
 """Successive modes that are drawn among each other, so that each sample has the power of all wavelengths."""
 PATCH_EDGE_MM = 20.0
 """Width of the patches in which distances are resampled: wider than a gyrus with its sulcus."""
-
 N_DRAWS = 2000
 """Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
@@ -160,7 +159,7 @@ def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, fl
     interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
     """
     gain, headroom = r - r_start, r_adjacent - r_start
-    has_headroom = interval_of(headroom)[1] > 0
+    has_headroom = with_interval("", headroom)["_low"] > 0
     share = gain / headroom if has_headroom else np.full_like(gain, np.nan)
     row: dict[str, float | str] = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
     for name, draws in {"r": r, "gain": gain, "headroom": headroom, "gain_share": share}.items():
@@ -169,14 +168,9 @@ def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, fl
 
 
 def with_interval(name: str, draws: Floats) -> dict[str, float]:
-    """Return a statistic and the ends of its 95 % interval by column: `name`, `name`_low, `name`_high."""
-    return dict(zip((name, f"{name}_low", f"{name}_high"), interval_of(draws), strict=True))
-
-
-def interval_of(draws: Floats) -> tuple[float, float, float]:
-    """Return a statistic, the first of (1 + k,) draws, and its 95 % interval, from the other k."""
+    """Return the first of (1 + k,) draws and the ends of its 95 % interval, from the others, by column."""
     low, high = (float("nan"),) * 2 if np.isnan(draws).all() else np.nanquantile(draws[1:], INTERVAL)
-    return float(draws[0]), float(low), float(high)
+    return {name: float(draws[0]), f"{name}_low": float(low), f"{name}_high": float(high)}
 
 
 def mirror_image(surface: PreparedSurface) -> tuple[TriangleMesh, float]:

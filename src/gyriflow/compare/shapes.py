@@ -17,13 +17,10 @@ from ..settings.terms import CURVATURE_RADIUS_MM
 
 EDGE_MM = 1.0
 """Edge length after remeshing."""
-
 MAX_CURVATURE_PER_MM = 1.0
 """Limit of mean curvature, which is clipped: larger values come from single sharp edges."""
-
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
-
 MAX_VOXELS = 1 << 20
 """Largest number of voxels along a direction."""
 

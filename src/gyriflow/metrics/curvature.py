@@ -21,20 +21,15 @@ RESOLVED_RADII = 4.0
 deep as long, by 21 % for shallow ones; by 17 and 43 % at 2.6 radii, by 58 and 74 % at 1.7."""
 
 log = logging.getLogger(__name__)
-
 EDGES_PER_RADIUS = 2.0
 """Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
 NOT_MUCH_LARGER = 1.1
 """A radius that is so many times larger than that asked for is used without a warning."""
-
 MAX_FAILED_SHARE = 0.01
-
 CHUNK = 1024
 """Vertices worked on at once: the arrays of their neighbours then stay in the processor's cache."""
-
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Shares of the area at which its distribution over mean curvature is given."""
-
 _POWERS = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
 _MONOMIALS = sorted({(a + c, b + d) for a, b in _POWERS for c, d in _POWERS})
 _NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS])
@@ -144,10 +139,7 @@ def _edge_lengths(mesh: TriangleMesh) -> Floats:
     return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
 
 
-type Quadrics = tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]
-
-
-def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
+def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
 
     The ball contains the vertices that edges inside it link to its centre, so not the other wall of a sulcus. The
@@ -165,7 +157,7 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     boundary = np.isin(np.arange(size), pairs[uses == 1])
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
-        _fit(mesh.vertices, normals, areas, radii_mm, centres, balls, boundary)
+        (*_fit(mesh.vertices, normals, areas, radii_mm, centres, balls), balls @ boundary)
         for centres, balls in _balls(mesh.vertices, radii_mm, links)
     ]
     coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*fits, strict=True))
@@ -191,14 +183,8 @@ def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iter
 
 
 def _fit(
-    vertices: Floats,
-    normals: Floats,
-    areas: Floats,
-    radii_mm: Floats,
-    centres: Ints,
-    balls: sparse.csr_matrix,
-    boundary: NDArray[np.bool_],
-) -> Quadrics:
+    vertices: Floats, normals: Floats, areas: Floats, radii_mm: Floats, centres: Ints, balls: sparse.csr_matrix
+) -> tuple[Floats, NDArray[np.bool_]]:
     near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
     offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
@@ -228,4 +214,4 @@ def _fit(
     coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[..., 0]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
-    return coefficients, fitted, balls @ boundary
+    return coefficients, fitted

@@ -14,12 +14,9 @@ from ..settings.terms import MassMatrix
 
 TOLERANCE = 1e-11
 """Of the residual of a mode, relative to its eigenvalue."""
-
 MODES_PER_SLICE = 100
 """Eigenvalues that SLEPc looks for round each shift; from 60 to 200 it matters little."""
-
 SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
-
 DENSE_VERTICES = 1000
 """Up to this size LAPACK solves the problem as a whole."""
 

@@ -35,7 +35,6 @@ from .thickness import at_part
 
 type Metrics = dict[str, float]
 """Values by the names of their records, in their units."""
-
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
 

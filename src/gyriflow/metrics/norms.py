@@ -19,23 +19,17 @@ from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
-
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
-
 FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
 """With fewer subjects, centiles end at these, and norms without one of them are fitted again."""
-
 MAX_ONE_STEP_Z = 1.5
 """Other norms are fitted again without a subject that is beyond this z or has several scans; else it is removed by one
 Newton step."""
-
 MIN_SPREAD = 1e-6
 """Smallest spread of a norm over its values for which there are scores."""
-
 CURVE_POINTS = 41
 """Number of points of a norm's curve."""
-
 OTHER_SIDES = "other hemispheres"
 """Flag of a brain whose hemispheres are not those of the reference brains."""
 SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag")

@@ -23,19 +23,15 @@ type SpangyModes = int | LastBand
 
 BANDS = 6
 """The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
-
 PARTS = 16
 """Parts of a band, each a sixteenth of an octave of wavelength, whose powers are given for distances of spectra."""
 PART_POWERS = [f"power_{part:02d}of{PARTS}" for part in range(1, PARTS + 1)]
-
 HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 """The columns that name a hemisphere in the tables of a study."""
 OPEN_AND_CLOSED = "open and closed hemispheres"
 """Flag of a distance between an open hemisphere and a closed one: closing a cut makes L 5 to 7 % shorter."""
-
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
-
 VERTICES_PER_WAVELENGTH = 8.0
 """Edges per shortest wave on the surface that modes are computed on; `benchmarks/spectra.py` compares other numbers."""
 LONGEST_EDGE_MM = 1.8
