@@ -108,13 +108,8 @@ def surface_spectra(
 
 
 def _band_table(spectra: Mapping[str, Mapping[str, Spectrum]]) -> pd.DataFrame:
-    rows = [
-        part.bands.assign(hemisphere=name, proxy=proxy)
-        for name, parts in spectra.items()
-        for proxy, part in parts.items()
-    ]
-    table = pd.concat(rows, ignore_index=True)
-    return table[list(dict.fromkeys(["hemisphere", "proxy", *table.columns]))]
+    rows = {(name, proxy): part.bands for name, parts in spectra.items() for proxy, part in parts.items()}
+    return pd.concat(rows, names=["hemisphere", "proxy"]).reset_index([0, 1]).reset_index(drop=True)
 
 
 def _mode_table(name: str, spectra: Mapping[str, Spectrum]) -> pd.DataFrame:

@@ -95,58 +95,6 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     return norms
 
 
-def structure_volumes(
-    volumes: Mapping[int, float], scheme: LabelScheme, norms: Mapping[str, PublishedNorm]
-) -> tuple[dict[str, float], list[str]]:
-    """Return the volumes of the structures of published norms, and the structures measured with another label scheme.
-
-    `volumes` are by label, in the norms' unit. With another scheme than the norm's, a structure is the scheme's tissue
-    that is closest to it, such as the cortex. A structure without voxels, or without labels in the scheme, is left out.
-    """
-    structures, substitutes = {}, []
-    for name, norm in norms.items():
-        same = norm.scheme == scheme.name
-        labels = norm.labels if same else getattr(scheme, norm.tissue, ())
-        total = sum(volumes.get(label, 0.0) for label in labels)
-        if total > 0:
-            structures[name] = total
-            substitutes += [] if same else [name]
-    return structures, substitutes
-
-
-def published_scores(
-    volumes: Mapping[str, float],
-    week: float,
-    norms: Mapping[str, PublishedNorm],
-    substitutes: Sequence[str] = (),
-    sides: Sequence[Side] = SIDES,
-) -> pd.DataFrame:
-    """Return the scores of the volumes of a brain against published norms.
-
-    `volumes` are by structure, in the norms' unit; structures without a norm are left out. `substitutes` are the
-    structures measured with another label scheme than the norm's, `sides` the hemispheres of the brain.
-
-    Columns structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution,
-    0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other labels": the norm
-    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain lacks a hemisphere
-    of the norm). Expected, z and centile are NaN with the last two flags.
-    """
-    rows = []
-    for name, value in volumes.items():
-        if name not in norms:
-            continue
-        norm = norms[name]
-        flag = "other labels" if name in substitutes else "ok"
-        if len(sides) < len(SIDES) and norm.side not in sides:
-            flag = "one hemisphere"
-        elif not norm.weeks[0] <= week <= norm.weeks[1]:
-            flag = "outside the norm's weeks"
-        row = {"structure": name, "week": week, "value": value, "unit": norm.unit, "brains": norm.subjects}
-        rows.append(row | {"flag": flag} | (_scored(norm, week, value) if flag in {"ok", "other labels"} else {}))
-    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
-    return pd.DataFrame(rows, columns=columns).astype({"brains": float})
-
-
 @dataclass(frozen=True)
 class LabelledBrain:
     """A measured brain, the volume in mL of each of its labels, and the label scheme."""
@@ -158,22 +106,50 @@ class LabelledBrain:
     volumes: Mapping[int, float]
 
 
+def published_scores(brain: LabelledBrain, norms: Mapping[str, PublishedNorm]) -> pd.DataFrame:
+    """Return the scores of the volumes of a brain's structures against published norms.
+
+    With another label scheme than the norm's, a structure is the scheme's tissue that is closest to it, such as the
+    cortex. A structure without voxels, or without labels in the scheme, is left out.
+
+    Columns subject, structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal
+    distribution, 0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other
+    labels": the norm was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain
+    lacks a hemisphere of the norm). Expected, z and centile are NaN with the last two flags.
+    """
+    rows = []
+    for name, norm in norms.items():
+        is_same = norm.scheme == brain.scheme.name
+        labels = norm.labels if is_same else getattr(brain.scheme, norm.tissue, ())
+        value = sum(brain.volumes.get(label, 0.0) for label in labels)
+        if value <= 0:
+            continue
+        flag = "ok" if is_same else "other labels"
+        if len(brain.sides) < len(SIDES) and norm.side not in brain.sides:
+            flag = "one hemisphere"
+        elif not norm.weeks[0] <= brain.week <= norm.weeks[1]:
+            flag = "outside the norm's weeks"
+        row = {"structure": name, "value": value, "unit": norm.unit, "brains": norm.subjects, "flag": flag}
+        rows.append(row | (_scored(norm, brain.week, value) if flag in {"ok", "other labels"} else {}))
+    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
+    table = pd.DataFrame(rows, columns=["subject", *columns]).astype({"brains": float})
+    return table.assign(subject=brain.subject, week=brain.week)
+
+
 def volume_tables(
     brains: Sequence[LabelledBrain], norms: Mapping[str, PublishedNorm]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the volumes of all labels of brains, and their scores against published norms.
+    """Return the volumes of all labels of brains, and their `published_scores`.
 
-    Columns subject, run ("real"), week, label, tissue, volume_mL; subject and those of `published_scores`.
+    Columns subject, run ("real"), week, label, tissue, volume_mL.
     """
-    rows, scores = [], []
-    for brain in brains:
-        columns = brain.subject, MEASURED, brain.week
-        rows += [(*columns, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
-        found, substitutes = structure_volumes(brain.volumes, brain.scheme, norms)
-        scored = published_scores(found, brain.week, norms, substitutes, brain.sides)
-        scores.append(scored.assign(subject=brain.subject)[["subject", *scored.columns]])
-    volumes = pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"])
-    return volumes, pd.concat(scores, ignore_index=True)
+    rows = [
+        (brain.subject, MEASURED, brain.week, label, brain.scheme.labels.get(label, ""), volume)
+        for brain in brains
+        for label, volume in brain.volumes.items()
+    ]
+    scores = pd.concat([published_scores(brain, norms) for brain in brains], ignore_index=True)
+    return pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"]), scores
 
 
 @dataclass(frozen=True)
