@@ -90,8 +90,8 @@ def ensemble_maps(
     members in which the vertex is sulcus or gyrus.
     """
     areas = vertex_areas(run)
-    motions = [rigid_fit(member.vertices, run.vertices, areas) for member in members]
-    aligned = [transform_points(member.vertices, motion) for member, motion in zip(members, motions, strict=True)]
+    shapes = [member.vertices for member in members]
+    aligned = [transform_points(shape, rigid_fit(shape, run.vertices, areas)) for shape in shapes]
     values, spread = np.stack(shape_indices), np.full(run.vertices.shape, np.nan)
     if len(members) > 1:
         spread = np.var(aligned, axis=0, ddof=1)

@@ -76,13 +76,8 @@ class Resampling:
         return draw_units([*map(len, blocks), patches])
 
     def coordinates(self, values: Floats) -> Floats:
-        """Return coordinates of a map (n,) less its mean, whose scalar products are those of maps over the area.
-
-        A map that is constant to rounding has coordinates 0.
-        """
+        """Return coordinates of a map (n,) less its mean, whose scalar products are those of maps over the area."""
         centred = values - np.average(values, weights=self.areas)
-        if centred @ (self.areas * centred) <= 1e-12 * (values @ (self.areas * values)):
-            centred = np.zeros_like(values)
         places, functions = self.basis
         parts = []
         for side in self.sides:
@@ -98,13 +93,13 @@ class Resampling:
         Samples are spread as Student's t of as many units as the power of `truth` comes from, Σp²⁻¹ of the shares p.
         """
         r = correlation(truth, values, self.areas)
+        if np.isnan(r):
+            return np.full(1 + N_DRAWS, np.nan)
         x, y = self.coordinates(truth), self.coordinates(values)
         sums = np.stack([np.bincount(self.units, product) for product in (x * x, y * y, x * y)], axis=1)
         xx, yy, xy = (self.drawn @ sums).T
-        has_both = (xx > 0) & (yy > 0)
-        drawn = np.where(has_both, xy / np.sqrt(np.where(has_both, xx * yy, 1.0)), np.nan)
-        shares = sums[:, 0] / max(sums[:, 0].sum(), np.finfo(float).tiny)
-        freedom = max(1 / max((shares**2).sum(), np.finfo(float).tiny) - 2, 1.0)
+        drawn, shares = xy / np.sqrt(xx * yy), sums[:, 0] / sums[:, 0].sum()
+        freedom = max(1 / (shares**2).sum() - 2, 1.0)
         spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
         # about r, since the sides of a symmetric brain are not exactly equal
         return np.append(r, r + spread * (drawn[1:] - drawn[0]))

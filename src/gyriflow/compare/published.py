@@ -71,14 +71,24 @@ def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTa
     Columns study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
     run), run, distance, flag, paper (value that the paper reports), place (in the paper).
     """
-    columns = ["subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run", "distance", "flag"]
-    tables = [pd.DataFrame(columns=["study", *columns, "paper", "place"])]
+    columns = [
+        "study",
+        "subject",
+        "observed",
+        "hemisphere",
+        "measure",
+        "parameter",
+        "nearest",
+        "run",
+        "distance",
+        "flag",
+    ]
+    tables = [pd.DataFrame(columns=[*columns, "paper", "place"])]
     for entry in published["nearest"]:
         for name, sweep in sweeps.items():
             if sweep.repeats(entry):
                 rows = sweep.nearest[sweep.nearest["measure"].str.removesuffix("_weyl") == entry["measure"]]
-                rows = rows.assign(parameter=entry["parameter"], nearest=rows[entry["parameter"]])[columns]
-                rows.insert(0, "study", name)
+                rows = rows.assign(study=name, parameter=entry["parameter"], nearest=rows[entry["parameter"]])[columns]
                 tables.append(rows.assign(paper=entry["value"], place=entry["place"]))
     return pd.concat(tables[1:] or tables, ignore_index=True)
 
@@ -239,10 +249,9 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         return f"{holds.sum()} of {len(holds)} runs{text}", _verdict(holds)
     shares = _cut_shares(sweep.comparison)
     if check == "most_B4":
-        finer = shares[["B5", "B6"]].max(axis=1)
-        holds = (shares["B4"] > finer)[shares["B4"].notna() & finer.notna()]
+        margin = shares["B4"] - shares[["B5", "B6"]].max(axis=1)
     elif check == "little_B6":
-        holds = shares["B6"].dropna() < MAX_WEAK_SHARE
+        margin = MAX_WEAK_SHARE - shares["B6"]
     elif check in ("right_B4", "left_B5_B6"):
         if mirror_mm is None or mirror_mm <= MAX_MIRROR_MM:
             found = "one hemisphere" if mirror_mm is None else f"hemispheres are mirror images to {mirror_mm:.2f} mm"
@@ -250,16 +259,13 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         if not {"right", "left"} <= set(shares.index.get_level_values("hemisphere")):
             return NO_BANDS, NOT_TESTABLE
         right, left = (shares.xs(side, level="hemisphere") for side in ("right", "left"))
-        if check == "right_B4":
-            difference = right["B4"] - left["B4"]
-        else:
-            difference = pd.concat([left[band] - right[band] for band in ("B5", "B6")])
-        holds = difference.dropna() > SHARE_TOL
+        fine = [left[band] - right[band] for band in ("B5", "B6")]
+        margin = pd.concat([right["B4"] - left["B4"]] if check == "right_B4" else fine) - SHARE_TOL
     else:
         is_observed = shares.index.get_level_values("brain").str.startswith(OBSERVED)
         smallest = shares.loc[is_observed, "B5"].groupby("hemisphere").min()
-        margin = (smallest - shares.loc[~is_observed, "B5"].groupby("hemisphere").max()).dropna()
-        holds = margin > 0
+        margin = smallest - shares.loc[~is_observed, "B5"].groupby("hemisphere").max()
+    holds = margin.dropna() > 0
     if holds.empty:
         return NO_BANDS, NOT_TESTABLE
     text = f"{holds.sum()} of {len(holds)} cases"

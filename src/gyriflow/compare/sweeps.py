@@ -28,14 +28,15 @@ WITHIN_NOISE = "within noise of the next"
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 _VALUES = ("value", "observed_value")
-DISTANCE_COLUMNS = ("hemisphere", "measure", *_VALUES, "distance", "unit", "flag")
 PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
     *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
 )
 """Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim paper."""
-LABELS = ("subject", "run", "observed", "observed_population", "same_population")
-COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
+COMPARISON_COLUMNS = [
+    *("subject", "run", "observed", "observed_population", "same_population"),
+    *("hemisphere", "measure", *_VALUES, "distance", "unit", "flag"),
+]
 
 Parts = Mapping[str, TriangleMesh]
 """Surfaces of a brain in mm: the "whole" and its hemispheres."""
@@ -170,7 +171,7 @@ def member_row(
 def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per hemisphere.
 
-    The comparison has the columns subject, run, observed and `DISTANCE_COLUMNS`; members are rows of `member_row`,
+    The comparison has the columns `COMPARISON_COLUMNS`; members are rows of `member_row`,
     whose columns `varied` have the varied values.
 
     Columns subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and
