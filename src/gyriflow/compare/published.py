@@ -71,25 +71,16 @@ def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTa
     Columns study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
     run), run, distance, flag, paper (value that the paper reports), place (in the paper).
     """
-    columns = [
-        "study",
-        "subject",
-        "observed",
-        "hemisphere",
-        "measure",
-        "parameter",
-        "nearest",
-        "run",
-        "distance",
-        "flag",
-    ]
-    tables = [pd.DataFrame(columns=[*columns, "paper", "place"])]
+    columns = ["study", "subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run"]
+    columns += ["distance", "flag", "paper", "place"]
+    tables = [pd.DataFrame(columns=columns)]
     for entry in published["nearest"]:
+        parameter = entry["parameter"]
         for name, sweep in sweeps.items():
             if sweep.repeats(entry):
                 rows = sweep.nearest[sweep.nearest["measure"].str.removesuffix("_weyl") == entry["measure"]]
-                rows = rows.assign(study=name, parameter=entry["parameter"], nearest=rows[entry["parameter"]])[columns]
-                tables.append(rows.assign(paper=entry["value"], place=entry["place"]))
+                rows = rows.assign(study=name, parameter=parameter, nearest=rows[parameter])
+                tables.append(rows.assign(paper=entry["value"], place=entry["place"])[columns])
     return pd.concat(tables[1:] or tables, ignore_index=True)
 
 
