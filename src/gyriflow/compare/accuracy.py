@@ -74,10 +74,8 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
     if errors.empty:
         return None
     weeks, horizons = (np.unique(errors[name]) for name in ("week", "horizon"))
-    week_limit, horizon_limit = (
-        float(min((step for step in steps if step >= value - 1e-6), default=steps[-1]))
-        for steps, value in ((weeks, week), (horizons, horizon))
-    )
+    week_limit = weeks[np.searchsorted(weeks[:-1], week - 1e-6)]
+    horizon_limit = horizons[np.searchsorted(horizons[:-1], horizon - 1e-6)]
     shortest = errors.groupby("week")["horizon"].transform("min")
     smaller = [
         _counted(

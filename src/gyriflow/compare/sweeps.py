@@ -130,17 +130,13 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
         powers = modes[modes["mode"] < cut].set_index("band")["coefficient_shape_index"] ** 2
         power = powers.groupby("band").sum().reindex(range(1, max(FOLD_BANDS) + 1))
         shares[run, subject, side] = power / power.sum() if len(modes) >= cut else power * np.nan
-    flags = comparison.set_index(["run", "subject", "observed", "hemisphere", "measure"])["flag"]
-    rows, resolved = [], []
-    for row in numbers.to_dict("records"):
-        run, subject, brain, side = (row[name] for name in ("run", "subject", "observed", "hemisphere"))
-        for band in FOLD_BANDS:
-            name = f"shape_index_relative_power_B{band}"
-            resolved.append(flags[run, subject, brain, side, name] != NOT_RESOLVED)
-            values = {"value": shares[run, subject, side][band], "observed_value": shares[MEASURED, brain, side][band]}
-            rows.append(row | values | {"measure": f"{name}_weyl"})
-    cut_bands = _with_distance(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.Series(resolved, dtype=bool))
-    return joined_comparisons([comparison, cut_bands])
+    bands = {f"shape_index_relative_power_B{band}": band for band in FOLD_BANDS}
+    rows = comparison[comparison["measure"].isin(bands)]
+    keys = rows[["run", "subject", "hemisphere"]].assign(band=rows["measure"].map(bands))
+    observed_keys = keys.assign(run=MEASURED, subject=rows["observed"])
+    values = (pd.concat(shares).loc[list(pairs.itertuples(index=False))].to_numpy() for pairs in (keys, observed_keys))
+    cut = rows.assign(measure=rows["measure"] + "_weyl", **dict(zip(_VALUES, values, strict=True)))
+    return joined_comparisons([comparison, _with_distance(cut, rows["flag"] != NOT_RESOLVED)])
 
 
 def member_row(

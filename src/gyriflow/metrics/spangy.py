@@ -69,9 +69,7 @@ def weyl_number(area_mm2: float, first: float) -> int:
     WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the FetalFoldSim paper; it is 2π times
     smaller than (2π/WL6)² = 4⁶·λ1, the upper limit of B6.
     """
-    shortest = 2.0 * np.pi / np.sqrt(first) / 2.0**BANDS
-    largest = 2.0 * np.pi / shortest**2
-    return round(area_mm2 * largest / (4.0 * np.pi))
+    return round(area_mm2 * first * 4.0**BANDS / (8.0 * np.pi**2))
 
 
 def band_limits(first: float) -> Floats:
