@@ -167,8 +167,8 @@ def member_row(
 def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per hemisphere.
 
-    The comparison has the columns `COMPARISON_COLUMNS`; members are rows of `member_row`,
-    whose columns `varied` have the varied values.
+    The comparison has the columns `COMPARISON_COLUMNS`; members are rows of `member_row`, whose columns `varied` have
+    the varied values.
 
     Columns subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and
     the distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
