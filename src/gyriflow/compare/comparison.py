@@ -153,7 +153,7 @@ def fold_columns(
 
 def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, float]:
     """Return the sizes of two closed surfaces in mm and their differences, the columns of the group size."""
-    row = {}
+    row: dict[str, float] = {}
     for prefix, mesh in (("", predicted), ("observed_", observed)):
         size, volume = area_cm2(mesh), volume_ml(mesh)
         values = {"area_cm2": size, "volume_ml": volume, "relative_area": size / volume ** (2 / 3)}
