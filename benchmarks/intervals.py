@@ -21,10 +21,10 @@ import numpy as np
 from gyriflow.compare import placement
 from gyriflow.compare.placement import (
     Resampling,
-    interval_of,
     make_resampling,
     mirror_image,
     number_patches,
+    with_interval,
 )
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
 from gyriflow.geometry.matching import match_surface, values_at
@@ -108,7 +108,7 @@ def coverage(sampling: Resampling | Patches, maps: RandomMaps, count: int) -> di
     for _ in range(count):
         truth, *others = (maps.draw() for _ in range(3))
         run, start = (sampling.correlations(truth, R * truth + np.sqrt(1 - R**2) * other) for other in others)
-        (_, low, high), (_, gain_low, gain_high) = interval_of(run), interval_of(run - start)
+        (_, low, high), (_, gain_low, gain_high) = (with_interval("", x).values() for x in (run, run - start))
         found.append((low <= R <= high, gain_low <= 0 <= gain_high, gain_low > 0))
     shares = np.mean(found, axis=0).round(3)
     return dict(zip(("r_held", "gain_held", "gain_above_0"), map(float, shares), strict=True))

@@ -81,7 +81,7 @@ BY_TESTS = {
     ],
     # comparisons and metrics
     "compare/test_placement.py": [
-        ("src/gyriflow/compare/placement.py", "interval_of(headroom)[1] > 0", "headroom[0] > 0"),
+        ("src/gyriflow/compare/placement.py", 'with_interval("", headroom)["_low"] > 0', "headroom[0] > 0"),
         ("src/gyriflow/compare/placement.py", "r_adjacent - r_start\n", "r_adjacent - r\n"),
         ("src/gyriflow/compare/placement.py", "max(size - 1, 1)", "size"),
         ("src/gyriflow/compare/placement.py", "np.sqrt(self.side_areas) * finer", "finer"),
@@ -94,7 +94,7 @@ BY_TESTS = {
         ("src/gyriflow/compare/prediction.py", 'week - labels["start_week"]', "week"),
     ],
     "compare/test_comparison.py": [
-        ("src/gyriflow/compare/comparison.py", '"volume_ml"] / observed_sizes["volume_ml"] - 1', '"volume_ml"] / 100'),
+        ("src/gyriflow/compare/comparison.py", 'row[f"observed_{name}_{unit}"] - 1', "100"),
         (
             "src/gyriflow/compare/comparison.py",
             "float(crossing_faces(predicted))",
@@ -117,16 +117,16 @@ BY_TESTS = {
         ("src/gyriflow/compare/accuracy.py", "np.maximum(shorter, shortest)", "shorter"),
         ("src/gyriflow/compare/accuracy.py", "(count + 1) * LEVEL", "count * LEVEL"),
         ("src/gyriflow/compare/accuracy.py", "abs(means.mean()) > error", "True"),
-        ("src/gyriflow/compare/accuracy.py", "max(found.largest for found in smaller)", "last.largest"),
+        ("src/gyriflow/compare/accuracy.py", "max(found.largest for found in smaller)", "smaller[-1].largest"),
         ("src/gyriflow/compare/accuracy.py", 'rows["start_week"] + rows["horizon"]', 'rows["horizon"]'),
         ("src/gyriflow/compare/accuracy.py", "<= ATLAS_MARGIN", "<= 0"),
         ("src/gyriflow/compare/accuracy.py", 'errors["start"] != start', 'errors["start"] != ""'),
     ],
     "compare/test_ensemble.py": [
         ("src/gyriflow/compare/ensemble.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
-        ("src/gyriflow/compare/ensemble.py", "tested.largest if tested else 0.0", "0.0"),
+        ("src/gyriflow/compare/ensemble.py", "tested.coverage), tested.largest)", "tested.coverage), 0.0)"),
         ("src/gyriflow/compare/ensemble.py", "max(widest, half)", "half"),
-        ("src/gyriflow/compare/ensemble.py", "logs.mean() - (", "logs.mean() + ("),
+        ("src/gyriflow/compare/ensemble.py", "logs.mean() - tested.bias", "logs.mean() + tested.bias"),
     ],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),

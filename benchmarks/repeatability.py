@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.thickness import thickness_from_labels
 from gyriflow.compare.calibration import brain_scores, spectral_scores
-from gyriflow.compare.comparison import aligned_distances
+from gyriflow.compare.comparison import aligned_distances, observed_brain
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.poses import pose_from
 from gyriflow.geometry.triangles import TriangleMesh
@@ -95,7 +95,8 @@ def compare_pair(pair: tuple) -> tuple[dict[str, float], dict[str, float]]:
     """Return the distances between two surfaces of the brain, and the scores of one against the other."""
     (first, found), (second, other) = pair
     distances = aligned_distances(first, second)
-    scores = brain_scores(first, second, SURFACE_SCORES, radius_mm=CURVATURE_RADIUS_MM)
+    observed = observed_brain("", second, CURVATURE_RADIUS_MM)
+    scores = brain_scores(first, observed, SURFACE_SCORES, radius_mm=CURVATURE_RADIUS_MM)
     scores |= spectral_scores(found.spectra, other.spectra)
     return {f"surface_{name}": distances[f"{name}_mm"] for name in ("distance", "distance95")}, scores
 

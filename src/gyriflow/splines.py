@@ -12,12 +12,10 @@ from scipy.interpolate import BSpline
 from scipy.optimize import brentq
 
 log = logging.getLogger(__name__)
-
 type Floats = NDArray[np.float64]
 
 STRENGTHS = (-8.0, 8.0)
 """The range of the logarithm of the penalty's strength."""
-
 FREEDOM_TOL = 0.05
 """Degrees of freedom may miss the wanted ones by this without a warning."""
 

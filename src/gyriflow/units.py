@@ -2,7 +2,6 @@
 
 SECONDS_PER_GW = 604_800.0
 """One gestational week (GW) in seconds."""
-
 M_PER_MM = 1e-3
 MM_PER_M = 1e3
 ML_PER_MM3 = 1e-3

@@ -1,7 +1,7 @@
 """Errors of predictions in tests, and the intervals that follow from them. The unit is the start brain."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,23 +24,12 @@ ATLAS_MARGIN = 0.02
 
 @dataclass(frozen=True)
 class ErrorInTests:
-    """The error of a prediction by tests, as logarithm of predicted over observed.
+    """The error of a prediction by tests of `starts` start brains, as logarithm of predicted over observed.
 
-    Attributes
-    ----------
-    starts
-        Number of start brains with a test.
-    largest
-        Half the width of the interval: the largest error of these starts, about `bias` if it is corrected.
-    bias
-        Mean error of the starts.
-    is_corrected
-        Whether the bias is larger than its error, so that the interval is centred at the value less the bias.
-    coverage
-        Share of starts that such an interval contains at most, by counting: k/(k + 1) for the largest error of k
-        starts, `LEVEL` from `MIN_STARTS` on.
-    is_beyond
-        Whether no test went as far, in weeks predicted or in horizon.
+    `largest` is half the width of the interval: the largest error of these starts, about `bias`, their mean error, if
+    it is larger than its own error (`is_corrected`). `coverage` is the share of starts that such an interval contains
+    at most, by counting: k/(k + 1) for the largest error of k starts, `LEVEL` from `MIN_STARTS` on. `is_beyond`: no
+    test went as far, in weeks predicted or in horizon.
     """
 
     starts: int
@@ -85,10 +74,8 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
     if errors.empty:
         return None
     weeks, horizons = (np.unique(errors[name]) for name in ("week", "horizon"))
-    week_limit, horizon_limit = (
-        float(min((step for step in steps if step >= value - 1e-6), default=steps[-1]))
-        for steps, value in ((weeks, week), (horizons, horizon))
-    )
+    week_limit = weeks[np.searchsorted(weeks[:-1], week - 1e-6)]
+    horizon_limit = horizons[np.searchsorted(horizons[:-1], horizon - 1e-6)]
     shortest = errors.groupby("week")["horizon"].transform("min")
     smaller = [
         _counted(
@@ -97,10 +84,8 @@ def error_in_tests(errors: pd.DataFrame, week: float, horizon: float) -> ErrorIn
         for earlier in weeks[weeks <= week_limit]
         for shorter in horizons[horizons <= horizon_limit]
     ]
-    last = smaller[-1]
-    half = max(found.largest for found in smaller)
     is_beyond = bool(week > weeks[-1] + 1e-6 or horizon > horizons[-1] + 1e-6)
-    return ErrorInTests(last.starts, half, last.bias, last.is_corrected, last.coverage, is_beyond)
+    return replace(smaller[-1], largest=max(found.largest for found in smaller), is_beyond=is_beyond)
 
 
 def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests:
@@ -116,10 +101,10 @@ def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests
     for number, values in enumerate(errors):
         others, others_corrected = _bias(np.delete(means, number))
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
+    rank, coverage = len(largest), count / (count + 1)
     if count >= MIN_STARTS:
-        rank = int(np.ceil(round((count + 1) * LEVEL, 6)))
-        return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, LEVEL, False)
-    return ErrorInTests(count, float(max(largest)), bias, is_corrected, count / (count + 1), False)
+        rank, coverage = int(np.ceil(round((count + 1) * LEVEL, 6))), LEVEL
+    return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, coverage, is_beyond=False)
 
 
 def _bias(means: Floats) -> tuple[float, bool]:
@@ -134,12 +119,11 @@ def error_words(metric: str, tested: ErrorInTests) -> str:
     """Describe a tested error, such as "largest error of 2 tests, −10 to +11 %: 2 in 3 brains at most"."""
     low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
     ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
-    starts = f"{tested.starts} test{'s' if tested.starts > 1 else ''}"
-    if tested.starts < MIN_STARTS:
-        words = f"largest error of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
-        words += f": {tested.starts} in {tested.starts + 1} brains at most"
-    else:
-        words = f"{100 * LEVEL:.0f} % of {starts}, {ends} %{' of the folding' if metric == FOLDING else ''}"
+    is_few = tested.starts < MIN_STARTS
+    words = "largest error" if is_few else f"{100 * LEVEL:.0f} %"
+    words += f" of {tested.starts} test{'s' if tested.starts > 1 else ''}, {ends} %"
+    words += " of the folding" if metric == FOLDING else ""
+    words += f": {tested.starts} in {tested.starts + 1} brains at most" if is_few else ""
     if tested.is_corrected:
         words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
     return words + ("; no test went as far" if tested.is_beyond else "")
@@ -156,16 +140,14 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         errors = log_errors(tests, metric)
         for start, own in errors.groupby("start"):
             others = errors[errors["start"] != start]
-            places = own[["week", "horizon"]].to_numpy(dtype=float)
-            found = [error_in_tests(others, week, horizon) for week, horizon in places]
-            inside = [
-                abs(error - interval.bias * interval.is_corrected) <= interval.largest
-                for error, interval in zip(own["error"], found, strict=True)
-                if interval
+            tested = [
+                (error, interval)
+                for week, horizon, error in own[["week", "horizon", "error"]].to_numpy(dtype=float)
+                if (interval := error_in_tests(others, week, horizon))
             ]
-            if inside:
-                at_most = max(interval.coverage for interval in found if interval)
-                rows.append((metric, start, len(inside), sum(inside), at_most))
+            held = sum(abs(error - part.bias * part.is_corrected) <= part.largest for error, part in tested)
+            if tested:
+                rows.append((metric, start, len(tested), held, max(part.coverage for _, part in tested)))
     return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
 
 
@@ -188,11 +170,8 @@ def atlas_advantage(tests: Sequence[Mapping[str, Any]], horizon: float) -> tuple
 def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week: float) -> dict[str, Any]:
     """Describe the errors of tests for the report of a prediction of a week.
 
-    Returns
-    -------
-    dict
-        errors: by metric, the words of its tested error; held: by metric, how often intervals held when each start was
-        left out; advantage: a sentence where the atlas' own brain was better, or ""; starts: the tested brains.
+    Returns errors (by metric, the words of its tested error), held (by metric, how often intervals held when each start
+    was left out), advantage (a sentence where the atlas' own brain was better, or "") and starts (the tested brains).
     """
     horizon, errors = week - start_week, {}
     for metric in QUANTITIES:

@@ -55,13 +55,8 @@ def to_unit_box(values: pd.DataFrame, bounds: Mapping[str, Sequence[float]]) -> 
 def calibrated_parameters(base: Mapping[str, Any], values: Mapping[str, float], week: float) -> dict[str, Any]:
     """Return the content of `params.yaml` for a run of a calibration that ends at a week.
 
-    Parameters
-    ----------
-    base
-        Content of `params.yaml` of the base run.
-    values
-        Value of each parameter. A parameter is a key of `params.yaml` (with dots for nested keys), `stiffness_ratio`,
-        or `KEY.amplitude`, a factor on the curve KEY.
+    `base` is that of the base run, `values` the value of each parameter: a key of `params.yaml` (with dots for nested
+    keys), `stiffness_ratio`, or `KEY.amplitude`, a factor on the curve KEY.
     """
     params = deepcopy(dict(base))
     for key, value in values.items():
@@ -149,22 +144,12 @@ def run_score(
 ) -> dict[str, Any]:
     """Return the score of a run, the weighted sum of its scores' means over all pairs of brains.
 
-    Parameters
-    ----------
-    pairs
-        Simulated surfaces and the observed brains to compare them with. They are not read if the run has diverged.
-    weights
-        Weight of each score.
-    causes
-        Reasons why simulations of the run have diverged; empty if all have finished.
-    spectra
-        Spectra of the same pairs, as in `spectral_scores`; only needed if `weights` has some of these scores.
+    `pairs` are simulated surfaces and the observed brains to compare them with, `spectra` those of the same pairs as in
+    `spectral_scores`, only needed if `weights` has some of these scores. Neither is read if there are `causes` why
+    simulations of the run have diverged.
 
-    Returns
-    -------
-    dict
-        score and the mean of each score in `weights`, NaN if the run has diverged; outcome ("finished" or "diverged")
-        and cause.
+    Returns score and the mean of each score in `weights`, NaN if the run has diverged; outcome ("finished" or
+    "diverged") and cause.
     """
     rows: list[dict[str, float]] = []
     if not causes:
@@ -185,10 +170,10 @@ def run_score(
 class Surrogate:
     """A Gaussian process that predicts the score of a run from its parameters.
 
-    `bounds` are the lowest and highest value of each parameter; they become 0 and 1 in the unit box. The process is
-    fitted to n runs at `points` (n, d) of the box, with `scores` (n,); a diverged run gets a score worse than all
-    others. The kernel is Matérn's (ν = 5/2), with a length for each parameter, plus noise. `seed` determines the
-    candidates for the next runs.
+    It is fitted to n runs at `points` (n, d) of the unit box, in which the lowest and highest value of each parameter
+    (`bounds`) are 0 and 1, with `scores` (n,); a diverged run gets a score worse than all others. The kernel is
+    Matérn's (ν = 5/2), with a length for each parameter, plus noise. `seed` determines the candidates for the next
+    runs.
     """
 
     process: GaussianProcessRegressor
@@ -255,13 +240,10 @@ def expected_improvement(process: GaussianProcessRegressor, points: Floats, best
 
 
 def find_optimum(surrogate: Surrogate) -> pd.DataFrame:
-    """Find the minimum of the surrogate.
+    """Find the minimum of the surrogate: a row per parameter.
 
-    Returns
-    -------
-    DataFrame
-        A row per parameter: parameter, value, lowest and highest (the bounds), at_bound (whether the value is within
-        1 % of a bound), score and score_sd (mean and standard deviation of the surrogate at the minimum).
+    Columns parameter, value, lowest and highest (the bounds), at_bound (whether the value is within 1 % of a bound),
+    score and score_sd (mean and standard deviation of the surrogate at the minimum).
     """
     process, candidates = surrogate.process, _candidates(surrogate)
     box = [(0.0, 1.0)] * candidates.shape[1]

@@ -5,23 +5,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import align
 from ..geometry.matching import crossing_faces, nearest_on, surface_distance, values_at
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    area,
-    area_cm2,
-    edges,
-    signed_volume,
-    vertex_areas,
-    vertex_normals,
-    volume_ml,
-)
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area_cm2, vertex_areas, vertex_normals, volume_ml
 from ..quantities import COMPARED_MAPS
 from ..settings.terms import CURVATURE_RADIUS_MM
 from .placement import (
@@ -49,17 +39,9 @@ GROUPS: tuple[Group, ...] = ("size", "distance", "folds", "quality", "intervals"
 class ObservedBrain:
     """An observed brain that predicted surfaces are compared with.
 
-    Attributes
-    ----------
-    id
-        Its id, or another name of it.
-    surface
-        Its closed pial surface in mm, as it is.
-    prepared
-        The same, prepared for comparison.
-    baselines
-        Brains prepared for comparison with it: `start`, the start brain scaled to its volume, which has no new folds,
-        and `adjacent`, the observed brain of the week before; needed for the intervals.
+    `surface` is its closed pial surface in mm as it is, `prepared` the same prepared for comparison. `baselines` are
+    brains prepared for comparison with it, needed for the intervals: `start`, the start brain scaled to its volume,
+    which has no new folds, and `adjacent`, the observed brain of the week before.
     """
 
     id: str
@@ -114,22 +96,17 @@ def compare(
     `radius_mm` is that of the fitted curvature. Sizes and distances are of the surfaces as they are, aligned rigidly;
     folds are compared after scaling to the observed volume.
 
-    Returns
-    -------
-    row
-        Columns by group:
+    Returns a row with the columns of each group, and with intervals the bootstrap samples of distance_mm and r_… after
+    their values, (1 + N_DRAWS,) each, drawn alike for all surfaces that are compared with this observed brain.
 
-        - size: area_cm2, volume_ml, relative_area (A/V^⅔), the same of the observed brain (observed_…), and
-          area_difference and volume_difference from it, as fractions of its own;
-        - distance: `surface_distances` and cortex_dice;
-        - folds: r_… of each of `COMPARED_MAPS`, matched_share (share of the observed area with a matching point) and
-          `shapes.curvature_differences`;
-        - quality: crossing_faces, and roughness_ratio to the observed surface;
-        - intervals: distance_mm_low and …_high, and with baselines `placement.gain_columns` of each map (gain_…,
-          gain_low_…); asymmetry_mm of the observed brain, is_symmetric and resampled.
-    samples
-        With intervals, the bootstrap samples of distance_mm and r_… after their values, (1 + N_DRAWS,) each, drawn
-        alike for all surfaces that are compared with this observed brain.
+    - size: area_cm2, volume_ml, relative_area (A/V^⅔), the same of the observed brain (observed_…), and area_difference
+      and volume_difference from it, as fractions of its own;
+    - distance: `surface_distances` and cortex_dice;
+    - folds: r_… of each of `COMPARED_MAPS`, matched_share (share of the observed area with a matching point) and
+      `shapes.curvature_differences`;
+    - quality: crossing_faces, and roughness_ratio to the observed surface;
+    - intervals: distance_mm_low and …_high, and with baselines `placement.gain_columns` of each map (gain_…,
+      gain_low_…); asymmetry_mm of the observed brain, is_symmetric and resampled.
     """
     row: dict[str, Any] = {}
     samples: dict[str, Floats] = {}
@@ -176,20 +153,14 @@ def fold_columns(
 
 def size_columns(predicted: TriangleMesh, observed: TriangleMesh) -> dict[str, float]:
     """Return the sizes of two closed surfaces in mm and their differences, the columns of the group size."""
-    sizes, observed_sizes = (
-        {
-            "area_cm2": area_cm2(mesh),
-            "volume_ml": volume_ml(mesh),
-            "relative_area": area(mesh) / signed_volume(mesh) ** (2 / 3),
-        }
-        for mesh in (predicted, observed)
-    )
-    return {
-        **sizes,
-        **{f"observed_{name}": size for name, size in observed_sizes.items()},
-        "area_difference": sizes["area_cm2"] / observed_sizes["area_cm2"] - 1,
-        "volume_difference": sizes["volume_ml"] / observed_sizes["volume_ml"] - 1,
-    }
+    row: dict[str, float] = {}
+    for prefix, mesh in (("", predicted), ("observed_", observed)):
+        size, volume = area_cm2(mesh), volume_ml(mesh)
+        values = {"area_cm2": size, "volume_ml": volume, "relative_area": size / volume ** (2 / 3)}
+        row |= {prefix + name: value for name, value in values.items()}
+    for name, unit in (("area", "cm2"), ("volume", "ml")):
+        row[f"{name}_difference"] = row[f"{name}_{unit}"] / row[f"observed_{name}_{unit}"] - 1
+    return row
 
 
 def pairwise_distances(
@@ -247,10 +218,7 @@ def roughness_mm(mesh: TriangleMesh) -> float:
 
     On surfaces with the same even triangles it measures wrinkles as small as a triangle.
     """
-    first, second = edges(mesh)[0].T
-    sums = np.zeros_like(mesh.vertices)
-    np.add.at(sums, first, mesh.vertices[second])
-    np.add.at(sums, second, mesh.vertices[first])
-    count = np.bincount(np.concatenate([first, second]), minlength=len(sums))
-    offsets: Floats = ((sums / count[:, None] - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
+    links = igl.adjacency_matrix(mesh.faces)
+    means = links @ mesh.vertices / np.asarray(links.sum(axis=1))
+    offsets: Floats = ((means - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
     return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))

@@ -16,9 +16,7 @@ from ..settings.terms import MEASURED
 
 SMOOTHING_MM = 3.0
 """Standard deviation of the Gaussian that smooths areas before they are compared."""
-
 SCORES = ["expected", "sd", "z", "centile", "brains", "flag"]
-
 type SurfaceThickness = tuple[TriangleMesh, Floats]
 """A pial surface in mm, and the (n,) cortical thickness at its vertices in mm."""
 
@@ -26,14 +24,9 @@ type SurfaceThickness = tuple[TriangleMesh, Floats]
 def deviation_maps(expected: TriangleMesh, fitted: TriangleMesh) -> dict[str, Floats]:
     """Return distance_mm and log_area of the observed brain at the (n,) vertices of the expected surface.
 
+    `expected` is aligned with the observed surface, in mm, and `fitted` is the same surface deformed to fit it.
     distance_mm is along the normal, positive where the observed brain lies outside; log_area is the logarithm of the
     observed over the expected area.
-
-    Parameters
-    ----------
-    expected, fitted
-        The expected surface in mm, aligned with the observed one, and the same surface deformed to fit the observed
-        one.
     """
     ratio = vertex_areas(fitted) / vertex_areas(expected)
     return {
@@ -51,25 +44,16 @@ def thickness_difference(
 ) -> Floats:
     """Return the observed minus the expected thickness in mm at the (n,) vertices of the expected surface.
 
-    The expected thickness is that of the observed start brain, multiplied by its growth in the run.
-
-    Parameters
-    ----------
-    fitted
-        The expected surface deformed to fit the observed one.
-    observed, start
-        The observed brain of the week, and the observed start brain.
-    simulated_start, expected_mm
-        The simulated brain at the week of the start, and its thickness at the week compared. Vertices are the same.
+    The expected thickness is that of the observed start brain, multiplied by its growth in the run: `expected_mm`, at
+    the week compared, over that of the `simulated_start`, at the same vertices. `fitted` is the expected surface
+    deformed to fit the observed one of the week.
     """
+
+    def values_on(mesh: TriangleMesh, surface: TriangleMesh, values: Floats) -> Floats:
+        return values_at(match_surface(mesh, surface), values)
+
     surface, start_mm = simulated_start
-    grown = _values_on(surface, start) * expected_mm / start_mm
-    return _values_on(fitted, observed) - grown
-
-
-def _values_on(mesh: TriangleMesh, thickness: SurfaceThickness) -> Floats:
-    surface, values = thickness
-    return values_at(match_surface(mesh, surface), values)
+    return values_on(fitted, *observed) - values_on(surface, *start) * expected_mm / start_mm
 
 
 def deviation_table(
@@ -81,21 +65,11 @@ def deviation_table(
 ) -> pd.DataFrame:
     """Average maps over the whole brain, its hemispheres and their regions, by area.
 
-    Parameters
-    ----------
-    labels
-        First columns of the table.
-    surface, maps
-        The expected surface in mm, and maps at its (n,) vertices.
-    sides
-        Its hemispheres, whose vertices are among those of the whole surface.
-    regions
-        By side: the labels of the hemisphere's vertices, and the names of the labels. Empty without regions.
+    The maps are at the (n,) vertices of the expected surface in mm; the vertices of its `sides` are among them.
+    `regions` are by side the labels of the hemisphere's vertices and the names of the labels, empty without regions.
 
-    Returns
-    -------
-    DataFrame
-        The labels, hemisphere, region ("" for all of it), metric (the map, without its unit), value, unit.
+    Columns are the given `labels`, hemisphere, region ("" for all of it), metric (the map, without its unit), value,
+    unit.
     """
     parts = {"whole": surface, **sides}
     part_maps = {
@@ -116,12 +90,8 @@ def deviation_table(
 def deviation_scores(deviations: pd.DataFrame, *, individuals: bool) -> pd.DataFrame:
     """Add to each deviation its z-score and centile among those of the other brains of the run.
 
-    Parameters
-    ----------
-    deviations
-        Rows of `deviation_table` with the columns run, subject and week. Rows without a value are left out.
-    individuals
-        Whether the observed brains differ as individuals do; averages have no centiles.
+    Deviations are rows of `deviation_table` with the columns run, subject and week; those without a value are left out.
+    Averages, which do not differ as `individuals` do, have no centiles.
     """
     tables = []
     for _, table in deviations.dropna(subset=["value"]).groupby("run", sort=False):

@@ -33,27 +33,17 @@ def displacement_table(
 ) -> pd.DataFrame:
     """Compare the displacement of the pial vertices with the measured one, a row per interval of weeks.
 
+    Positions (n, 3) by week in mm are of the same vertices in the run and carried along the registration; `faces` (m,
+    3) are the triangles. `registered` growth came from this very registration: then the table tests the solver's
+    consistency, not the model. InputError for fewer than two weeks.
+
     The rigid motion of each interval is removed from both, and the simulated vectors are rotated into the pose of the
     measured brain. The baseline is uniform scaling: all vertices move away from the centroid of the measured surface,
     so that the volume grows as measured. Connected components are treated one by one: where nothing joins the
     hemispheres, growth does not determine their relative position.
 
-    Parameters
-    ----------
-    weeks
-        Ascending, two or more; InputError if there are fewer.
-    simulated, measured
-        By week the (n, 3) positions in mm of the same vertices: in the run, and carried along the registration.
-    faces
-        (m, 3) triangles of the surface.
-    registered
-        Whether growth came from this very registration; then the table tests the solver's consistency, not the model.
-
-    Returns
-    -------
-    DataFrame
-        from_week, to_week, test (consistency or comparison), displacement_r, displacement_slope,
-        displacement_r_scaling, displacement_slope_scaling, rms_mm, measured_rms_mm (root mean square by area).
+    Columns from_week, to_week, test (consistency or comparison), displacement_r, displacement_slope,
+    displacement_r_scaling, displacement_slope_scaling, rms_mm, measured_rms_mm (root mean square by area).
     """
     if len(weeks) < 2:
         found = f"{len(weeks)} weeks shared by the run and the registration"

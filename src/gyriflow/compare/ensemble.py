@@ -16,6 +16,8 @@ from .accuracy import LEVEL, ErrorInTests, error_in_tests, from_log, log_errors,
 SULCUS, GYRUS = -0.375, 0.375
 """Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
 1992."""
+UNTESTED = ErrorInTests(starts=0, largest=0.0, bias=0.0, is_corrected=False, coverage=LEVEL, is_beyond=False)
+"""The intervals of a run without tests are those of its members."""
 
 
 def spread_of_members(values: Floats, level: float) -> float:
@@ -37,25 +39,17 @@ def interval_table(
 ) -> pd.DataFrame:
     """Return the intervals of whole brains by week and metric.
 
+    The tables have the metrics (week, hemisphere, metric, value, unit) of the run, of all its members, and of the
+    observed brains of its weeks, which may be empty. `tests` are the rows of `norms/predictions.yaml`, empty if the run
+    is no prediction.
+
     The spread of the members and the largest error of the tests are added in logarithms, as √(spread² + error²), about
     the mean of the members less the bias of the tests if that is corrected. Those of later weeks are never narrower.
 
-    Parameters
-    ----------
-    run, members, observed
-        Metrics with columns week, hemisphere, metric, value, unit; of the run, of all its members, and of the observed
-        brains of its weeks. `observed` may be empty.
-    tests
-        Of a prediction, the rows of `norms/predictions.yaml`; empty if the run is no prediction.
-
-    Returns
-    -------
-    DataFrame
-        Columns week, metric, unit, run (its value), members (number of values), mean, sd (NaN for one), tested_starts,
-        largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without tests), is_corrected, coverage (share
-        of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of further members without tests),
-        low, high, observed (NaN without a brain) and contains_observed. A member that did not reach a week has no value
-        there.
+    Columns week, metric, unit, run (its value), members (number of values; one that did not reach a week has none),
+    mean, sd (NaN for one), tested_starts, largest_error, bias (fractions, of `accuracy.error_in_tests`; NaN without
+    tests), is_corrected, coverage (share of brains in the interval: at most this much by `tested_starts`, or `LEVEL` of
+    further members without tests), low, high, observed (NaN without a brain) and contains_observed.
     """
     keys, names = ["week", "metric"], metrics_shown(Shown.INTERVALS)
     own, varied, brains = (
@@ -66,14 +60,15 @@ def interval_table(
         errors, widest = log_errors(tests, str(metric)), 0.0
         for at, group in table.groupby("week")["value"]:
             week = float(str(at))
-            tested = error_in_tests(errors, week, week - start) if week > start else None
-            level = tested.coverage if tested else LEVEL
+            tested = (error_in_tests(errors, week, week - start) if week > start else None) or UNTESTED
             logs = log_value(str(metric), group.to_numpy(dtype=float))
-            half = np.hypot(spread_of_members(logs, level), tested.largest if tested else 0.0)
+            half = np.hypot(spread_of_members(logs, tested.coverage), tested.largest)
             widest = max(widest, half) if np.isfinite(half) else half
-            middle = logs.mean() - (tested.bias if tested and tested.is_corrected else 0.0)
+            middle = logs.mean() - tested.bias * tested.is_corrected
             row = {"week": week, "metric": metric, "members": len(group), "mean": group.mean(), "sd": group.std()}
-            row |= tested_columns(tested) | {"coverage": level}
+            largest, bias = np.expm1([tested.largest, tested.bias]) if tested.starts else (np.nan, np.nan)
+            row |= {"tested_starts": tested.starts, "largest_error": largest, "bias": bias}
+            row |= {"is_corrected": tested.is_corrected, "coverage": tested.coverage}
             low, high = (from_log(str(metric), middle + sign * widest) for sign in (-1, 1))
             rows.append(row | {"low": low, "high": high})
     table = own[[*keys, "unit", "value"]].rename(columns={"value": "run"}).merge(pd.DataFrame(rows), "left", keys)
@@ -85,32 +80,19 @@ def interval_table(
     )
 
 
-def tested_columns(tested: ErrorInTests | None) -> dict[str, float | bool]:
-    """Return the columns of `interval_table` that are about tests."""
-    if tested is None:
-        return {"tested_starts": 0, "largest_error": np.nan, "bias": np.nan, "is_corrected": False}
-    errors = {"largest_error": np.expm1(tested.largest), "bias": np.expm1(tested.bias)}
-    return {"tested_starts": tested.starts, **errors, "is_corrected": tested.is_corrected}
-
-
 def ensemble_maps(
     run: TriangleMesh, members: Sequence[TriangleMesh], shape_indices: Sequence[Floats]
 ) -> dict[str, Floats]:
     """Return maps (n,) of the spread of an ensemble at the vertices of a run's hemisphere.
 
-    Vertices of `members` correspond to those of the run. Positions are compared after a rigid alignment with the run.
-    `shape_indices` (n,) are those of the run and of the members.
-
-    Returns
-    -------
-    dict
-        position_sd_mm, the root mean square distance of the members from their mean position, with n − 1, NaN for
-        fewer than two; and sulcus_probability and gyrus_probability, the shares of run and members in which the
-        vertex is sulcus or gyrus.
+    Vertices of `members` correspond to those of the run; `shape_indices` (n,) are those of the run and of the members.
+    position_sd_mm is the root mean square distance of the members, aligned rigidly with the run, from their mean
+    position, with n − 1, NaN for fewer than two; sulcus_probability and gyrus_probability are the shares of run and
+    members in which the vertex is sulcus or gyrus.
     """
     areas = vertex_areas(run)
-    motions = [rigid_fit(member.vertices, run.vertices, areas) for member in members]
-    aligned = [transform_points(member.vertices, motion) for member, motion in zip(members, motions, strict=True)]
+    shapes = [member.vertices for member in members]
+    aligned = [transform_points(shape, rigid_fit(shape, run.vertices, areas)) for shape in shapes]
     values, spread = np.stack(shape_indices), np.full(run.vertices.shape, np.nan)
     if len(members) > 1:
         spread = np.var(aligned, axis=0, ddof=1)

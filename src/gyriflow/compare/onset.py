@@ -24,13 +24,11 @@ from ..metrics.gyrification import sulcal_depth
 
 MIN_DEPTH_MM = 2.0
 """A sulcus is present if it is at least this deep below its neighbouring crowns."""
-
 CROWN_DISTANCE_MM = 10.0
 """Distance from a sulcus within which its neighbouring crowns are searched for."""
 
 MIN_AREA_MM2 = 40.0
 """Smallest area of a valley that counts as a sulcus."""
-
 BOTTOM_QUANTILE, CROWN_QUANTILE = 0.9, 0.1
 """Quantiles of depth by area that stand for the bottom of a sulcus and for the crowns around it."""
 
@@ -74,21 +72,10 @@ def name_sulci(
 ) -> tuple[Ints, dict[int, str]]:
     """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
 
-    Names are like "left central", then "left central 2" for the second largest part in that region. Parts outside all
-    regions are named by the number of their valley, like "left 4".
-
-    Parameters
-    ----------
-    sulci
-        (n,) numbers of `find_sulci`.
-    labels, names
-        (n,) labels of the vertices, and names of the labels that are regions. Without names, sulci are "left 1" and so
-        on.
-
-    Returns
-    -------
-    tuple
-        (n,) numbers of the parts, 1 for the largest, 0 outside of sulci, and their names.
+    Sulci are the (n,) numbers of `find_sulci`, labels (n,) those of the vertices; `names` are those of labels that are
+    regions. Returns the (n,) numbers of the parts, 1 for the largest, 0 outside of sulci, and their names, like "left
+    central", then "left central 2" for the second largest part in that region. Parts outside all regions are named by
+    the number of their valley, like "left 4".
     """
     areas = vertex_areas(mesh)
     named_labels = np.where(np.isin(labels, list(names)), labels, 0)
@@ -135,21 +122,10 @@ def onset_table(
     sulci: NDArray[np.integer],
     names: Mapping[int, str],
 ) -> pd.DataFrame:
-    """Find the week when each sulcus of the last observed brain appears in a series of surfaces.
+    """Find the week when each sulcus of the last observed brain appears in a series of surfaces, as `find_onset`.
 
-    Parameters
-    ----------
-    surfaces
-        A hemisphere by week, in mm.
-    carried
-        For each week the same hemisphere with its vertices carried onto the last observed brain.
-    last, sulci, names
-        Hemisphere of the last observed brain, and the result of `find_named_sulci` on it.
-
-    Returns
-    -------
-    DataFrame
-        As `find_onset`.
+    `surfaces` are a hemisphere by week in mm, and `carried` the same with vertices carried onto the last observed
+    brain. `sulci` and `names` are the result of `find_named_sulci` on the `last` brain's hemisphere.
     """
     reliefs = {}
     for (week, mesh), on_last in zip(surfaces.items(), carried, strict=True):
@@ -160,18 +136,14 @@ def onset_table(
 
 def measure_relief(
     mesh: TriangleMesh, depth_mm: Floats, sulci: NDArray[np.integer], names: Mapping[int, str]
-) -> pd.DataFrame:
-    """Measure how deep each sulcus is below its neighbouring crowns.
+) -> dict[str, float]:
+    """Return by name how deep in mm each sulcus is below its neighbouring crowns; NaN for sulci without vertices.
 
-    `depth_mm` (n,) is the depth of the vertices below the hull or envelope. Columns: region, bottom_mm, crown_mm,
-    relief_mm (bottom − crown); NaN for sulci without vertices.
+    `depth_mm` (n,) is the depth of the vertices below the hull or envelope.
     """
-    areas = vertex_areas(mesh)
-    rows = []
+    areas, reliefs = vertex_areas(mesh), dict.fromkeys(names.values(), np.nan)
     for number, name in names.items():
-        inside = sulci == number
-        if not inside.any():
-            rows.append((name, np.nan, np.nan, np.nan))
+        if not (inside := sulci == number).any():
             continue
         tree = cKDTree(mesh.vertices[inside])
         distances, _ = tree.query(mesh.vertices, distance_upper_bound=CROWN_DISTANCE_MM)
@@ -179,20 +151,20 @@ def measure_relief(
             float(np.quantile(depth_mm[part], share, weights=areas[part], method="inverted_cdf"))
             for part, share in ((inside, BOTTOM_QUANTILE), (np.isfinite(distances), CROWN_QUANTILE))
         )
-        rows.append((name, bottom, crown, bottom - crown))
-    return pd.DataFrame(rows, columns=["region", "bottom_mm", "crown_mm", "relief_mm"])
+        reliefs[name] = bottom - crown
+    return reliefs
 
 
-def find_onset(reliefs: Mapping[float, pd.DataFrame]) -> pd.DataFrame:
-    """Find the week when each sulcus appears, from tables of `measure_relief` by week.
+def find_onset(reliefs: Mapping[float, Mapping[str, float]]) -> pd.DataFrame:
+    """Find the week when each sulcus appears, from the reliefs of `measure_relief` by week.
 
     That is the first week with a relief of `MIN_DEPTH_MM`, interpolated linearly from the week before (not interpolated
     if the relief of the week before is NaN). Columns: region, there_at_start, onset_week (NaN if the sulcus was present
     at the start or never appears), first_relief_mm, last_relief_mm.
     """
     weeks, rows = sorted(reliefs), []
-    for name, table in pd.concat([reliefs[week] for week in weeks]).groupby("region", sort=False):
-        depths = table["relief_mm"].to_numpy(dtype=float)
+    for name in reliefs[weeks[0]]:
+        depths = np.array([reliefs[week][name] for week in weeks])
         reached = np.flatnonzero(depths >= MIN_DEPTH_MM)
         week = np.nan
         if len(reached) and reached[0] > 0:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import norm, t
 
 from ..geometry.alignment import MIRROR, align
-from ..geometry.matching import Match, match_points, match_surface, nearest_on, values_at
+from ..geometry.matching import Match, interpolation, match_points, match_surface, nearest_on, values_at
 from ..geometry.remeshing import remesh
 from ..geometry.triangles import Floats, Ints, TriangleMesh, submesh, transformed, vertex_areas, vertex_normals
 from ..metrics.laplace_beltrami import laplacian, modes_below
@@ -28,7 +28,6 @@ MODES_PER_BLOCK = 12
 """Successive modes that are drawn among each other, so that each sample has the power of all wavelengths."""
 PATCH_EDGE_MM = 20.0
 """Width of the patches in which distances are resampled: wider than a gyrus with its sulcus."""
-
 N_DRAWS = 2000
 """Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
@@ -46,20 +45,10 @@ class Resampling:
     Folds run across borders of patches, but the modes of a random map are independent. If the brain is its own mirror
     image, the modes are those of its left half with a free rim, and both sides are drawn together.
 
-    Attributes
-    ----------
-    areas : (n,) float
-        Areas of the surface's vertices in mm².
-    sides
-        m points of the surface; if it is symmetric m points of its left half, and their mirror images on the right.
-    side_areas : (m,) float
-        Areas of these points in mm².
-    basis : (m, v) sparse float and (v, k) float
-        Their product has the k modes at the points, orthonormal by area, in the order of their wavelengths.
-    patch : (m,) int
-        Patch of each point.
-    asymmetry_mm
-        Mean distance of the brain from its mirror image.
+    `areas` (n,) of the vertices and `side_areas` (m,) are in mm². `sides` are m points of the surface; if it is
+    symmetric m points of its left half, and their mirror images on the right. The product of `basis`, (m, v) and (v,
+    k), has the k modes at the points, orthonormal by area, in the order of their wavelengths; `patch` (m,) is the patch
+    of each point, and `asymmetry_mm` the mean distance of the brain from its mirror image.
     """
 
     areas: Floats
@@ -87,13 +76,8 @@ class Resampling:
         return draw_units([*map(len, blocks), patches])
 
     def coordinates(self, values: Floats) -> Floats:
-        """Return coordinates of a map (n,) less its mean, whose scalar products are those of maps over the area.
-
-        A map that is constant to rounding has coordinates 0.
-        """
+        """Return coordinates of a map (n,) less its mean, whose scalar products are those of maps over the area."""
         centred = values - np.average(values, weights=self.areas)
-        if centred @ (self.areas * centred) <= 1e-12 * (values @ (self.areas * values)):
-            centred = np.zeros_like(values)
         places, functions = self.basis
         parts = []
         for side in self.sides:
@@ -109,13 +93,13 @@ class Resampling:
         Samples are spread as Student's t of as many units as the power of `truth` comes from, Σp²⁻¹ of the shares p.
         """
         r = correlation(truth, values, self.areas)
+        if np.isnan(r):
+            return np.full(1 + N_DRAWS, np.nan)
         x, y = self.coordinates(truth), self.coordinates(values)
         sums = np.stack([np.bincount(self.units, product) for product in (x * x, y * y, x * y)], axis=1)
         xx, yy, xy = (self.drawn @ sums).T
-        has_both = (xx > 0) & (yy > 0)
-        drawn = np.where(has_both, xy / np.sqrt(np.where(has_both, xx * yy, 1.0)), np.nan)
-        shares = sums[:, 0] / max(sums[:, 0].sum(), np.finfo(float).tiny)
-        freedom = max(1 / max((shares**2).sum(), np.finfo(float).tiny) - 2, 1.0)
+        drawn, shares = xy / np.sqrt(xx * yy), sums[:, 0] / sums[:, 0].sum()
+        freedom = max(1 / (shares**2).sum() - 2, 1.0)
         spread = t.ppf(INTERVAL[1], freedom) / norm.ppf(INTERVAL[1])
         # about r, since the sides of a symmetric brain are not exactly equal
         return np.append(r, r + spread * (drawn[1:] - drawn[0]))
@@ -134,9 +118,7 @@ def make_resampling(surface: PreparedSurface) -> Resampling:
     sides.insert(0, itself)
     coarse, areas = remesh(mesh, MODE_EDGE_MM), vertex_areas(mesh)
     modes = modes_below(*laplacian(coarse), (2 * np.pi / SHORTEST_MODE_MM) ** 2).functions
-    match, rows = match_surface(mesh, coarse), np.repeat(np.arange(len(areas)), 3)
-    shape = len(areas), len(coarse.vertices)
-    places = sparse.csr_matrix((match.weights.ravel(), (rows, match.corners.ravel())), shape=shape)
+    places = interpolation(match_surface(mesh, coarse), len(coarse.vertices))
     # orthonormal on the finer surface, in the same order
     products = modes.T @ (places.T @ places.multiply(areas[:, None]).tocsr() @ modes)
     modes = solve_triangular(cholesky(products, lower=True), modes.T, lower=True).T
@@ -167,15 +149,12 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
 def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float | str]:
     """Compare correlations and their bootstrap samples with those of the start brain and of the week before.
 
-    Returns
-    -------
-    dict
-        r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed brain
-        of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
-        interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
+    Columns r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed
+    brain of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
+    interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
     """
     gain, headroom = r - r_start, r_adjacent - r_start
-    has_headroom = interval_of(headroom)[1] > 0
+    has_headroom = with_interval("", headroom)["_low"] > 0
     share = gain / headroom if has_headroom else np.full_like(gain, np.nan)
     row: dict[str, float | str] = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
     for name, draws in {"r": r, "gain": gain, "headroom": headroom, "gain_share": share}.items():
@@ -184,14 +163,9 @@ def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, fl
 
 
 def with_interval(name: str, draws: Floats) -> dict[str, float]:
-    """Return a statistic and the ends of its 95 % interval by column: `name`, `name`_low, `name`_high."""
-    return dict(zip((name, f"{name}_low", f"{name}_high"), interval_of(draws), strict=True))
-
-
-def interval_of(draws: Floats) -> tuple[float, float, float]:
-    """Return a statistic, the first of (1 + k,) draws, and its 95 % interval, from the other k."""
+    """Return the first of (1 + k,) draws and the ends of its 95 % interval, from the others, by column."""
     low, high = (float("nan"),) * 2 if np.isnan(draws).all() else np.nanquantile(draws[1:], INTERVAL)
-    return float(draws[0]), float(low), float(high)
+    return {name: float(draws[0]), f"{name}_low": float(low), f"{name}_high": float(high)}
 
 
 def mirror_image(surface: PreparedSurface) -> tuple[TriangleMesh, float]:

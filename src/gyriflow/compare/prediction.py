@@ -20,17 +20,10 @@ def simple_predictions(
 ) -> dict[str, TriangleMesh]:
     """Predict a week without mechanics: closed surfaces in mm by model.
 
-    Parameters
-    ----------
-    start
-        The start brain; the model `scaled` is this brain with the volume of the target.
-    target
-        The surface that the run grows towards in this week, itself the model `target`.
-    registered
-        Further models on the boundary of the start's mesh, among them `atlas`, the atlas interpolated to this week.
-    atlas
-        The atlas' own surface of this week, if there is one; it then replaces the registered model `atlas`. Either is
-        scaled to the volume of the target.
+    The model `scaled` is the start brain with the volume of the target, `target` the surface that the run grows towards
+    in this week. `registered` has further models on the boundary of the start's mesh, among them `atlas`, the atlas
+    interpolated to this week; its own surface of this week, if there is one, replaces it. Either is scaled to the
+    volume of the target.
     """
     volume = signed_volume(target)
     atlas = registered["atlas"] if atlas is None else atlas
@@ -47,21 +40,12 @@ def comparison_table(
 ) -> pd.DataFrame:
     """Compare the predicted surfaces of each week with the observed brain: a row per week and model.
 
-    Parameters
-    ----------
-    labels
-        run; kind ("explained" if growth was measured on the observed brains, else "predicted"); start (id of the start
-        brain) and start_week.
-    models
-        By week and model closed surfaces in mm, that of the run as `run`; all others are baselines.
-    radius_mm
-        Radius of the fitted curvature.
+    Labels are run; kind ("explained" if growth was measured on the observed brains, else "predicted"); start (id of the
+    start brain) and start_week. Models are by week closed surfaces in mm, that of the run as `run`; all others are
+    baselines. `radius_mm` is that of the fitted curvature.
 
-    Returns
-    -------
-    DataFrame
-        The labels, week, observed (id of the observed brain), horizon (weeks since the start), model, the columns of
-        `compare`, and those of `model_columns` where there are baselines.
+    Columns are the labels, week, observed (id of the observed brain), horizon (weeks since the start), model, those of
+    `compare`, and those of `model_columns` where there are baselines.
     """
     rows = []
     for week in sorted(models):
@@ -78,13 +62,10 @@ def comparison_table(
 def model_columns(samples: Mapping[str, Mapping[str, Floats]]) -> dict[str, dict[str, float]]:
     """Compare the models of a week with each other, by the `samples` of `compare` of each.
 
-    Returns
-    -------
-    dict
-        By model: skill = 1 − distance / distance of the best baseline (chosen anew in each sample, so the interval
-        includes the uncertainty of that choice); r_less_atlas and distance_less_atlas_mm, the differences of r of the
-        shape index and of distance_mm from those of the model `atlas`, if there is one. All have 95 % intervals …_low
-        and …_high, of paired samples.
+    Columns by model: skill = 1 − distance / distance of the best baseline (chosen anew in each sample, so the interval
+    includes the uncertainty of that choice); r_less_atlas and distance_less_atlas_mm, the differences of r of the shape
+    index and of distance_mm from those of the model `atlas`, if there is one. All have 95 % intervals …_low and …_high,
+    of paired samples.
     """
     best = np.min([drawn["distance_mm"] for model, drawn in samples.items() if model != "run"], axis=0)
     columns: dict[str, dict[str, float]] = {}

@@ -68,22 +68,19 @@ def published_nearest(published: Mapping[str, Any], sweeps: Mapping[str, SweepTa
     """Return the nearest runs by each measure for which the paper also reports a nearest value.
 
     The paper compares with other brains (a normal atlas). Its spectra are of the shape index, cut at Weyl's number.
-
-    Returns
-    -------
-    DataFrame
-        study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
-        run), run, distance, flag, paper (value that the paper reports), place (in the paper).
+    Columns study (name of the sweep), subject, observed, hemisphere, measure, parameter, nearest (value of the nearest
+    run), run, distance, flag, paper (value that the paper reports), place (in the paper).
     """
-    columns = ["subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run", "distance", "flag"]
-    tables = [pd.DataFrame(columns=["study", *columns, "paper", "place"])]
+    columns = ["study", "subject", "observed", "hemisphere", "measure", "parameter", "nearest", "run"]
+    columns += ["distance", "flag", "paper", "place"]
+    tables = [pd.DataFrame(columns=columns)]
     for entry in published["nearest"]:
+        parameter = entry["parameter"]
         for name, sweep in sweeps.items():
             if sweep.repeats(entry):
                 rows = sweep.nearest[sweep.nearest["measure"].str.removesuffix("_weyl") == entry["measure"]]
-                rows = rows.assign(parameter=entry["parameter"], nearest=rows[entry["parameter"]])[columns]
-                rows.insert(0, "study", name)
-                tables.append(rows.assign(paper=entry["value"], place=entry["place"]))
+                rows = rows.assign(study=name, parameter=parameter, nearest=rows[parameter])
+                tables.append(rows.assign(paper=entry["value"], place=entry["place"])[columns])
     return pd.concat(tables[1:] or tables, ignore_index=True)
 
 
@@ -102,26 +99,11 @@ def replication_table(
 ) -> pd.DataFrame:
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
-    Parameters
-    ----------
-    published
-        Content of `fetalfoldsim.yaml`.
-    displacement
-        Rows of one run, with the columns from_week, to_week, nodes, max_mm, mean_mm.
-    sweeps
-        If the sweep of a result is not among them, its verdict is `NOT_RUN`.
-    summary
-        `summary.json` of the same run as the displacement.
-    costs
-        Power and carbon intensity for the costs of the run.
-    rates, used_rate
-        Growth rates from surface areas (columns from_week, to_week, rate_per_s), and the rate used by the same run.
-    from_back
-        `place_of_largest` of the displacement from 24 to 25 GW.
-    mirror_mm
-        `mirror_distance` of the start brain's hemispheres.
-    surfaces
-        Whole pial surfaces of observed brains by id.
+    `published` is the content of `fetalfoldsim.yaml`; the verdict on a result whose sweep is not among `sweeps` is
+    `NOT_RUN`. Of one run are `displacement` (from_week, to_week, nodes, max_mm, mean_mm), its `summary.json`, and the
+    growth rate that it used; `rates` are those from surface areas (from_week, to_week, rate_per_s). `from_back` is
+    `place_of_largest` of the displacement from 24 to 25 GW, `mirror_mm` the `mirror_distance` of the start brain's
+    hemispheres, `surfaces` the whole pial surfaces of observed brains by id.
 
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.
@@ -258,10 +240,9 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         return f"{holds.sum()} of {len(holds)} runs{text}", _verdict(holds)
     shares = _cut_shares(sweep.comparison)
     if check == "most_B4":
-        finer = shares[["B5", "B6"]].max(axis=1)
-        holds = (shares["B4"] > finer)[shares["B4"].notna() & finer.notna()]
+        margin = shares["B4"] - shares[["B5", "B6"]].max(axis=1)
     elif check == "little_B6":
-        holds = shares["B6"].dropna() < MAX_WEAK_SHARE
+        margin = MAX_WEAK_SHARE - shares["B6"]
     elif check in ("right_B4", "left_B5_B6"):
         if mirror_mm is None or mirror_mm <= MAX_MIRROR_MM:
             found = "one hemisphere" if mirror_mm is None else f"hemispheres are mirror images to {mirror_mm:.2f} mm"
@@ -269,16 +250,13 @@ def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[s
         if not {"right", "left"} <= set(shares.index.get_level_values("hemisphere")):
             return NO_BANDS, NOT_TESTABLE
         right, left = (shares.xs(side, level="hemisphere") for side in ("right", "left"))
-        if check == "right_B4":
-            difference = right["B4"] - left["B4"]
-        else:
-            difference = pd.concat([left[band] - right[band] for band in ("B5", "B6")])
-        holds = difference.dropna() > SHARE_TOL
+        fine = [left[band] - right[band] for band in ("B5", "B6")]
+        margin = pd.concat([right["B4"] - left["B4"]] if check == "right_B4" else fine) - SHARE_TOL
     else:
         is_observed = shares.index.get_level_values("brain").str.startswith(OBSERVED)
         smallest = shares.loc[is_observed, "B5"].groupby("hemisphere").min()
-        margin = (smallest - shares.loc[~is_observed, "B5"].groupby("hemisphere").max()).dropna()
-        holds = margin > 0
+        margin = smallest - shares.loc[~is_observed, "B5"].groupby("hemisphere").max()
+    holds = margin.dropna() > 0
     if holds.empty:
         return NO_BANDS, NOT_TESTABLE
     text = f"{holds.sum()} of {len(holds)} cases"

@@ -17,29 +17,20 @@ from ..settings.terms import CURVATURE_RADIUS_MM
 
 EDGE_MM = 1.0
 """Edge length after remeshing."""
-
 MAX_CURVATURE_PER_MM = 1.0
 """Limit of mean curvature, which is clipped: larger values come from single sharp edges."""
-
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels that are counted."""
-
 MAX_VOXELS = 1 << 20
 """Largest number of voxels along a direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedSurface:
-    """A surface prepared for comparison, with the curvature at its n vertices.
+    """A closed surface in mm with even triangles, prepared for comparison, with the curvature at its n vertices.
 
-    Attributes
-    ----------
-    mesh
-        Closed surface in mm with even triangles.
-    mean_curvature : (n,) float
-        In 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`.
-    shape_index : (n,) float
-        From −1, a pit, to 1.
+    `mean_curvature` (n,) is in 1/mm, positive on gyri, clipped at ± `MAX_CURVATURE_PER_MM`; `shape_index` (n,) is from
+    −1, a pit, to 1.
     """
 
     mesh: TriangleMesh

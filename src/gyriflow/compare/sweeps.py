@@ -27,14 +27,15 @@ WITHIN_NOISE = "within noise of the next"
 WITHOUT_DISTANCE = (WEYL_NUMBER, CROSSING_FACES)
 """Metrics that are compared, but are not measures of similarity."""
 _VALUES = ("value", "observed_value")
-DISTANCE_COLUMNS = ("hemisphere", "measure", *_VALUES, "distance", "unit", "flag")
 PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "poisson_ratio"),
     *("growth_rate_per_s", "radial_growth_rate_per_s", "step_s", "start_week", "end_week"),
 )
 """Parameters of each run in `members.csv`, as in the tables of the FetalFoldSim paper."""
-LABELS = ("subject", "run", "observed", "observed_population", "same_population")
-COMPARISON_COLUMNS = [*LABELS, *DISTANCE_COLUMNS]
+COMPARISON_COLUMNS = [
+    *("subject", "run", "observed", "observed_population", "same_population"),
+    *("hemisphere", "measure", *_VALUES, "distance", "unit", "flag"),
+]
 
 Parts = Mapping[str, TriangleMesh]
 """Surfaces of a brain in mm: the "whole" and its hemispheres."""
@@ -51,26 +52,15 @@ def comparison_table(
 ) -> pd.DataFrame:
     """Measure how far a simulated brain is from each observed one.
 
-    Parameters
-    ----------
-    run, subject
-        Names of the run and of its start brain.
-    populations
-        Populations of the start brain and of the observed brains, by id.
-    metrics, spectra
-        Rows of the simulated brain and of the observed ones, whose `run` is "real".
-    simulated, observed
-        Surfaces of the simulated brain, and of the observed ones by id, in the same order of parts.
+    `run` and `subject` name the run and its start brain; `populations` are those of the start brain and of the observed
+    brains, by id. Metrics and spectra have the rows of the simulated brain and of the observed ones, whose `run` is
+    "real". The observed surfaces by id have the same parts as the simulated ones.
 
-    Returns
-    -------
-    DataFrame
-        The columns `COMPARISON_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
-        `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
-        `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `area`, `volume`, `gyrification_index`
-        (distance: absolute relative difference); `weyl_number` and `crossing_faces` (no distance);
-        `spectral_distance_…`; `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of
-        `comparison.compare`).
+    Columns are `COMPARISON_COLUMNS`; flag is "ok" or the reason why the value is not reliable. Measures are
+    `relative_power_B4` to `B6`, the share of a band in the power of the spectrum of mean curvature, and
+    `shape_index_relative_power_B4` to `B6` (distance: absolute difference); `area`, `volume`, `gyrification_index`
+    (distance: absolute relative difference); `weyl_number` and `crossing_faces` (no distance); `spectral_distance_…`;
+    `surface_distance` and `surface_distance95` (distance_mm and distance95_mm of `comparison.compare`).
     """
     bands = _pairs(spectra[spectra["band"].isin(FOLD_BANDS)], ["hemisphere", "proxy", "band"])
     measure = bands["proxy"].map(SPECTRUM_PREFIXES) + "relative_power_B" + bands["band"].astype(str)
@@ -128,17 +118,10 @@ def _with_distance(bands: pd.DataFrame, resolved: pd.Series) -> pd.DataFrame:
 def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.DataFrame:
     """Add the shares of spectra that are all cut at one number of modes per side, as in the FetalFoldSim paper.
 
-    The number is the largest Weyl number of the compared surfaces, simulated and observed. The measures are
-    `shape_index_relative_power_B4_weyl` to `B6_weyl`, with the flag "cut off" if fewer modes were computed or the band
-    begins beyond the cut.
-
-    Parameters
-    ----------
-    comparison
-        The columns `COMPARISON_COLUMNS` of all runs of a sweep.
-    coefficients
-        Columns subject, run ("real" for observed brains), hemisphere, mode, band, coefficient_shape_index of all
-        simulated and observed brains in the comparison.
+    The number is the largest Weyl number of the compared surfaces, simulated and observed, in the `comparison` of all
+    runs of a sweep. The measures are `shape_index_relative_power_B4_weyl` to `B6_weyl`, with the flag "cut off" if
+    fewer modes were computed or the band begins beyond the cut. Coefficients have the columns `COEFFICIENTS` of all
+    brains compared.
     """
     numbers = comparison[comparison["measure"] == WEYL_NUMBER]
     cuts = numbers.groupby("hemisphere")[list(_VALUES)].max().max(axis=1).to_dict()
@@ -148,17 +131,13 @@ def with_common_cut(comparison: pd.DataFrame, coefficients: pd.DataFrame) -> pd.
         powers = modes[modes["mode"] < cut].set_index("band")["coefficient_shape_index"] ** 2
         power = powers.groupby("band").sum().reindex(range(1, max(FOLD_BANDS) + 1))
         shares[run, subject, side] = power / power.sum() if len(modes) >= cut else power * np.nan
-    flags = comparison.set_index(["run", "subject", "observed", "hemisphere", "measure"])["flag"]
-    rows, resolved = [], []
-    for row in numbers.to_dict("records"):
-        run, subject, brain, side = (row[name] for name in ("run", "subject", "observed", "hemisphere"))
-        for band in FOLD_BANDS:
-            name = f"shape_index_relative_power_B{band}"
-            resolved.append(flags[run, subject, brain, side, name] != NOT_RESOLVED)
-            values = {"value": shares[run, subject, side][band], "observed_value": shares[MEASURED, brain, side][band]}
-            rows.append(row | values | {"measure": f"{name}_weyl"})
-    cut_bands = _with_distance(pd.DataFrame(rows, columns=COMPARISON_COLUMNS), pd.Series(resolved, dtype=bool))
-    return joined_comparisons([comparison, cut_bands])
+    bands = {f"shape_index_relative_power_B{band}": band for band in FOLD_BANDS}
+    rows = comparison[comparison["measure"].isin(bands)]
+    keys = rows[["run", "subject", "hemisphere"]].assign(band=rows["measure"].map(bands))
+    observed_keys = keys.assign(run=MEASURED, subject=rows["observed"])
+    values = (pd.concat(shares).loc[list(pairs.itertuples(index=False))].to_numpy() for pairs in (keys, observed_keys))
+    cut = rows.assign(measure=rows["measure"] + "_weyl", **dict(zip(_VALUES, values, strict=True)))
+    return joined_comparisons([comparison, _with_distance(cut, rows["flag"] != NOT_RESOLVED)])
 
 
 def member_row(
@@ -166,8 +145,8 @@ def member_row(
 ) -> dict[str, object]:
     """Return the row of a run in `members.csv`: its varied values, its outcome and its cost.
 
-    `labels` are study, run, subject and compare_week; `values` are the varied values by key; `params`, `zones` and
-    `summary` are the contents of the run's files.
+    Labels are study, run, subject and compare_week; `values` the varied values by key; the rest are the contents of the
+    run's files.
     """
     elements = zones["elements_through_cortex"]
     is_resolved = elements is not None and elements >= ELEMENTS_NEEDED[zones["order"]]
@@ -189,21 +168,12 @@ def member_row(
 def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequence[str]) -> pd.DataFrame:
     """Find the run that is nearest to each observed brain by each measure, per hemisphere.
 
-    Parameters
-    ----------
-    comparison
-        The columns subject, run, observed and `DISTANCE_COLUMNS`.
-    members
-        Rows of `member_row`.
-    varied
-        Columns of members with the varied values.
+    The comparison has the columns `COMPARISON_COLUMNS`; members are rows of `member_row`, whose columns `varied` have
+    the varied values.
 
-    Returns
-    -------
-    DataFrame
-        subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and the
-        distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
-        of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
+    Columns subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and
+    the distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
+    of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
     """
     keys, varied = ["subject", "observed", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]

@@ -7,6 +7,7 @@ import igl
 import igl.predicates
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .triangles import Floats, Ints, TriangleMesh, corners, edges, face_normals, transformed, vertex_normals
@@ -179,6 +180,12 @@ def values_at(match: Match, values: NDArray) -> Floats:
     """Return (n,) or (n, k) values at matched points from those at the surface's vertices, linear in each face."""
     weights = match.weights if values.ndim == 1 else match.weights[..., None]
     return np.asarray((values[match.corners] * weights).sum(axis=1))
+
+
+def interpolation(match: Match, size: int) -> sparse.csr_matrix:
+    """Return the matrix (n, size) that takes values at the vertices of a surface to the n matching points."""
+    rows = np.repeat(np.arange(len(match.corners)), 3)
+    return sparse.csr_matrix((match.weights.ravel(), (rows, match.corners.ravel())), (len(match.corners), size))
 
 
 def labels_at(match: Match, labels: NDArray[np.integer]) -> Ints:

@@ -5,7 +5,7 @@ Normals are outward, so that gyri are positive and sulci negative.
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,27 +21,21 @@ RESOLVED_RADII = 4.0
 deep as long, by 21 % for shallow ones; by 17 and 43 % at 2.6 radii, by 58 and 74 % at 1.7."""
 
 log = logging.getLogger(__name__)
-
 EDGES_PER_RADIUS = 2.0
 """Radius of the smallest ball in edges: with fewer neighbours a quadric follows the noise."""
 NOT_MUCH_LARGER = 1.1
 """A radius that is so many times larger than that asked for is used without a warning."""
-
 MAX_FAILED_SHARE = 0.01
-
 CHUNK = 1024
 """Vertices worked on at once: the arrays of their neighbours then stay in the processor's cache."""
-
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Shares of the area at which its distribution over mean curvature is given."""
-
 _POWERS = ((2, 0), (1, 1), (0, 2), (1, 0), (0, 1), (0, 0))
 _MONOMIALS = sorted({(a + c, b + d) for a, b in _POWERS for c, d in _POWERS})
 _NORMAL_EQUATIONS = np.array([[_MONOMIALS.index((a + c, b + d)) for a, b in _POWERS] for c, d in _POWERS])
 
 
-@dataclass(frozen=True, eq=False)
-class Curvature:
+class Curvature(NamedTuple):
     """Curvature per vertex of a surface with n vertices, and the (n,) radius of the ball that each is fitted in.
 
     `maximum` and `minimum` (n,) are the principal curvatures κ1 ≥ κ2 in 1/mm, both 1/R on a sphere of radius R.
@@ -82,9 +76,8 @@ def curvature(mesh: TriangleMesh, *, radius_mm: float = CURVATURE_RADIUS_MM) -> 
 
     The quadric is a local height function with slope (Cazals and Pouget 2005 call it a jet of degree 2); its principal
     curvatures are those at the vertex's foot. It need not pass through the vertex, which averages noise out. Where the
-    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning
-    where it is more than a tenth larger. Weights: see `_quadrics`. MeshError where a vertex in a hundred has no usable
-    neighbourhood.
+    local edges are longer than half of `radius_mm`, the ball grows to two of them, with a warning if it is more than a
+    tenth larger. MeshError where a vertex in a hundred has no usable neighbourhood.
     """
     finest = EDGES_PER_RADIUS * mean_edge_length(mesh)
     if finest > NOT_MUCH_LARGER * radius_mm:
@@ -117,14 +110,10 @@ def kept_curvature(wavelength_mm: Floats, radius_mm: float) -> Floats:
 def curvature_integrals(curvature: Curvature, areas: Floats) -> dict[str, float]:
     """Return integrals over a surface with (n,) areas of the vertices in mm², |k₁| the larger principal curvature.
 
-    intrinsic_curvature_index
-        1/4π ∫ max(K, 0) dA; 1 for all convex surfaces (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102).
-    folding_index
-        1/4π ∫ |k₁|(|k₁| − |k₂|) dA; 0 for a sphere (the same).
-    mean_curvature_norm
-        The L² norm 1/4π ∫ H² dA; 1 for a sphere (Batchelor et al. 2002, IEEE Trans. Med. Imaging 21, 953-965).
-    gaussian_curvature_norm
-        The L² norm 1/4π √(A ∫ K² dA) with A the area; 1 for a sphere (the same).
+    intrinsic_curvature_index is 1/4π ∫ max(K, 0) dA, 1 for all convex surfaces, and folding_index 1/4π ∫ |k₁|(|k₁| −
+    |k₂|) dA, 0 for a sphere (Van Essen and Drury 1997, J. Neurosci. 17, 7079-7102). mean_curvature_norm is the L² norm
+    1/4π ∫ H² dA and gaussian_curvature_norm 1/4π √(A ∫ K² dA) with A the area, both 1 for a sphere (Batchelor et al.
+    2002, IEEE Trans. Med. Imaging 21, 953-965).
     """
     smaller, larger = np.sort(np.abs([curvature.maximum, curvature.minimum]), axis=0)
     integrals = {
@@ -143,13 +132,6 @@ def mean_curvature_quantiles(curvature: Curvature, areas: Floats) -> dict[str, f
     return dict(zip(names, map(float, values), strict=True))
 
 
-def join(curvatures: list[Curvature]) -> Curvature:
-    """Return the curvature of surfaces side by side."""
-    return Curvature(
-        *(np.concatenate([getattr(part, field.name) for part in curvatures]) for field in fields(Curvature))
-    )
-
-
 def _edge_lengths(mesh: TriangleMesh) -> Floats:
     pairs, _ = edges(mesh)
     lengths = np.repeat(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1)[:, 0], axis=1), 2)
@@ -157,10 +139,7 @@ def _edge_lengths(mesh: TriangleMesh) -> Floats:
     return np.bincount(pairs.ravel(), lengths, size) / np.maximum(np.bincount(pairs.ravel(), minlength=size), 1)
 
 
-type Quadrics = tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]
-
-
-def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
+def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return quadrics over the tangent planes of n vertices, by weighted least squares in a ball round each.
 
     The ball contains the vertices that edges inside it link to its centre, so not the other wall of a sulcus. The
@@ -168,33 +147,21 @@ def _quadrics(mesh: TriangleMesh, radii_mm: Floats) -> Quadrics:
     like an integral and does not depend on the mesh. The weight falls to zero at the rim, and vertices whose normal
     differs by more than 90° do not count. The tangent plane is that of the weighted mean of the normals.
 
-    Returns
-    -------
-    coefficients : (n, 6) float
-        Of z = a x² + b x y + c y² + d x + e y + f: a, b, c in 1/mm, d, e without unit, f in mm; z along the outward
-        normal. 0 where nothing could be fitted.
-    fitted : (n,) bool
-        False where the neighbours do not determine a quadric.
-    one_sided : (n,) bool
-        True where the ball holds a vertex of the boundary of an open surface.
+    Returns the (n, 6) coefficients of z = a x² + b x y + c y² + d x + e y + f in mm, z along the outward normal, 0
+    where nothing could be fitted; whether (n,) the neighbours determine a quadric; and whether (n,) the ball holds a
+    vertex of the boundary of an open surface.
     """
-    links, boundary = _links(mesh)
+    (pairs, uses), size = edges(mesh), len(mesh.vertices)
+    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
+    links = sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size))
+    boundary = np.isin(np.arange(size), pairs[uses == 1])
     normals, areas = vertex_normals(mesh), vertex_areas(mesh)
     fits = [
-        _fit(mesh.vertices, normals, areas, radii_mm, centres, balls, boundary)
+        (*_fit(mesh.vertices, normals, areas, radii_mm, centres, balls), balls @ boundary)
         for centres, balls in _balls(mesh.vertices, radii_mm, links)
     ]
     coefficients, fitted, one_sided = (np.concatenate(parts) for parts in zip(*fits, strict=True))
     return coefficients, fitted, one_sided
-
-
-def _links(mesh: TriangleMesh) -> tuple[sparse.csr_matrix, NDArray[np.bool_]]:
-    pairs, uses = edges(mesh)
-    size = len(mesh.vertices)
-    boundary = np.zeros(size, dtype=bool)
-    boundary[pairs[uses == 1]] = True
-    both = np.concatenate([pairs, pairs[:, ::-1], np.arange(size)[:, None].repeat(2, axis=1)])
-    return sparse.csr_matrix((np.ones(len(both), dtype=bool), both.T), shape=(size, size)), boundary
 
 
 def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iterator[tuple[Ints, sparse.csr_matrix]]:
@@ -216,14 +183,8 @@ def _balls(vertices: Floats, radii_mm: Floats, links: sparse.csr_matrix) -> Iter
 
 
 def _fit(
-    vertices: Floats,
-    normals: Floats,
-    areas: Floats,
-    radii_mm: Floats,
-    centres: Ints,
-    balls: sparse.csr_matrix,
-    boundary: NDArray[np.bool_],
-) -> Quadrics:
+    vertices: Floats, normals: Floats, areas: Floats, radii_mm: Floats, centres: Ints, balls: sparse.csr_matrix
+) -> tuple[Floats, NDArray[np.bool_]]:
     near, starts, counts = balls.indices, balls.indptr[:-1], np.diff(balls.indptr)
     scale = np.repeat(radii_mm[centres], counts)
     offset = (vertices[near] - np.repeat(vertices[centres], counts, axis=0)) / scale[:, None]
@@ -253,4 +214,4 @@ def _fit(
     coefficients[fitted] = np.linalg.solve(matrices[fitted], right[fitted, :, None])[..., 0]
     # back from units of the radius
     coefficients *= radii_mm[centres, None] ** np.array([-1, -1, -1, 0, 0, 1])
-    return coefficients, fitted, balls @ boundary
+    return coefficients, fitted

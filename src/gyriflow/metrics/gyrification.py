@@ -16,16 +16,12 @@ from ..geometry.triangles import Floats, TriangleMesh, area, corners, face_areas
 
 ENVELOPE_RADIUS_MM = 5.0
 """The envelope bridges sulci narrower than twice this radius."""
-
 ENVELOPE_OFFSET_MM = 0.1
 """Distance at which the envelope is first wrapped round the surface."""
-
 PIECE_MM = 2.0
 """Size of the pieces that are classed as lying over the cut or over the pial surface."""
-
 ABOVE_MM = 0.3
 """Height above a piece at which the line into it begins: the envelope is in places below the surface."""
-
 LOCAL_RADIUS_MM = 10.0
 """Radius of the patches of the local index: two of the widest sulci that the envelope bridges."""
 

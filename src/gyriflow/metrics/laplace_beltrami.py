@@ -1,7 +1,6 @@
 """Modes of the Laplace-Beltrami operator of a triangle surface, K φ = λ M φ, with a count that none is missing."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import igl
 import numpy as np
@@ -10,17 +9,14 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import MeshError, SolverError
 from ..geometry.diffusion import stiffness_matrix
-from ..geometry.triangles import Floats, TriangleMesh
+from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 from ..settings.terms import MassMatrix
 
 TOLERANCE = 1e-11
 """Of the residual of a mode, relative to its eigenvalue."""
-
 MODES_PER_SLICE = 100
 """Eigenvalues that SLEPc looks for round each shift; from 60 to 200 it matters little."""
-
 SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
-
 DENSE_VERTICES = 1000
 """Up to this size LAPACK solves the problem as a whole."""
 
@@ -50,13 +46,8 @@ def laplacian(mesh: TriangleMesh, mass: MassMatrix = "mean") -> tuple[sparse.csc
     stiffness = stiffness_matrix(mesh.vertices, mesh.faces)
     matrix = igl.massmatrix(mesh.vertices, mesh.faces, igl.MASSMATRIX_TYPE_FULL)
     if mass == "mean":
-        matrix = 0.5 * (matrix + sparse.diags(lumped(matrix)))
+        matrix = 0.5 * (matrix + sparse.diags(vertex_areas(mesh)))
     return sparse.csc_matrix(stiffness), sparse.csc_matrix(matrix)
-
-
-def lumped(mass: sparse.csc_matrix) -> Floats:
-    """Return the (n,) area of each vertex in mm², the sums of a mass matrix' rows."""
-    return np.asarray(mass.sum(axis=1)).ravel()
 
 
 def first_eigenvalue(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix) -> float:
@@ -124,26 +115,22 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
         factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
         factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         solver.solve()
-        return _converged_modes(solver, operators[0], count)
+        if (converged := solver.getConverged()) != count:
+            raise SolverError("the number of modes is wrong", found=converged, expected=count, remedy=SLIVERS)
+        vector, _ = operators[0].createVecs()
+        values = np.array([solver.getEigenvalue(i).real for i in range(count)])
+        functions, order = np.empty((size, count), order="F"), np.argsort(values)
+        for column, i in enumerate(order):
+            solver.getEigenvector(int(i), vector)
+            functions[:, column] = vector.getArray()
+        vector.destroy()
+        return Modes(values[order], functions)
     except PETSc.Error as error:
         problem = f"the modes up to λ = {value:g} mm⁻² could not be found"
         raise SolverError(problem, found=f"SLEPc's error {error.ierr}", remedy=SLIVERS) from error
     finally:
         for thing in (solver, *operators):
             thing.destroy()
-
-
-def _converged_modes(solver: Any, operator: Any, number: int) -> Modes:
-    if (converged := solver.getConverged()) != number:
-        raise SolverError("the number of modes is wrong", found=converged, expected=number, remedy=SLIVERS)
-    vector, _ = operator.createVecs()
-    values = np.array([solver.getEigenvalue(i).real for i in range(number)])
-    functions, order = np.empty((vector.getSize(), number), order="F"), np.argsort(values)
-    for column, i in enumerate(order):
-        solver.getEigenvector(int(i), vector)
-        functions[:, column] = vector.getArray()
-    vector.destroy()
-    return Modes(values[order], functions)
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:

@@ -18,7 +18,6 @@ from .. import splines
 from ..geometry.triangles import Floats
 
 log = logging.getLogger(__name__)
-
 INTERVAL_Z = 1.645
 """Half the width of a 90 % interval in standard errors."""
 
@@ -40,7 +39,6 @@ SHAPE_WEIGHT = 0.6
 """Weight of the error of ln S at a week, beside that of its mean, in the degrees of freedom of Student's distribution.
 
 Such errors are nearer to normal than those of the mean, and make fewer extreme scores."""
-
 MAX_LEVERAGE = 0.9
 MIN_SCATTER = 1e-9
 ROUNDS, MAX_STEP = 60, 1.0
@@ -204,11 +202,9 @@ def fit_norm(weeks: Floats, values: Floats, people: ArrayLike, *, is_positive: b
     skewness, inverse = _skewness(fit, with_skewness, is_positive), np.linalg.inv(information)
     if scans.correlation is not None:
         # the scatter of the slopes with correlated scans
-        scatter = information.copy()
-        for part, part_rows, power in (
-            (slice(0, size), rows * np.exp(-log_scale)[:, None], 1),
-            (slice(size, size + scale_size), np.sqrt(2 * left)[:, None] * scale_rows, 2),
-        ):
+        scatter, parts = information.copy(), (slice(0, size), slice(size, size + scale_size))
+        scaled_rows = rows * np.exp(-log_scale)[:, None], np.sqrt(2 * left)[:, None] * scale_rows
+        for part, part_rows, power in zip(parts, scaled_rows, (1, 2), strict=True):
             scatter[part, part] = penalty[part, part] + part_rows.T @ scans.spread(part_rows, power)
         inverse = inverse @ scatter @ inverse
     units = np.ones(len(fit))
@@ -270,18 +266,12 @@ def _information(
     own = np.sqrt(each)[:, None] * rows
     leverage = np.einsum("ij,ij->i", own @ np.linalg.inv(location + penalty[:size, :size]), scans.spread(own)) / weights
     left = 1 - np.minimum(leverage, MAX_LEVERAGE)
-    blocks = [
-        [location, 2 * skewness * (rows.T * weights) @ scale_rows, -0.5 * rows.T @ weights[:, None]],
-        [
-            None,
-            2 * (scale_rows.T * (weights * left)) @ scale_rows,
-            -skewness * scale_rows.T @ (weights * squared)[:, None],
-        ],
-        [None, None, np.array([[7 / 4 * (weights @ squared)]])],
-    ]
-    for row, column in ((1, 0), (2, 0), (2, 1)):
-        blocks[row][column] = blocks[column][row].T
-    return np.block(blocks), left
+    scale = 2 * (scale_rows.T * (weights * left)) @ scale_rows
+    both = 2 * skewness * (rows.T * weights) @ scale_rows
+    location_skewness = -0.5 * rows.T @ weights[:, None]
+    scale_skewness = -skewness * scale_rows.T @ (weights * squared)[:, None]
+    last = [location_skewness.T, scale_skewness.T, np.array([[7 / 4 * (weights @ squared)]])]
+    return np.block([[location, both, location_skewness], [both.T, scale, scale_skewness], last]), left
 
 
 def _slope(terms: "_Terms", rows: Floats, scale_rows: Floats, weights: Floats, left: Floats) -> Floats:

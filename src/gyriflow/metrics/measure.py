@@ -28,14 +28,13 @@ from ..geometry.triangles import (
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES, MassMatrix
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, join, mean_curvature_quantiles
+from .curvature import RESOLVED_RADII, Curvature, curvature, curvature_integrals, mean_curvature_quantiles
 from .gyrification import Pieces, cap, envelope, gyrification_index, local_gyrification_index, pieces_over, sulcal_depth
 from .spangy import SpangyModes, Spectrum, spectral_basis, spectrum, weyl_number
 from .thickness import at_part
 
 type Metrics = dict[str, float]
 """Values by the names of their records, in their units."""
-
 LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
 """The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
 
@@ -102,22 +101,15 @@ def surface_spectra(
 ) -> pd.DataFrame:
     """Return the spectra of the hemispheres of a brain, as in `BrainMetrics.spectra`."""
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
+    maps = {name: curvature(mesh, radius_mm=curvature_radius_mm) for name, mesh in meshes.items()}
     return _band_table(
-        {
-            name: hemisphere_spectra(mesh, curvature(mesh, radius_mm=curvature_radius_mm), spangy_modes, spangy_mass)
-            for name, mesh in meshes.items()
-        }
+        {name: hemisphere_spectra(mesh, maps[name], spangy_modes, spangy_mass) for name, mesh in meshes.items()}
     )
 
 
 def _band_table(spectra: Mapping[str, Mapping[str, Spectrum]]) -> pd.DataFrame:
-    rows = [
-        part.bands.assign(hemisphere=name, proxy=proxy)
-        for name, parts in spectra.items()
-        for proxy, part in parts.items()
-    ]
-    table = pd.concat(rows, ignore_index=True)
-    return table[list(dict.fromkeys(["hemisphere", "proxy", *table.columns]))]
+    rows = {(name, proxy): part.bands for name, parts in spectra.items() for proxy, part in parts.items()}
+    return pd.concat(rows, names=["hemisphere", "proxy"]).reset_index([0, 1]).reset_index(drop=True)
 
 
 def _mode_table(name: str, spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
@@ -141,7 +133,7 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     """
     meshes = [side.mesh for side in sides]
     areas = np.concatenate([vertex_areas(mesh) for mesh in meshes])
-    curvature_maps = join([side.curvature_maps for side in sides])
+    curvature_maps = Curvature(*map(np.concatenate, zip(*(side.curvature_maps for side in sides), strict=True)))
     weights = areas * curvature_maps.reliable
     if not weights.any():
         reason = "every vertex has the edge of the surface within its radius"
@@ -257,33 +249,23 @@ def measure_brain(
     spangy_modes: SpangyModes = SPANGY_MODES,
     spangy_mass: MassMatrix = "mean",
 ) -> BrainMetrics:
-    """Measure a brain.
+    """Measure a brain by its closed pial surface, outward, in mm, and the pial surfaces of its hemispheres.
 
-    A cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
-    curvature within `curvature_radius_mm` of it out of the means. Except for volume and area, values of the whole
-    are those of both hemispheres: Σ area over Σ area of the hulls, and means over both.
+    A hemisphere is closed, or open where a connected brain is cut at the fissure; None if the brain does not have it. A
+    cut counts for the volume only. It is left out of area, gyrification, depth, curvature and spectrum, and depth and
+    curvature within `curvature_radius_mm` of it out of the means. Except for volume and area, values of the whole are
+    those of both hemispheres: Σ area over Σ area of the hulls, and means over both.
 
-    Parameters
-    ----------
-    whole
-        The closed pial surface, outward, in mm.
-    left, right
-        The pial surfaces of the hemispheres, closed, or open where a connected brain is cut at the fissure; None for a
-        hemisphere that the brain does not have.
-    thickness_mm : (n,) float
-        Cortical thickness at the vertices of `whole`, NaN where it was not measured; None where it is not known.
-    label_volumes_ml
-        Volumes of the labels inside the surface in mL, by name: those of `LABEL_VOLUMES` become metrics of the whole.
-    curvature_radius_mm, spangy_modes, spangy_mass
-        See `curvature.curvature` and `spangy.spectral_basis`.
-
-    Raises
-    ------
-    MeshError
-        Where a surface looks inwards, or a hemisphere is not in one piece.
+    `thickness_mm` (n,) is the cortical thickness at the vertices of `whole`, NaN where it was not measured, None where
+    it is not known; `label_volumes_ml` are the volumes of the labels inside the surface, of which those of
+    `LABEL_VOLUMES` become metrics of the whole. See `curvature.curvature` and `spangy.spectral_basis` for the others.
+    MeshError where a surface looks inwards, or a hemisphere is not in one piece.
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
-    _require_outward(whole, *meshes.values())
+    for mesh in (whole, *meshes.values()):
+        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
+            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
+            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
     folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in meshes.items()}
     spectra = {
         name: hemisphere_spectra(part.mesh, part.curvature_maps, spangy_modes, spangy_mass)
@@ -322,13 +304,6 @@ def measure_brain(
         spectra=_band_table(spectra),
         coefficients=pd.concat([_mode_table(name, part) for name, part in spectra.items()], ignore_index=True),
     )
-
-
-def _require_outward(*meshes: TriangleMesh) -> None:
-    for mesh in meshes:
-        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
-            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
-            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
 
 
 def measure_white(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,40 +19,26 @@ from .tables import BRAIN
 
 QUANTILES = {"q05": 0.05, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q95": 0.95}
 """The quantiles that norms give, by the names of their columns."""
-
 WINDOW_GW = 0.5
 """Brains are scored up to this long before the norm's first week and after its last."""
-
 FEW_SUBJECTS, FEW_CENTILES = 30, (5.0, 95.0)
 """With fewer subjects, centiles end at these, and norms without one of them are fitted again."""
-
 MAX_ONE_STEP_Z = 1.5
 """Other norms are fitted again without a subject that is beyond this z or has several scans; else it is removed by one
 Newton step."""
-
 MIN_SPREAD = 1e-6
 """Smallest spread of a norm over its values for which there are scores."""
-
 CURVE_POINTS = 41
 """Number of points of a norm's curve."""
-
 OTHER_SIDES = "other hemispheres"
 """Flag of a brain whose hemispheres are not those of the reference brains."""
 SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "centile_high", "brains", "flag")
 """Columns of `measured_scores` that follow the value and its unit."""
 
 
-class Norm(Protocol):
-    """The distribution of a quantity by week."""
-
-    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-        """Return z of values (n,) at weeks, and its 90 % interval (2, n), NaN if it is unknown."""
-
-    def values(self, weeks: ArrayLike, z: float) -> Floats:
-        """Return the values with a z at weeks (n,)."""
-
-
-def _scored(norm: Norm, week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)) -> dict[str, Any]:
+def _scored(
+    norm: "PublishedNorm | WeeklyNorm", week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)
+) -> dict[str, Any]:
     """Return the first eight of `SCORES`, with centiles between the given ones."""
     low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
     z, interval = norm.scores([week], [value])
@@ -109,58 +95,6 @@ def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
     return norms
 
 
-def structure_volumes(
-    volumes: Mapping[int, float], scheme: LabelScheme, norms: Mapping[str, PublishedNorm]
-) -> tuple[dict[str, float], list[str]]:
-    """Return the volumes of the structures of published norms, and the structures measured with another label scheme.
-
-    `volumes` are by label, in the norms' unit. With another scheme than the norm's, a structure is the scheme's tissue
-    that is closest to it, such as the cortex. A structure without voxels, or without labels in the scheme, is left out.
-    """
-    structures, substitutes = {}, []
-    for name, norm in norms.items():
-        same = norm.scheme == scheme.name
-        labels = norm.labels if same else getattr(scheme, norm.tissue, ())
-        total = sum(volumes.get(label, 0.0) for label in labels)
-        if total > 0:
-            structures[name] = total
-            substitutes += [] if same else [name]
-    return structures, substitutes
-
-
-def published_scores(
-    volumes: Mapping[str, float],
-    week: float,
-    norms: Mapping[str, PublishedNorm],
-    substitutes: Sequence[str] = (),
-    sides: Sequence[Side] = SIDES,
-) -> pd.DataFrame:
-    """Return the scores of the volumes of a brain against published norms.
-
-    `volumes` are by structure, in the norms' unit; structures without a norm are left out. `substitutes` are the
-    structures measured with another label scheme than the norm's, `sides` the hemispheres of the brain.
-
-    Columns structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal distribution,
-    0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other labels": the norm
-    was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain lacks a hemisphere
-    of the norm). Expected, z and centile are NaN with the last two flags.
-    """
-    rows = []
-    for name, value in volumes.items():
-        if name not in norms:
-            continue
-        norm = norms[name]
-        flag = "other labels" if name in substitutes else "ok"
-        if len(sides) < len(SIDES) and norm.side not in sides:
-            flag = "one hemisphere"
-        elif not norm.weeks[0] <= week <= norm.weeks[1]:
-            flag = "outside the norm's weeks"
-        row = {"structure": name, "week": week, "value": value, "unit": norm.unit, "brains": norm.subjects}
-        rows.append(row | {"flag": flag} | (_scored(norm, week, value) if flag in {"ok", "other labels"} else {}))
-    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
-    return pd.DataFrame(rows, columns=columns).astype({"brains": float})
-
-
 @dataclass(frozen=True)
 class LabelledBrain:
     """A measured brain, the volume in mL of each of its labels, and the label scheme."""
@@ -172,22 +106,50 @@ class LabelledBrain:
     volumes: Mapping[int, float]
 
 
+def published_scores(brain: LabelledBrain, norms: Mapping[str, PublishedNorm]) -> pd.DataFrame:
+    """Return the scores of the volumes of a brain's structures against published norms.
+
+    With another label scheme than the norm's, a structure is the scheme's tissue that is closest to it, such as the
+    cortex. A structure without voxels, or without labels in the scheme, is left out.
+
+    Columns subject, structure, week, value, unit, expected, sd, z = (value − expected)/sd, centile (of the normal
+    distribution, 0 to 100), brains (in the norm; NaN if its source does not give their number), flag ("ok"; "other
+    labels": the norm was measured with another label scheme; "outside the norm's weeks"; "one hemisphere" if the brain
+    lacks a hemisphere of the norm). Expected, z and centile are NaN with the last two flags.
+    """
+    rows = []
+    for name, norm in norms.items():
+        is_same = norm.scheme == brain.scheme.name
+        labels = norm.labels if is_same else getattr(brain.scheme, norm.tissue, ())
+        value = sum(brain.volumes.get(label, 0.0) for label in labels)
+        if value <= 0:
+            continue
+        flag = "ok" if is_same else "other labels"
+        if len(brain.sides) < len(SIDES) and norm.side not in brain.sides:
+            flag = "one hemisphere"
+        elif not norm.weeks[0] <= brain.week <= norm.weeks[1]:
+            flag = "outside the norm's weeks"
+        row = {"structure": name, "value": value, "unit": norm.unit, "brains": norm.subjects, "flag": flag}
+        rows.append(row | (_scored(norm, brain.week, value) if flag in {"ok", "other labels"} else {}))
+    columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
+    table = pd.DataFrame(rows, columns=["subject", *columns]).astype({"brains": float})
+    return table.assign(subject=brain.subject, week=brain.week)
+
+
 def volume_tables(
     brains: Sequence[LabelledBrain], norms: Mapping[str, PublishedNorm]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the volumes of all labels of brains, and their scores against published norms.
+    """Return the volumes of all labels of brains, and their `published_scores`.
 
-    Columns subject, run ("real"), week, label, tissue, volume_mL; subject and those of `published_scores`.
+    Columns subject, run ("real"), week, label, tissue, volume_mL.
     """
-    rows, scores = [], []
-    for brain in brains:
-        columns = brain.subject, MEASURED, brain.week
-        rows += [(*columns, label, brain.scheme.labels.get(label, ""), ml) for label, ml in brain.volumes.items()]
-        found, substitutes = structure_volumes(brain.volumes, brain.scheme, norms)
-        scored = published_scores(found, brain.week, norms, substitutes, brain.sides)
-        scores.append(scored.assign(subject=brain.subject)[["subject", *scored.columns]])
-    volumes = pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"])
-    return volumes, pd.concat(scores, ignore_index=True)
+    rows = [
+        (brain.subject, MEASURED, brain.week, label, brain.scheme.labels.get(label, ""), volume)
+        for brain in brains
+        for label, volume in brain.volumes.items()
+    ]
+    scores = pd.concat([published_scores(brain, norms) for brain in brains], ignore_index=True)
+    return pd.DataFrame(rows, columns=[*BRAIN, "label", "tissue", "volume_mL"]), scores
 
 
 @dataclass(frozen=True)
@@ -204,7 +166,7 @@ class CohortNorms:
 
     @property
     def hemispheres(self) -> str:
-        """The hemispheres of its brains, as of `_hemispheres_of`."""
+        """The hemispheres of its brains."""
         return " ".join(sorted({hemisphere for hemisphere, _ in self.norms}))
 
     def volumes_ml(self, weeks: Sequence[float]) -> Floats:
@@ -273,8 +235,11 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     """
     names = [*BRAIN, "hemisphere", "metric", "value", "unit"]
     by_metric = dict(_by_metric(metrics, reference))
-    is_comparable = same_sides(metrics, reference) if len(reference) else _hemispheres_of(metrics) == cohort.hemispheres
-    table = _with_norm(metrics.assign(is_comparable=is_comparable))
+    # the whole of a brain with one hemisphere is that hemisphere: it has half of the volume and area of others
+    sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
+    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
+    expected = sides[is_reference] if len(reference) else [cohort.hemispheres]
+    table = _with_norm(metrics.assign(is_comparable=sides.isin(expected)))
     rows = []
     for row in table.to_dict("records"):
         key = row["hemisphere"], row["metric"]
@@ -320,20 +285,6 @@ def _score(
     return score | {"flag": "few brains" if is_small else "ok"}
 
 
-def same_sides(metrics: pd.DataFrame, reference: Sequence[str]) -> pd.Series:
-    """Return for each row of a table of metrics whether its brain has the hemispheres of a reference's brains.
-
-    The whole of a brain with one hemisphere is that hemisphere: its volume and area are half of what others have.
-    """
-    sides = _hemispheres_of(metrics)
-    is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    return sides.isin(sides[is_reference])
-
-
-def _hemispheres_of(metrics: pd.DataFrame) -> pd.Series:
-    return metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
-
-
 def _with_norm(metrics: pd.DataFrame) -> pd.DataFrame:
     """Return the rows with a value of a metric that has norms, with the column person."""
     has_norm = metrics["metric"].map(lambda name: METRICS[name].has_norm).astype(bool)
@@ -357,11 +308,10 @@ def norm_curves(cohort: CohortNorms) -> pd.DataFrame:
     for (hemisphere, metric), (unit, norm) in cohort.norms.items():
         weeks = np.linspace(norm.first, norm.last, CURVE_POINTS if norm.last > norm.first else 1)
         low, expected, high = (norm.values(weeks, z) for z in (-1.0, 0.0, 1.0))
-        interval = norm.median_interval(weeks)
-        band = {"week": weeks, "brains": norm.subjects, "expected": expected}
-        band |= {"expected_low": interval[0], "expected_high": interval[1]}
-        spread = {"sd": 0.5 * (high - low)}
-        spread |= {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
-        band |= spread if cohort.individuals else dict.fromkeys(spread, np.nan)
-        parts.append(pd.DataFrame(band).assign(hemisphere=hemisphere, metric=metric, unit=unit))
+        band = {"hemisphere": hemisphere, "metric": metric, "unit": unit, "week": weeks, "brains": norm.subjects}
+        first, last = norm.median_interval(weeks)
+        band |= {"expected": expected, "expected_low": first, "expected_high": last}
+        spread = {name: norm.values(weeks, float(stats.norm.ppf(q))) for name, q in QUANTILES.items()}
+        spread |= {"sd": 0.5 * (high - low)}
+        parts.append(pd.DataFrame(band | (spread if cohort.individuals else dict.fromkeys(spread, np.nan))))
     return pd.concat(parts[1:] or parts, ignore_index=True)[[*columns, *QUANTILES]]

@@ -12,30 +12,26 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-from ..geometry.matching import match_surface
+from ..geometry.matching import interpolation, match_surface
 from ..geometry.remeshing import decimate
-from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges
+from ..geometry.triangles import Floats, Ints, TriangleMesh, area, edges, vertex_areas
 from ..settings.terms import FOLD_BANDS, MEASURED, MIN_KEPT_CURVATURE, PROXIES, LastBand, MassMatrix
 from .curvature import kept_curvature
-from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, lumped, modes_below
+from .laplace_beltrami import count_below, first_eigenvalue, laplacian, lowest_modes, modes_below
 
 type SpangyModes = int | LastBand
 
 BANDS = 6
 """The bands are B0 to B6; B4, B5 and B6 go with primary, secondary and tertiary folds."""
-
 PARTS = 16
 """Parts of a band, each a sixteenth of an octave of wavelength, whose powers are given for distances of spectra."""
 PART_POWERS = [f"power_{part:02d}of{PARTS}" for part in range(1, PARTS + 1)]
-
 HEMISPHERE = ["subject", "run", "week", "hemisphere"]
 """The columns that name a hemisphere in the tables of a study."""
 OPEN_AND_CLOSED = "open and closed hemispheres"
 """Flag of a distance between an open hemisphere and a closed one: closing a cut makes L 5 to 7 % shorter."""
-
 ROUNDING = 1e-9
 """Limits of bands that differ by less, relative to their size, are equal."""
-
 VERTICES_PER_WAVELENGTH = 8.0
 """Edges per shortest wave on the surface that modes are computed on; `benchmarks/spectra.py` compares other numbers."""
 LONGEST_EDGE_MM = 1.8
@@ -73,9 +69,7 @@ def weyl_number(area_mm2: float, first: float) -> int:
     WL6 = WL0/2⁶ with WL0 = 2π/√λ1, and λmax = 2π/WL6², the formula printed in the FetalFoldSim paper; it is 2π times
     smaller than (2π/WL6)² = 4⁶·λ1, the upper limit of B6.
     """
-    shortest = 2.0 * np.pi / np.sqrt(first) / 2.0**BANDS
-    largest = 2.0 * np.pi / shortest**2
-    return round(area_mm2 * largest / (4.0 * np.pi))
+    return round(area_mm2 * first * 4.0**BANDS / (8.0 * np.pi**2))
 
 
 def band_limits(first: float) -> Floats:
@@ -123,18 +117,14 @@ def spectral_basis(mesh: TriangleMesh, choice: SpangyModes, mass: MassMatrix = "
     """
     stiffness, matrix = laplacian(mesh, mass)
     first, places = first_eigenvalue(stiffness, matrix), sparse.eye(len(mesh.vertices), format="csr")
-    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(lumped(matrix)))
+    energy = matrix if mass == "consistent" else sparse.csc_matrix(sparse.diags(vertex_areas(mesh)))
     by_name = isinstance(choice, str)
     end = float(band_limits(first)[int(str(choice)[1:])]) if by_name else 4.0 * np.pi * int(choice) / area(mesh)
     edge_mm = min(2.0 * np.pi / np.sqrt(end) / VERTICES_PER_WAVELENGTH, LONGEST_EDGE_MM)
     needed = ceil(area(mesh) / (np.sqrt(0.75) * edge_mm**2))
     if mass == "mean" and needed < WORTHWHILE * len(mesh.vertices):
         copy = decimate(mesh, needed)
-        match, columns = match_surface(mesh, copy), len(copy.vertices)
-        rows = np.repeat(np.arange(len(mesh.vertices)), 3)
-        places = sparse.csr_matrix(
-            (match.weights.ravel(), (rows, match.corners.ravel())), (len(mesh.vertices), columns)
-        )
+        places = interpolation(match_surface(mesh, copy), len(copy.vertices))
         stiffness, matrix = laplacian(copy, mass)
     number = stiffness.shape[0] // 2
     if by_name and (count := count_below(stiffness, matrix, end)) <= number:

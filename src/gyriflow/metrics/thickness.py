@@ -28,14 +28,11 @@ def depth_of_weight(weight: Floats) -> Floats:
 def simulated_thickness(start: TetrahedralMesh, depth: Floats, positions: Floats, pial: TriangleMesh) -> Floats:
     """Return the (n,) cortical thickness in mm at the vertices of a simulated pial surface.
 
-    The border between cortex and core is where the depth at the start is the cortical thickness, which is where the
-    cortical weight is ½. It is made of material points and carried with the tissue: the cortex of a later week is what
-    was cortex at the start, however much it has grown or been pressed. Thickness is then that of the layer between the
-    pial surface and the carried border, as in measured brains (`geometry.matching.layer_thickness`).
-
-    Of the m vertices of the mesh of the start, `depth` (m,) is the distance to the pial surface over the cortical
-    thickness there, 1 at the border, as `depth_of_weight` gives it; `positions` (m, 3) are the present ones in mm, as
-    is the pial surface. MeshError where no point is deeper than the cortex.
+    It is that of the layer between the pial surface and the border of cortex and core
+    (`geometry.matching.layer_thickness`). The border is carried with the tissue: the cortex of a later week is what was
+    cortex at the start, however much it has grown or been pressed. `depth` (m,) of the mesh of the start is the
+    distance to the pial surface over the cortical thickness, 1 at the border, as `depth_of_weight` gives it;
+    `positions` (m, 3) are the present ones in mm. MeshError where no point is deeper than the cortex.
     """
     grid = pv.UnstructuredGrid({pv.CellType.TETRA: linear_pieces(start)}, np.asarray(positions, dtype=float))
     grid.point_data["depth"] = depth

@@ -1,7 +1,6 @@
 """Sulci, their names and the week when they appear, in grooves of known depth."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from shapes import sphere
 
@@ -25,20 +24,18 @@ NAMES = {1: "central", 2: "calcarine", 3: "nowhere"}
 
 def test_relief_is_bottom_below_crowns_not_depth_below_the_hull():
     mesh, depths = groove(3.0)
-    table = measure_relief(mesh, depths, REGIONS, NAMES).set_index("region")
-    assert table.loc["central", "relief_mm"] == pytest.approx(3.0, abs=0.35)
-    assert table.loc["calcarine", "relief_mm"] == pytest.approx(0.0, abs=1e-9)
-    assert np.isnan(table.loc["nowhere", "relief_mm"])
+    reliefs = measure_relief(mesh, depths, REGIONS, NAMES)
+    assert reliefs["central"] == pytest.approx(3.0, abs=0.35)
+    assert reliefs["calcarine"] == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(reliefs["nowhere"])
     # a wide place that lies deep, as the insula does, is no sulcus
     sunken = measure_relief(mesh, np.where(POINTS[:, 0] > 0, 6.0, 0.0), REGIONS, NAMES)
-    assert sunken["relief_mm"].iloc[0] == 0
+    assert sunken["central"] == 0
 
 
 def reliefs_of(depths):
-    """Return tables of `measure_relief` by week, with what is known of two regions beside the ball."""
-    return {
-        week: pd.DataFrame({"region": ["central", "calcarine"], "relief_mm": [d, 0.1]}) for week, d in depths.items()
-    }
+    """Return the reliefs of two regions by week."""
+    return {week: {"central": depth, "calcarine": 0.1} for week, depth in depths.items()}
 
 
 def test_onset_is_when_two_millimetres_are_reached_whatever_the_order_of_weeks():

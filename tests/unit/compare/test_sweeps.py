@@ -46,7 +46,14 @@ def spectra(run, subject, powers):
         for proxy, factor in (("mean_curvature", 1), ("shape_index", 2))
         for band, power in zip((4, 5, 6), powers, strict=True)
     ]  # fmt: skip
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).assign(week=28.0)
+
+
+def with_parts(table):
+    """Add the powers of the parts of bands, all in the middle of a band of a brain with L = 128 mm."""
+    table = table.assign(wavelength_max_mm=256.0 / 2.0 ** table["band"], is_open=False)
+    table[PART_POWERS] = np.outer(table["power"], np.arange(16) == 7)
+    return table
 
 
 METRICS = pd.DataFrame(
@@ -66,7 +73,7 @@ def parts(radius):
 
 def test_distances_are_those_of_bands_sizes_spectra_and_surfaces():
     both = pd.concat([spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1))])
-    both = both.assign(week=28.0, power=both["relative_power"])
+    both = with_parts(both.assign(power=both["relative_power"]))
     surfaces = [{"whole": sphere(radius, 3)} for radius in (10.0, 11.5)]
     table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surfaces[0], {"b": surfaces[1]})
     table = table.set_index(["hemisphere", "measure"])
@@ -90,7 +97,7 @@ def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
     both = pd.concat(
         [spectra("sim", "a", (0.5, 0.2, 0.1)), spectra("real", "b", (0.4, 0.3, 0.1)).assign(complete=False)]
     )
-    both = both.assign(week=28.0, power=both["relative_power"])
+    both = with_parts(both.assign(power=both["relative_power"]))
     surface = {"whole": sphere(10.0, 2)}
     table = comparison_table("sim", "a", {"a": "", "b": ""}, METRICS, both, surface, {"b": surface})
     (row,) = table[table["measure"] == "relative_power_B4"].to_dict("records")
@@ -104,17 +111,14 @@ def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named(
         spectra("real", "b", (0.4, 0.3, 0.1)),
         spectra("real", "c", (0.1, 0.1, 0.1)),
     ]
-    power = [table.assign(week=28.0, power=table["relative_power"] * 10) for table in tables]
+    power = [table.assign(power=table["relative_power"] * 10) for table in tables]
     bands = [table.assign(band=band, power=5.0, relative_power=0.1) for table in power for band in (1, 2, 3)]
     rows = [("real", "c", "whole", "area", 180.0, "cm2")]
     metrics = pd.concat([METRICS, pd.DataFrame(rows, columns=list(METRICS))])
     populations = {"a": "normal", "b": "normal", "c": "operated"}
     observed = {"b": parts(12.0), "c": parts(15.0)}
     both = pd.concat([*power, *bands], ignore_index=True)
-    both = both.drop_duplicates(["run", "subject", "proxy", "band"])
-    both = both.assign(wavelength_max_mm=128.0 / 2.0 ** both["band"], is_open=False)
-    # in the middle of each band
-    both[PART_POWERS] = np.outer(both["power"], np.arange(16) == 7)
+    both = with_parts(both.drop_duplicates(["run", "subject", "proxy", "band"]))
     table = comparison_table("sim", "a", populations, metrics, both, parts(10.0), observed)
     assert list(table) == COMPARISON_COLUMNS
     assert set(table["subject"] + table["run"]) == {"asim"}

@@ -22,7 +22,6 @@ from gyriflow.metrics.norms import (
     norm_curves,
     published_norms,
     published_scores,
-    structure_volumes,
     volume_tables,
 )
 from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
@@ -45,11 +44,13 @@ def table(weeks: np.ndarray, values: np.ndarray, *others: tuple[str, float, floa
     return pd.DataFrame(rows, columns=COLUMNS), [f"s{i}" for i in range(len(weeks))]
 
 
+def labelled(week, volumes, scheme="dhcp-19", sides=SIDES):
+    return LabelledBrain("a", week, sides, SCHEMES[scheme], volumes)
+
+
 def test_published_volumes_of_cortex_and_white_matter() -> None:
     # at 29 weeks: 0.3052·841 − 11.828·29 + 123 and 0.0223·841 + 7.3471·29 − 145.28
-    found = published_scores({"cortex": 36.66 + 3.787, "white_matter": 86.54, "tail": 1.0}, 29.0, NORMS).set_index(
-        "structure"
-    )
+    found = published_scores(labelled(29.0, {3: 36.66 + 3.787, 5: 86.54, 99: 1.0}), NORMS).set_index("structure")
     assert found["expected"].tolist() == pytest.approx([36.66, 86.54], abs=0.01)
     assert list(found.index) == ["cortex", "white_matter"]
     # SD of the cortex: 0.01647·841 − 0.47701·29 + 3.76905
@@ -57,7 +58,7 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert found.loc["cortex", "z"] == pytest.approx(1.0, abs=0.01)
     assert found["centile"].tolist() == pytest.approx([84.13, 50.0], abs=0.3)
     assert np.isnan(found["brains"]).all()
-    assert published_scores({"cortex": 30.0}, 18.0, NORMS)["flag"].tolist() == ["outside the norm's weeks"]
+    assert published_scores(labelled(18.0, {3: 30.0}), NORMS)["flag"].tolist() == ["outside the norm's weeks"]
 
 
 def scores(metrics, reference, **options):
@@ -378,24 +379,22 @@ def test_half_a_brain_is_not_compared_with_whole_ones() -> None:
 
 
 def test_one_hemisphere_is_not_scored_by_volumes_of_both() -> None:
-    volumes = {"cortex": 20.0, "left_lateral_ventricle": 2.3, "right_lateral_ventricle": 2.3}
-    found = published_scores(volumes, 29.0, NORMS, sides=("left",)).set_index("structure")
+    volumes = {3: 20.0, 7: 2.3, 8: 2.3}
+    found = published_scores(labelled(29.0, volumes, sides=("left",)), NORMS).set_index("structure")
     assert found["flag"].tolist() == ["one hemisphere", "ok", "one hemisphere"]
     assert found.loc["cortex", ["expected", "sd", "z", "centile"]].isna().all()
     assert found.loc["left_lateral_ventricle", "z"] == pytest.approx(0.0, abs=0.1)
-    assert (published_scores(volumes, 29.0, NORMS)["flag"] == "ok").all()
+    assert (published_scores(labelled(29.0, volumes), NORMS)["flag"] == "ok").all()
 
 
 def test_structures_of_the_norms_scheme_and_of_others() -> None:
-    own, others = structure_volumes({3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}, SCHEMES["dhcp-19"], NORMS)
-    assert own == {"cortex": 9.0, "deep_grey": 3.0, "left_lateral_ventricle": 1.0}
-    assert others == []
+    own = published_scores(labelled(21.0, {3: 4.0, 4: 5.0, 7: 1.0, 14: 2.0, 17: 1.0}), NORMS).set_index("structure")
+    assert own["value"].to_dict() == {"cortex": 9.0, "deep_grey": 3.0, "left_lateral_ventricle": 1.0}
+    assert set(own["flag"]) == {"ok"}
     # 2 is the cortex of FeTA and outer CSF of BOUNTI; it has no sides for the ventricles
-    found, others = structure_volumes({2: 8.0, 3: 40.0, 4: 3.0}, SCHEMES["feta-7"], NORMS)
-    assert found == {"cortex": 8.0, "white_matter": 40.0}
-    assert others == ["cortex", "white_matter"]
-    scores = published_scores(found | {"cortex": 9.0}, 21.0, NORMS, others)
-    assert scores["flag"].tolist() == ["other labels"] * 2
+    other = published_scores(labelled(21.0, {2: 8.0, 3: 40.0, 4: 3.0}, "feta-7"), NORMS).set_index("structure")
+    assert other["value"].to_dict() == {"cortex": 8.0, "white_matter": 40.0}
+    assert set(other["flag"]) == {"other labels"}
 
 
 def test_tables_of_volumes_have_the_labels_and_the_structures_of_each_brain():
