@@ -14,7 +14,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding, advance
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
-from gyriflow.geometry.triangles import TriangleMesh, face_areas
+from gyriflow.geometry.triangles import TriangleMesh, area
 from gyriflow.settings.folding import FoldingParameters, parameters_from
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -22,9 +22,11 @@ from .boxes import box_zones
 
 WIDTH_MM, DEPTH_MM = 8.0, 8.0
 """About the fastest wave at a contrast of 5, which is 7.07 mm."""
-HEIGHT_MM = 0.5
-"""Height of the wave at the start."""
-RATE_PER_S, CORE_RATE_PER_S = 1e-7, 5e-8
+GROOVE_MM, GROOVE_WIDTH_MM = 1.5, 0.8
+"""Depth of the sulcus at the start, and the distance from its middle at which 1/e of that is left."""
+RATE_PER_S = 1e-7
+"""Rate of the cortex along the surface, and of the core in all directions, which widens the gyri and shuts the sulcus.
+"""
 CONTRAST, CORE_PA = 5.0, 300.0
 FINE_DEPTH_MM = 2.5
 COARSENING = 1.5
@@ -53,7 +55,7 @@ class Slab:
                 "shear_modulus_core_pa": CORE_PA,
                 "shear_modulus_cortex_pa": CORE_PA * CONTRAST,
                 "growth_rate_per_s": RATE_PER_S,
-                "core_growth_rate_per_s": CORE_RATE_PER_S,
+                "core_growth_rate_per_s": RATE_PER_S,
                 "step_s": self.growth / RATE_PER_S,
                 "support": "free",
                 "contact": {"kind": self.contact},
@@ -66,7 +68,7 @@ class Slab:
 class Fold:
     """The surface after a step.
 
-    `growth` is that of the cortex so far, `area_ratio` that of the surface to the area of the flat slab, `depth_mm`
+    `growth` is that of the cortex so far, `area_ratio` the area of the surface over that at the start, `depth_mm`
     that of the sulcus, and `pressure_pa` the mean pressure of one bank on the other: their force over the depth.
     """
 
@@ -90,8 +92,8 @@ def mesh_of(slab: Slab) -> TetrahedralMesh:
     mesh = grid([x, np.arange(2) / slab.cells, -np.array(down)[::-1] * DEPTH_MM / down[-1]])
     mesh = mesh if slab.order == 1 else quadratic(mesh)
     vertices = mesh.vertices.copy()
-    wave = HEIGHT_MM / 2 * np.cos(2 * np.pi * vertices[:, 0] / WIDTH_MM)
-    vertices[:, 2] -= wave * (1 + vertices[:, 2] / DEPTH_MM) ** 2
+    groove = GROOVE_MM * np.exp(-((vertices[:, 0] / GROOVE_WIDTH_MM) ** 2))
+    vertices[:, 2] -= groove * (1 + vertices[:, 2] / DEPTH_MM) ** 2
     return TetrahedralMesh(vertices, mesh.tets)
 
 
@@ -108,18 +110,18 @@ def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> lis
 
 def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
     """Return the fold after the last step."""
-    top, places = folding.zones.cortex_facets, state.positions * MM_PER_M
+    top, start, places = folding.zones.cortex_facets, mesh_of(slab).vertices, state.positions * MM_PER_M
     across, height = 1 / slab.cells, places[np.unique(top), 2]
     depth_mm, force, surface = float(np.ptp(height)), 0.0, TriangleMesh(places, folding.zones.facets)
     if (contact := folding.contact) is not None:
         u, curved = folding.solved.displacement, contact.surface
         # of quadratic elements, the finer surface that contact acts on
         surface = TriangleMesh(curved.reference_mm() + curved.displacement_mm(u), curved.faces)
-        is_left = mesh_of(slab).vertices[curved.nodes, 0] < -1e-9
+        is_left = start[curved.nodes, 0] < -1e-9
         force = abs(float(contact.forces(u)[is_left, 0].sum()))
     return Fold(
         growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
-        area_ratio=float(face_areas(TriangleMesh(places, top)).sum() / (WIDTH_MM * across)),
+        area_ratio=area(TriangleMesh(places, top)) / area(TriangleMesh(start, top)),
         depth_mm=depth_mm,
         pressure_pa=force / (across * depth_mm * M_PER_MM**2) / slab.growth,
         crossing=crossing_faces(surface),
