@@ -28,6 +28,8 @@ RATE_PER_S = 1e-7
 """Rate of the cortex along the surface, and of the core in all directions, which widens the gyri and shuts the sulcus.
 """
 CONTRAST, CORE_PA = 5.0, 300.0
+BOTTOM = 0.25
+"""Share of the depth of the sulcus that counts as its bottom."""
 FINE_DEPTH_MM = 2.5
 COARSENING = 1.5
 """Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
@@ -69,7 +71,8 @@ class Fold:
     """The surface after a step.
 
     `growth` is that of the cortex so far, `area_ratio` the area of the surface over that at the start, `depth_mm`
-    that of the sulcus, and `pressure_pa` the mean pressure of one bank on the other: their force over the depth.
+    that of the sulcus, and `pressure_pa` the mean pressure of its banks on each other in a step, per growth in it, without
+    the bottom of the sulcus: there the surface is so compressed that neighbours repel each other.
     """
 
     growth: float
@@ -111,21 +114,21 @@ def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> lis
 def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
     """Return the fold after the last step."""
     top, start, places = folding.zones.cortex_facets, mesh_of(slab).vertices, state.positions * MM_PER_M
-    across, height = 1 / slab.cells, places[np.unique(top), 2]
+    across, height, row = 1 / slab.cells, places[np.unique(top), 2], state.rows[-1]
     depth_mm, force, surface = float(np.ptp(height)), 0.0, TriangleMesh(places, folding.zones.facets)
     if (contact := folding.contact) is not None:
         u, curved = folding.solved.displacement, contact.surface
         # of quadratic elements, the finer surface that contact acts on
         surface = TriangleMesh(curved.reference_mm() + curved.displacement_mm(u), curved.faces)
-        is_left = start[curved.nodes, 0] < -1e-9
-        force = abs(float(contact.forces(u)[is_left, 0].sum()))
+        is_bank = (start[curved.nodes, 0] < 0) & (places[curved.nodes, 2] > height.min() + BOTTOM * depth_mm)
+        force = abs(float(contact.forces(u)[is_bank, 0].sum()))
     return Fold(
         growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
         area_ratio=area(TriangleMesh(places, top)) / area(TriangleMesh(start, top)),
         depth_mm=depth_mm,
-        pressure_pa=force / (across * depth_mm * M_PER_MM**2) / slab.growth,
+        pressure_pa=force / (across * (1 - BOTTOM) * depth_mm * M_PER_MM**2) / (row["dt_s"] * RATE_PER_S),
         crossing=crossing_faces(surface),
-        least_volume_ratio=state.rows[-1]["min_J"],
+        least_volume_ratio=row["min_J"],
     )
 
 
