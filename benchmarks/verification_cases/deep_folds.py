@@ -71,7 +71,7 @@ class Fold:
     """The surface after a step.
 
     `growth` is that of the cortex so far, `area_ratio` the area of the surface over that at the start, `depth_mm`
-    that of the sulcus, and `pressure_pa` the mean pressure of its banks on each other in a step, per growth in it, without
+    that of the sulcus, and `pressure_pa` the mean pressure of its banks on each other per growth in the step, without
     the bottom of the sulcus: there the surface is so compressed that neighbours repel each other.
     """
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from shapes import box_mesh, ellipsoid_mesh
 
-
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.alignment import rigid_fit
 from gyriflow.geometry.deformations import transform_points

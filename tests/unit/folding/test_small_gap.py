@@ -7,7 +7,7 @@ from gyriflow.folding.contact import small_gap_mm
 
 
 def gaps(near, others, far):
-    """Return shuffled gaps in mm: a list of small ones, and counts of uneven ones around 0.5 mm and of infinite ones."""
+    """Return shuffled gaps in mm: a list of small ones, and counts of uneven ones from 0.5 mm on and infinite ones."""
     rng = np.random.default_rng(4)
     return rng.permutation([*near, *np.linspace(0.5, 0.9, others), *np.full(far, np.inf)])
 
