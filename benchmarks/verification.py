@@ -33,7 +33,7 @@ MEMORIES = (0.0, 0.05, np.inf)
 TWO_WEEKS = 2e-7 * 2 * 604_800
 """Growth of the reference model in two weeks."""
 STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 56}
-DEEP_CELLS = {1: (2, 3, 4), 2: (1, 1.5, 2)}
+DEEP_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4), 2: (1, 1.5)}
 """Cells per cortical thickness by element order."""
 DEEP_GROWTH, DEEP_AREA_RATIO = (0.04, 0.02), 1.6
 RANKS = (1, 2, 3)

