@@ -33,8 +33,11 @@ MEMORIES = (0.0, 0.05, np.inf)
 TWO_WEEKS = 2e-7 * 2 * 604_800
 """Growth of the reference model in two weeks."""
 STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 56}
+DEEP_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4), 2: (1, 1.5)}
+"""Cells per cortical thickness by element order."""
+DEEP_GROWTH, DEEP_AREA_RATIO = (0.04, 0.02), 1.6
 RANKS = (1, 2, 3)
-SERIAL = ("theory", "elements")
+SERIAL = ("theory", "elements", "deep")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -171,7 +174,25 @@ def memory() -> dict:
     return found
 
 
-PARTS = {part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory)}
+def deep() -> list[dict]:
+    """Fold a slab until its banks press on each other: growth, depth and pressure at an area ratio, and crossings."""
+    from verification_cases.deep_folds import Slab, at_ratio, folded
+
+    found = []
+    for order, counts in DEEP_CELLS.items():
+        for slab in [Slab(cells, order, growth) for growth in DEEP_GROWTH for cells in counts]:
+            folds = folded(slab, DEEP_AREA_RATIO)
+            values = dict(zip(("growth", "depth_mm", "pressure_pa"), at_ratio(folds, DEEP_AREA_RATIO), strict=True))
+            crossing = sum(fold.crossing for fold in folds)
+            found.append(
+                {"order": order, "cells": slab.cells, "growth_of_step": slab.growth, "crossing": crossing} | values
+            )
+    return found
+
+
+PARTS = {
+    part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory, deep)
+}
 
 
 def run(part: str, ranks: int) -> dict:

@@ -23,7 +23,7 @@ from verification_cases.mirrored import block, folded, hemisphere, reflected_and
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import boundary_faces, signed_volumes
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, signed_volumes
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import FREE
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
@@ -205,3 +205,45 @@ def test_equal_distances_to_several_pial_vertices_do_not_break_the_symmetry():
     _, found = folded(block(6), 4, COMM)
     assert found.displacement_mm > 0.1
     assert found.relative <= 1e-9
+
+
+def vertices_pulled_near(gap, count, growth_rate_per_s=0.0):
+    """Return what folds two blocks in a tube, and their start: few vertices of the upper one almost touch the lower."""
+    mesh = two_blocks(gap=gap)
+    facing = np.isclose(mesh.vertices[:, 2], gap / 2) & (np.abs(mesh.vertices[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
+    positions = mesh.vertices.copy()
+    positions[np.flatnonzero(facing)[[1, 11][:count]], 2] = 0.01 - gap / 2
+    mesh, p = TetrahedralMesh(positions, mesh.tets), free_blocks(gap, growth_rate_per_s=growth_rate_per_s)[0].parameters
+    return Folding(COMM, mesh, in_a_tube(mesh), p), State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize(("gap", "distance_mm"), [(0.5, 0.28), (0.24, 0.06)])
+def test_few_vertices_at_a_hundredth_of_a_mm_are_pressed_apart_and_do_not_set_the_contact_distance(
+    count, gap, distance_mm
+):
+    folding, state = vertices_pulled_near(gap, count)
+    # that of the edges, or a quarter of the gap of the rest
+    assert folding.contact.barrier.distance_mm == pytest.approx(distance_mm, rel=0.1)
+    after = folding.step(state, state.step_s)
+    assert after.rows[-1]["min_distance_mm"] > 0.5 * distance_mm
+    assert after.rows[-1]["min_J"] > 0.9
+    moved = np.linalg.norm(after.positions - state.positions, axis=1)
+    assert np.median(moved) < 0.1 * moved.max()
+
+
+@pytest.mark.parametrize("gap", [0.5, 0.24])
+def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_grows(gap):
+    folding, state = vertices_pulled_near(gap, 2, growth_rate_per_s=2e-7)
+    for _ in range(4):
+        state = folding.step(state, state.step_s)
+        _, crossing, _ = igl.predicates.find_self_intersections(state.positions * MM_PER_M, folding.zones.facets)
+        assert len(crossing) == 0
+    assert min(row["min_distance_mm"] for row in state.rows) > 0.02
+
+
+def test_a_small_gap_of_all_sets_the_contact_distance_and_nothing_moves():
+    folding, state = vertices_pulled_near(0.03, 2)
+    assert folding.contact.barrier.distance_mm == pytest.approx(0.01, rel=0.01)
+    after = folding.step(state, state.step_s)
+    assert (after.positions == state.positions).all()

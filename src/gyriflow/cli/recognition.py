@@ -350,7 +350,7 @@ def _complete(
         cause = "" if facts or subject is None else _similar_ids(subject, tables)
     else:
         cause = _similar_ids(scan, tables, only_similar=True)
-    age, named = facts.age if facts else ScanAge(None, cause=cause), week_in_name(brain.file.parts, tables.notation)
+    age, named = facts or ScanAge(None, cause=cause), week_in_name(brain.file.parts, tables.notation)
     if age.week is not None and named.week is not None and not _agree(age.week, named.week):
         age = ScanAge(None, cause=f"found two ages, {age.week:g} ({age.source}) and {named.source}; expected one")
     elif age.week is None and not age.cause:

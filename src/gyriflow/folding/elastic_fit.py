@@ -195,13 +195,13 @@ class ElasticFit:
         for _ in range(MAX_DRAWS):
             try:
                 self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
+                self._straighten()
                 break
             except SolverError as error:
                 self.positions_mm, problem = start, str(error)
                 lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
         else:
             log.warning("the body is not drawn to a surface: %s", problem)
-        self._straighten()
         return self._move(np.linalg.inv(motion))
 
     def move_to(self, shape: Floats) -> Floats:
@@ -244,12 +244,14 @@ class ElasticFit:
         the shape of now around the faults. Else they are states that the body has passed through since this was last
         called; elements and faces with faults between two of them that follow each other are warned of.
         """
-        passed, self._passed = self._passed, []
+        # where curved elements fold over, their linear pieces may be valid
+        passed = [shape for shape in self._passed if self._is_valid(shape)]
+        self._passed = []
         if self._moved_straight:
             return []
         motion = self._fit(self.positions_mm, before)
         places, stops = self._stops(before, transform_points(self.positions_mm, motion), passed)
-        self.positions_mm = transform_points(places, np.linalg.inv(motion))
+        self.positions_mm = transform_points(places, self._fit(places, self.positions_mm))
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
@@ -262,9 +264,13 @@ class ElasticFit:
             ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
             i = int(np.argmin(ways))
             stop, first = self._stops(before, transform_points(passed[i], self._fit(passed[i], before)), passed[:i])
-            last, second = self._stops(stop, after, passed[i + 1 :])
+            # each shape is fitted to the one before, as on the path
+            last, second = self._stops(stop, transform_points(after, self._fit(after, stop)), passed[i + 1 :])
             return last, [*first, stop, *second]
         if len(faults):
+            unchanged = self._faults_between(before, after)
+            if len(unchanged) <= len(faults):
+                untangled, faults = after, unchanged
             place, text = (
                 np.round(faults[0], 1).tolist(),
                 "%d elements or faces are inverted or cross near %s mm on the way",
@@ -292,6 +298,9 @@ class ElasticFit:
 
     def _gradients(self, goal: Floats) -> Floats:
         return deformation_gradients(self.positions_mm, goal, self._pieces, SLOPES[None])[:, 0]
+
+    def _is_valid(self, places: Floats) -> bool:
+        return self._tets is self._pieces or bool((lower_bounds(places, self._tets) > 0).all())
 
     def _straighten(self) -> None:
         """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""

@@ -1,0 +1,138 @@
+"""Fold a bilayer slab so deep that the banks of its sulcus press on each other.
+
+All lengths are in mm, and the cortex is 1 mm thick. The slab lies between sliding sides, so its surface can only grow
+by folding. No closed answer is known: meshes, element orders and time steps are compared with each other.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from gyriflow.folding.checkpoint import State
+from gyriflow.folding.simulation import Folding, advance
+from gyriflow.geometry.matching import crossing_faces
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
+from gyriflow.geometry.triangles import TriangleMesh, area
+from gyriflow.settings.folding import FoldingParameters, parameters_from
+from gyriflow.units import M_PER_MM, MM_PER_M
+
+from .boxes import box_zones
+
+WIDTH_MM, DEPTH_MM = 8.0, 8.0
+"""About the fastest wave at a contrast of 5, which is 7.07 mm."""
+GROOVE_MM, GROOVE_WIDTH_MM = 1.5, 0.8
+"""Depth of the sulcus at the start, and the distance from its middle at which 1/e of that is left."""
+RATE_PER_S = 1e-7
+"""Rate of the cortex along the surface, and of the core in all directions, which widens the gyri and shuts the sulcus.
+"""
+CONTRAST, CORE_PA = 5.0, 300.0
+BOTTOM = 0.25
+"""Share of the depth of the sulcus that counts as its bottom."""
+FINE_DEPTH_MM = 2.5
+COARSENING = 1.5
+"""Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step."""
+
+    cells: float
+    order: int
+    growth: float
+    contact: str = "global"
+
+    def parameters(self) -> FoldingParameters:
+        """Return the parameters of the run."""
+        return parameters_from(
+            {
+                # no parameter depends on the week
+                "start_week": 15.0,
+                "end_week": 45.0,
+                "output_weeks": [15.0, 45.0],
+                "fissure_x_mm": 0.0,
+                "thickness_mm": 1.0,
+                "shear_modulus_core_pa": CORE_PA,
+                "shear_modulus_cortex_pa": CORE_PA * CONTRAST,
+                "growth_rate_per_s": RATE_PER_S,
+                "core_growth_rate_per_s": RATE_PER_S,
+                "step_s": self.growth / RATE_PER_S,
+                "support": "free",
+                "contact": {"kind": self.contact},
+                "no_growth": {"kind": "none"},
+            }
+        )
+
+
+@dataclass(frozen=True)
+class Fold:
+    """The surface after a step.
+
+    `growth` is that of the cortex so far, `area_ratio` the area of the surface over that at the start, `depth_mm`
+    that of the sulcus, and `pressure_pa` the mean pressure of its banks on each other per growth in the step, without
+    the bottom of the sulcus: there the surface is so compressed that neighbours repel each other.
+    """
+
+    growth: float
+    area_ratio: float
+    depth_mm: float
+    pressure_pa: float
+    crossing: int
+    least_volume_ratio: float
+
+
+def mesh_of(slab: Slab) -> TetrahedralMesh:
+    """Return the slab, one element across, with its sulcus along y in the middle."""
+    down, size = [0.0], 1 / slab.cells
+    while down[-1] < DEPTH_MM:
+        if down[-1] >= FINE_DEPTH_MM - 1e-9:
+            size *= COARSENING ** (1 / slab.cells)
+        down.append(down[-1] + size)
+    # even, so that the bottom of the sulcus is a row of nodes
+    x = np.linspace(-WIDTH_MM / 2, WIDTH_MM / 2, 2 * round(WIDTH_MM * slab.cells / 2) + 1)
+    mesh = grid([x, np.arange(2) / slab.cells, -np.array(down)[::-1] * DEPTH_MM / down[-1]])
+    mesh = mesh if slab.order == 1 else quadratic(mesh)
+    vertices = mesh.vertices.copy()
+    groove = GROOVE_MM * np.exp(-((vertices[:, 0] / GROOVE_WIDTH_MM) ** 2))
+    vertices[:, 2] -= groove * (1 + vertices[:, 2] / DEPTH_MM) ** 2
+    return TetrahedralMesh(vertices, mesh.tets)
+
+
+def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> list[Fold]:
+    """Return the fold after each step, the last with at least an area ratio."""
+    mesh, p = mesh_of(slab), slab.parameters()
+    folding = Folding(comm, mesh, box_zones(mesh, p), p)
+    state, folds = State.at_start(mesh.vertices * M_PER_MM, p.step_s), []
+    while not folds or folds[-1].area_ratio < area_ratio:
+        state = advance(folding, state, state.time_s + p.step_s)
+        folds.append(fold_of(slab, folding, state))
+    return folds
+
+
+def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
+    """Return the fold after the last step."""
+    top, start, places = folding.zones.cortex_facets, mesh_of(slab).vertices, state.positions * MM_PER_M
+    across, height, row = 1 / slab.cells, places[np.unique(top), 2], state.rows[-1]
+    depth_mm, force, surface = float(np.ptp(height)), 0.0, TriangleMesh(places, folding.zones.facets)
+    if (contact := folding.contact) is not None:
+        u, curved = folding.solved.displacement, contact.surface
+        # of quadratic elements, the finer surface that contact acts on
+        surface = TriangleMesh(curved.reference_mm() + curved.displacement_mm(u), curved.faces)
+        is_bank = (start[curved.nodes, 0] < 0) & (places[curved.nodes, 2] > height.min() + BOTTOM * depth_mm)
+        force = abs(float(contact.forces(u)[is_bank, 0].sum()))
+    return Fold(
+        growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
+        area_ratio=area(TriangleMesh(places, top)) / area(TriangleMesh(start, top)),
+        depth_mm=depth_mm,
+        pressure_pa=force / (across * (1 - BOTTOM) * depth_mm * M_PER_MM**2) / (row["dt_s"] * RATE_PER_S),
+        crossing=crossing_faces(surface),
+        least_volume_ratio=row["min_J"],
+    )
+
+
+def at_ratio(folds: list[Fold], area_ratio: float) -> NDArray[np.float64]:
+    """Return growth, depth in mm and pressure in Pa at an area ratio, linear between the two steps around it."""
+    values = np.array([(fold.area_ratio, fold.growth, fold.depth_mm, fold.pressure_pa) for fold in folds]).T
+    return np.array([np.interp(area_ratio, values[0], value) for value in values[1:]])
