@@ -187,9 +187,13 @@ BY_TESTS = {
     ],
     "cli/test_checking.py": [
         ("src/gyriflow/running/cost.py", '"tetgen": 2.2', '"tetgen": 22'),
-        ("src/gyriflow/cli/check.py", "max((folding_s + other_s) / cores, longest_s)", "(folding_s + other_s) / cores"),
-        ("src/gyriflow/cli/check.py", "needs.seconds / min(job.threads, cores)", "needs.seconds"),
-        ("src/gyriflow/cli/check.py", "for _, needs in foldings), reverse=True)", "for _, needs in foldings))"),
+        (
+            "src/gyriflow/cli/check.py",
+            "max(sum(seconds) / cores, *map(end_s, range(len(jobs))))",
+            "sum(seconds) / cores",
+        ),
+        ("src/gyriflow/cli/check.py", "seconds[number] / min(jobs[number].threads, cores)", "seconds[number]"),
+        ("src/gyriflow/cli/check.py", "for each in needs), reverse=True)", "for each in needs))"),
     ],
     "running/test_terminal.py": [
         ("src/gyriflow/running/status.py", '"mesh": "mesh/brain.xdmf"', '"mesh": "surface/pial.surf.gii"'),
@@ -199,7 +203,7 @@ BY_TESTS = {
         ("src/gyriflow/running/snakemake_internals.py", "in REMOVED and made.has_its_date", "in REMOVED"),
         ("src/gyriflow/running/snakemake_internals.py", "content not in earlier", "content in earlier"),
     ],
-    "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime < since_s", "st_mtime > since_s")],
+    "running/test_jobs.py": [("src/gyriflow/running/jobs.py", "st_mtime >= since_s", "st_mtime < since_s")],
     "io/test_files.py": [
         ("src/gyriflow/errors.py", "exit_code = 5", "exit_code = 1"),
         ("src/gyriflow/io/files.py", "dtype=types, keep", "keep"),

@@ -6,6 +6,7 @@ import pytest
 from scripts import run_script
 
 from gyriflow.io.files import read_table, write_table
+from gyriflow.shipped import SHIPPED
 
 TABLES = (
     *("metrics", "spectra", "regions", "metrics_long", "metrics_wide", "change", "asymmetry"),
@@ -57,7 +58,7 @@ def tables_of(folder, ids, run, regions, people):
         "population": [None],
     }
     outputs = {name: f"out/{name}.csv" for name in TABLES} | {"norms": "out/norms.json"}
-    files |= {"cohort": [], "labelled": [], "norms": "norms.yaml"}
+    files |= {"cohort": [], "labelled": [], "norms": "norms.yaml", "noise": SHIPPED / "norms/repeatability.yaml"}
     run_script("metrics_tables.py", folder, files, outputs, params)
     return {name: (folder / f"out/{name}.csv").read_text() for name in TABLES}
 

@@ -268,14 +268,11 @@ class ElasticFit:
             last, second = self._stops(stop, transform_points(after, self._fit(after, stop)), passed[i + 1 :])
             return last, [*first, stop, *second]
         if len(faults):
-            unchanged = self._faults_between(before, after)
-            if len(unchanged) <= len(faults):
-                untangled, faults = after, unchanged
-            place, text = (
-                np.round(faults[0], 1).tolist(),
-                "%d elements or faces are inverted or cross near %s mm on the way",
-            )
-            log.warning(text, len(faults), place)
+            # the shape stays as it is: it is valid, and a changed one may not be
+            untangled, faults = after, self._faults_between(before, after)
+        if len(faults):
+            text = "%d elements or faces are inverted or cross near %s mm on the way"
+            log.warning(text, len(faults), np.round(faults[0], 1).tolist())
         return untangled, []
 
     def _faults_between(self, before: Floats, after: Floats, least: float = 0.0) -> Floats:

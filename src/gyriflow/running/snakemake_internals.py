@@ -45,7 +45,8 @@ def complete_rules(rules: Iterable[Any], environment: str) -> None:
     from snakemake.io import strip_wildcard_constraints
 
     for rule in rules:
-        runs = rule.script or rule.shellcmd
+        # a rule without output has nothing to do in this study
+        runs = rule.output and (rule.script or rule.shellcmd)
         if runs and not rule.log:
             rule.log_modifier = rule.output_modifier
             rule.set_log(log_of(rule.name, strip_wildcard_constraints(rule.output[0])))
