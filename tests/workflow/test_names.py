@@ -6,6 +6,7 @@ import pytest
 from scripts import run_script
 
 from gyriflow.io.files import read_table, write_table
+from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.shipped import SHIPPED
 
 TABLES = (
@@ -30,11 +31,12 @@ def write_tables(folder, ids, run, regions):
             brain = {"subject": name, "run": what, "week": week, "hemisphere": hemisphere}
             rows.append(brain | {"metric": "area", "value": 9 * week + random.normal(), "unit": "cm2"})
             if hemisphere != "whole":
-                band = {"proxy": "mean_curvature", "band": 4, "wavelength_min_mm": 9.0, "wavelength_max_mm": 18.0}
-                power = {"modes": 9, "power": random.uniform(), "relative_power": random.uniform()}
-                spectra.append(
-                    brain | band | power | dict.fromkeys(("complete", "denominator_complete", "resolved"), True)
-                )
+                for band in range(1, 7):
+                    wave = {"proxy": "mean_curvature", "band": band, "wavelength_max_mm": 256.0 / 2**band}
+                    wave |= {"wavelength_min_mm": 128.0 / 2**band, "modes": 9, "is_open": False}
+                    power = {name: random.uniform() for name in ("power", "relative_power", *PART_POWERS)}
+                    known = dict.fromkeys(("complete", "denominator_complete", "resolved"), True)
+                    spectra.append(brain | wave | power | known)
                 by_region += [
                     brain | {"region": region, "metric": "area", "value": random.uniform(3, 9), "unit": "cm2"}
                     for region in regions
