@@ -119,7 +119,7 @@ class SelfContact:
         if distance_mm is None:
             gaps = np.full(len(start), np.inf)
             self._lower_gaps(gaps, self._search.near(start))
-            gaps = -domain.comm.allreduce(-gaps, op=MPI.MAX)
+            gaps = np.min(domain.comm.allgather(gaps), axis=0)
             # round-off must not make a pair of surface elements exactly at the limit
             self._max_mm = MAX_GAP_FRACTION * small_gap_mm(gaps)
             self.begin_step()
