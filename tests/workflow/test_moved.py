@@ -105,7 +105,7 @@ def test_data_in_another_place_are_the_same_if_their_content_is(made, tmp_path):
     assert workflow.run("--cores", "1", "--configfile", "study.yaml").returncode == 0
     save_labels(scan, *phantom(22.5, 2.0))
     said = commands(workflow, "run", "study.yaml", "-n")
-    assert re.search(r"^  changed input other name\.nii\.gz: .*pial_from_labels_with_thickness", said, re.MULTILINE)
+    assert re.search(r"^  changed input other name\.nii\.gz: .*pial_with_thickness", said, re.MULTILINE)
 
 
 def test_another_version_runs_only_what_its_code_changes(made, tmp_path):
