@@ -24,7 +24,7 @@ from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
 from ..geometry.jacobians import EDGES, SLOPES, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
@@ -245,7 +245,7 @@ class ElasticFit:
         called; elements and faces with faults between two of them that follow each other are warned of.
         """
         # where curved elements fold over, their linear pieces may be valid
-        passed = [shape for shape in self._passed if self._is_valid(shape)]
+        passed = [shape for shape in self._passed if has_volume(shape, self._tets).all()]
         self._passed = []
         if self._moved_straight:
             return []
@@ -295,9 +295,6 @@ class ElasticFit:
 
     def _gradients(self, goal: Floats) -> Floats:
         return deformation_gradients(self.positions_mm, goal, self._pieces, SLOPES[None])[:, 0]
-
-    def _is_valid(self, places: Floats) -> bool:
-        return self._tets is self._pieces or bool((lower_bounds(places, self._tets) > 0).all())
 
     def _straighten(self) -> None:
         """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""

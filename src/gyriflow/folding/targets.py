@@ -16,9 +16,8 @@ from ..errors import InputError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import smooth_integrals, vertex_sizes
-from ..geometry.jacobians import lower_bounds
 from ..geometry.paths import Path, path_through
-from ..geometry.tetrahedra import NODES_OF_ORDER, TetrahedralMesh, volumes_between
+from ..geometry.tetrahedra import TetrahedralMesh, has_volume, volumes_between
 from ..settings.folding import AXES, FoldingParameters
 from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
@@ -122,12 +121,6 @@ class GrowthToTargets:
         ratios = volumes_between(goal, self.inputs.tets) / volumes_between(positions, self.inputs.tets)
         shrinking = (ratios > 0) & (ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S)
         return TargetGrowth(p, start, goal, misfit_mm, int(shrinking.sum()), self.total)
-
-
-def has_volume(positions: Floats, tets: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Return whether each (m, 4) or (m, 10) element is valid everywhere, for (n, 3) positions of its nodes."""
-    is_linear = tets.shape[1] == NODES_OF_ORDER[1]
-    return (volumes_between(positions, tets) if is_linear else lower_bounds(positions, tets)) > 0
 
 
 def shapes_of_run(p: FoldingParameters, maps: Maps, positions_mm: Floats) -> tuple[list[float], list[Floats]]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from .jacobians import CORNER_PARTS, EDGES, chunks, coefficients, determinants, shape_values
+from .jacobians import CORNER_PARTS, EDGES, chunks, coefficients, determinants, lower_bounds, shape_values
 from .triangles import Floats, Ints, TriangleMesh, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
@@ -82,6 +82,12 @@ def volumes_between(vertices: Floats, tets: NDArray[np.integer]) -> Floats:
         places = np.take(vertices, tets[part], axis=0)
         volumes[part] = determinants(places[:, 1:] - places[:, :1]) / 6.0
     return volumes
+
+
+def has_volume(positions: Floats, tets: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Return whether each (m, 4) or (m, 10) element is valid everywhere, for (n, 3) positions of its nodes."""
+    is_linear = tets.shape[1] == NODES_OF_ORDER[1]
+    return (volumes_between(positions, tets) if is_linear else lower_bounds(positions, tets)) > 0
 
 
 def signed_volumes(mesh: TetrahedralMesh) -> Floats:
