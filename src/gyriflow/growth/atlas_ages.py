@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 MAX_AGE_ERROR_GW = 1.0
 """Difference between stated age and age by size above which it is warned of."""
-MIN_SPACING_GW = 0.1
+MIN_AGE_SPACING_GW = 0.1
 """Smallest time between two brains of successive weeks."""
 
 
@@ -68,7 +68,7 @@ def ages_by_size(
     end_rates = [max(float(rate(curve, curve.weeks[end])), mean_rate) for end in (0, -1)]
     ages = np.where(sizes < logs[0], curve.weeks[0] + (sizes - logs[0]) / end_rates[0], inside)
     ages = np.where(sizes > logs[-1], curve.weeks[-1] + (sizes - logs[-1]) / end_rates[1], ages)
-    spacing = MIN_SPACING_GW * np.arange(len(ages))
+    spacing = MIN_AGE_SPACING_GW * np.arange(len(ages))
     ages = isotonic_regression(ages - spacing).x + spacing
     for number in np.flatnonzero(np.abs(ages - stated) > MAX_AGE_ERROR_GW):
         text = "the brain of the atlas at %g GW has the size of %.1f GW, and its shape is used at that age"

@@ -13,7 +13,7 @@ from ..geometry.paths import path_through
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
 from ..settings.growth import BEFORE_GW
-from .atlas_ages import MIN_SPACING_GW, AtlasAges
+from .atlas_ages import MIN_AGE_SPACING_GW, AtlasAges
 from .atlas_path import AtlasPath, positions_at, resample_by_size
 from .fitting import fit_onto_surface
 from .series_shapes import FittedBody, SeriesShapes, fit_body, tissue_below, with_stops
@@ -144,7 +144,7 @@ def predict_shapes(
     knots = path.knots(ages)
     at = ages.weeks - age_shift_gw
     grown = resample_by_size(mesh, carried, ages.weeks, ages, knots)
-    later = [round(float(week), 2) for week in at if week > start_week + MIN_SPACING_GW]
+    later = [round(float(week), 2) for week in at if week > start_week + MIN_AGE_SPACING_GW]
     later = later[: int(np.searchsorted(later, end_week)) + 2]
     individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
     expected = expected_positions(mesh, start_week, grown, at, later, **individual)

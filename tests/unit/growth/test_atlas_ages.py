@@ -5,7 +5,7 @@ import pytest
 from facts import Facts
 from shapes import ellipsoid_mesh
 
-from gyriflow.growth.atlas_ages import MIN_SPACING_GW, ages_by_size
+from gyriflow.growth.atlas_ages import MIN_AGE_SPACING_GW, ages_by_size
 from gyriflow.growth.atlas_path import resample_by_size
 from gyriflow.growth.series_shapes import sizes_of
 
@@ -30,7 +30,7 @@ def test_a_week_that_jumps_in_size_is_taken_for_the_age_of_its_size():
     assert table.loc[25.0, "volume_ml"] == pytest.approx(volumes[4])
     others = table.drop(index=[25.0, 26.0])
     assert others["age_by_size"].to_numpy() == pytest.approx(others.index.to_numpy(), abs=0.2)
-    assert (np.diff(ages.ages) >= MIN_SPACING_GW - 1e-9).all()
+    assert (np.diff(ages.ages) >= MIN_AGE_SPACING_GW - 1e-9).all()
 
 
 def test_the_curve_also_follows_the_norm_where_it_has_volumes():
