@@ -44,8 +44,8 @@ def main() -> None:
     parser.add_argument("--labels", type=Path, default=BRAIN)
     parser.add_argument("--scheme", default="spina-bifida-atlas")
     parser.add_argument("--week", type=float, default=29.0)
-    parser.add_argument("--last", choices=["B4", "B5", "B6"], default="B4", help="last band of the spectra")
-    parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--last", choices=["B4", "B5", "B6"], default="B5", help="last band of the spectra")
+    parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--record", type=Path, help="YAML file to write")
     arguments = parser.parse_args()
@@ -69,6 +69,9 @@ def main() -> None:
     print("| metric | coefficient of variation | standard deviation |\n| --- | ---: | ---: |")
     for name, row in record["metrics"].items():
         print(f"| `{name}` | {100 * row['cv']:.2f} % | {row['sd']:.3g} |")
+    print("\n| distance or score | between two repeats |\n| --- | ---: |")
+    for name, value in (record["distances"] | record["scores"]).items():
+        print(f"| `{name}` | {value:.3g} |")
     if arguments.record:
         write_yaml(arguments.record, record)
     print(json.dumps(record | {"numbers_missing_in_some_repeats": int(missing)}))
@@ -119,8 +122,12 @@ def unit(vector: np.ndarray) -> np.ndarray:
 
 
 def variation(table: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Return the variation of each metric over repeats: of the whole brain, or the mean of both sides."""
+    """Return the variation of each metric over repeats: of the whole brain, or the mean of both sides.
+
+    Metrics that are the same in all repeats, such as the radius of the curvature fit, are left out.
+    """
     spread = table.groupby(["metric", "hemisphere"], sort=False)["value"].agg(["mean", "std"]).dropna()
+    spread = spread[spread["std"] > 1e-9 * spread["mean"].abs()]
     spread["cv"] = spread["std"] / spread["mean"].abs()
     rows = {}
     for name, group in spread.groupby("metric", sort=False):

@@ -21,7 +21,7 @@ from ..settings.folding import FoldingParameters, parameters_from, require_maps
 from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..settings.varying import Maps, value_at
 from ..step import record_exit_code
-from .checks import refuse_impossible, stiffness_warning, zone_report, zone_warnings
+from .checks import refuse_impossible, stiffness_warning, zone_report
 from .output import ZONES, log_event, print_line, warn, write_events
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
@@ -100,8 +100,8 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         locking = stiffness_warning(parameters.poisson_ratio) if mesh.order == 1 else ""
         if parameters.targets and {"stress", "strain"} & {*parameters.fields}:
             print_line("growth towards shapes has no stress but in contact: no fields of stress and elastic strain")
-        for warning in filter(None, (*zone_warnings(report), locking)):
-            warn(warning)
+        if locking:
+            warn(locking)
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
         write_json(arguments.out / ZONES, report)

@@ -7,11 +7,9 @@ from ..errors import InputError, MeshError
 from ..geometry.jacobians import EDGES, lower_bounds
 from ..geometry.tetrahedra import TetrahedralMesh, connected_parts
 from ..geometry.triangles import TriangleMesh, edges, face_areas, mean_length
-from ..settings.terms import BASE, BETWEEN_PLANES, CLAMPED, MEDIAL_WALL, ZONE_NAMES
+from ..settings.terms import BASE, CLAMPED, MEDIAL_WALL, ZONE_NAMES
 from .zones import Zones
 
-MAX_BETWEEN_PLANES = 0.05
-"""Share of the pial area between the contact planes above which a user is warned."""
 MAX_POISSON_RATIO = 0.46
 """Poisson's ratio above which linear elements are clearly too stiff. With two of them through the cortex, the
 fastest-growing wave of a slab grows 32 % too slowly at 0.45, 40 % at 0.48, 47 % at 0.49 and 69 % at 0.499, where a wave
@@ -42,18 +40,6 @@ def zone_report(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> dic
         "initial_penetration_mm": zones.penetration_mm(mesh.vertices),
         "elements_through_cortex": thickness_mm / edge_length_within(mesh, zones, thickness_mm),
     }
-
-
-def zone_warnings(report: dict) -> list[str]:
-    """Return warnings about the zones, from their report."""
-    areas = {name: zone["area_mm2"] for name, zone in report["zones"].items()}
-    share = areas[ZONE_NAMES[BETWEEN_PLANES]] / sum(areas.values())
-    if share <= MAX_BETWEEN_PLANES:
-        return []
-    return [
-        f"{share:.0%} of the pial area lies between the contact planes and has no contact, so the hemispheres may "
-        "cross: use folding.contact.kind global, or check that the fissure lies in the middle"
-    ]
 
 
 def edge_length_within(mesh: TetrahedralMesh, zones: Zones, thickness_mm: float) -> float:

@@ -32,6 +32,8 @@ from .zones import Zones
 
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
+MAX_STEP_VOLUME_RATIO = 2.0
+"""Largest volume of an element after one step of growth by rates, over that before: more is not resolved in time."""
 
 
 class Folding:
@@ -107,6 +109,8 @@ class Folding:
             ),
             "rung": RUNGS[solution.rung],
         }
+        if growth.mean_deformation(self.elements) is None and row["max_J"] > MAX_STEP_VOLUME_RATIO:
+            raise NotConvergedError(f"an element grows to {row['max_J']:.1f} times its volume")
         self.solved = SolvedStep(u, step_s, growth)
         grown = self.grown(state, growth)
         after = state.after(displacement, step_s, row, stretch, growth.correction(size), grown)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces, on_whole_faces
-from ..geometry.triangles import Floats, TriangleMesh, face_normals
+from ..geometry.triangles import Floats, TriangleMesh, face_areas, face_normals
 from ..settings import terms
 from ..settings.folding import FoldingParameters, NoGrowth
 from ..settings.terms import Side
@@ -19,7 +19,9 @@ from .layers import PialSearch, cortical_weight
 
 Tags = dict[str, NDArray[np.int32]]
 GAP_MM = 2.5
-"""Width of the fissure, as in the FetalFoldSim paper."""
+"""Largest width of the fissure, as in the FetalFoldSim paper."""
+MAX_BETWEEN_PLANES = 0.01
+"""Largest share of the pial area between the contact planes, where walls would have no contact."""
 MAX_WALL_MM, MIN_WALL_COSINE = 2.0, 0.7
 """The medial wall of a single hemisphere: its largest distance to the innermost point, and the smallest cosine of the
 angle between its normal and the left-right axis."""
@@ -131,16 +133,19 @@ def inside_ellipsoid(vertices: NDArray, ellipsoid: NoGrowth, low: Floats, high: 
 def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: float = GAP_MM) -> Zones:
     """Return the zones of a brain in RAS+ mm for the parameters of a run.
 
-    The planes are a quarter of `gap_mm`, the width of the fissure, left and right of its middle. With any kind of
-    contact, facets near the fissure are not clamped; with `planes`, the `medial_vertices` do not grow. The
-    ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
+    The planes are a quarter of `gap_mm`, the width of the fissure, left and right of its middle; with contact `planes`
+    nearer, where the fissure is narrower: see `planes_distance`. With any kind of contact, facets near the fissure are
+    not clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
     has a MEDIAL_WALL, and may not pass the plane of that wall.
     """
     p = parameters
     fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
     x = mesh.vertices[:, 0]
     facets, _ = boundary_faces(mesh)
-    left_plane, right_plane = fissure_x_mm - gap_mm / 4, fissure_x_mm + gap_mm / 4
+    distance = bridge = gap_mm / 4
+    if p.contact.kind == "planes":
+        distance = min(distance, planes_distance(mesh.vertices, facets, fissure_x_mm))
+    left_plane, right_plane = fissure_x_mm - distance, fissure_x_mm + distance
     if side is not None:
         left_plane = right_plane = float(x.max() if side == "left" else x.min())
     low, high = brain_box(mesh.vertices, side)
@@ -171,11 +176,19 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: f
     if ellipsoid.kind != "none":
         growth[static] = 0.0
         if side is None:
-            growth[bridge_vertices(mesh, facets, left_plane, right_plane)] = 0.0
+            growth[bridge_vertices(mesh, facets, fissure_x_mm - bridge, fissure_x_mm + bridge)] = 0.0
             if p.contact.kind == "planes":
                 growth[medial_vertices(mesh, fissure_x_mm, left_plane, right_plane)] = 0.0
     free = support == "free" and side is None
     return Zones(facets, zone, growth, fissure_x_mm, (left_plane, right_plane), free, anchors)
+
+
+def planes_distance(vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float) -> float:
+    """Return the distance in mm from the middle of the fissure that has `MAX_BETWEEN_PLANES` of the pial area within."""
+    farthest = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
+    nearest_first = np.argsort(farthest)
+    within = np.cumsum(face_areas(TriangleMesh(vertices, facets))[nearest_first])
+    return float(farthest[nearest_first][np.searchsorted(within, MAX_BETWEEN_PLANES * within[-1])])
 
 
 def bridge_vertices(
@@ -199,7 +212,7 @@ def medial_vertices(
     """
     x = mesh.vertices[mesh.tets, 0]
     medial = np.where(x.mean(axis=1) > fissure_x_mm, x.min(axis=1), x.max(axis=1))
-    return np.unique(mesh.tets[(medial >= left_plane) & (medial <= right_plane)])
+    return np.unique(mesh.tets[(medial > left_plane) & (medial < right_plane)])
 
 
 def model_fields(zones: Zones, positions: Floats, p: FoldingParameters, week: float) -> dict[str, Floats]:
