@@ -135,8 +135,9 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: f
 
     The planes are a quarter of `gap_mm`, the width of the fissure, left and right of its middle; with contact `planes`
     nearer, where the fissure is narrower: see `planes_distance`. With any kind of contact, facets near the fissure are
-    not clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without growth is given in fractions of the brain's extents (Tallinen et al. 2016). A single hemisphere
-    has a MEDIAL_WALL, and may not pass the plane of that wall.
+    not clamped; with `planes`, the `medial_vertices` do not grow. The ellipsoid without growth is given in fractions
+    of the brain's extents (Tallinen et al. 2016). A single hemisphere has a MEDIAL_WALL, and may not pass the plane of
+    that wall.
     """
     p = parameters
     fissure_x_mm, support, side = p.fissure_x_mm, p.support, p.side
@@ -184,7 +185,7 @@ def zones_of_run(mesh: TetrahedralMesh, parameters: FoldingParameters, gap_mm: f
 
 
 def planes_distance(vertices: Floats, facets: NDArray[np.int64], fissure_x_mm: float) -> float:
-    """Return the distance in mm from the middle of the fissure that has `MAX_BETWEEN_PLANES` of the pial area within."""
+    """Return the distance in mm from the middle of the fissure that has `MAX_BETWEEN_PLANES` of the area within."""
     farthest = np.abs(vertices[facets, 0] - fissure_x_mm).max(axis=1)
     nearest_first = np.argsort(farthest)
     within = np.cumsum(face_areas(TriangleMesh(vertices, facets))[nearest_first])

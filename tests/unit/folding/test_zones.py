@@ -66,7 +66,7 @@ def test_tissue_that_bridges_the_planes_does_not_grow():
 
 @pytest.mark.parametrize("gap", [0.5, 2.0, 4.0])
 def test_the_planes_follow_the_fissure(gap):
-    """Walls of separate hemispheres have contact and grow, whatever their distance; the planes never go beyond the paper's."""
+    """Walls of separate hemispheres have contact and grow at any distance; the planes stay within the paper's."""
     boxes = [box_mesh((4, 3, 3), (8.0, 6.0, 6.0)) for _ in range(2)]
     x = [mesh.vertices + [shift, 0.0, 0.0] for mesh, shift in zip(boxes, (-4 - gap / 2, 4 + gap / 2), strict=True)]
     tets = [boxes[0].tets, boxes[1].tets + len(x[0])]
