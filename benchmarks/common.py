@@ -42,5 +42,5 @@ def r_shape_index(surface: TriangleMesh, observed: TriangleMesh, folds: Prepared
 
 def print_rows(rows: list[dict[str, Any]], **more: Any) -> None:
     """Print rows as a table, and as the last line one JSON object with `rows` and more entries."""
-    print(pd.DataFrame(rows).to_string(index=False, float_format="%.3f"))
+    print(pd.DataFrame(rows).to_string(index=False, float_format="%.4g"))
     print(json.dumps({"rows": rows, **more}))
