@@ -1,4 +1,4 @@
-"""Do atlases predict the sizes of other brains better at stated ages or at ages by size?
+"""Compare how well atlases predict the sizes of other brains at stated ages and at ages by size.
 
     ./run python benchmarks/atlas_sizes.py --atlas crl 'FOLDER/HarvardSTA{week}_Study1/parcellation.nii.gz' \\
         --atlas chinese 'FOLDER/Chinese{week}_Study1/parcellation.nii.gz' --weeks 21 38 --labels 1 2 5 6 8
@@ -9,11 +9,11 @@ error, and mean error, as fractions. The last line is one JSON object.
 """
 
 import argparse
-import json
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
+from common import print_rows
 
 from gyriflow.growth.atlas_ages import ages_by_size
 from gyriflow.io.volumes import read_label_volume
@@ -32,19 +32,12 @@ def volumes(pattern: str, weeks: range, labels: list[int]) -> dict[int, float]:
     return found
 
 
-def errors(growth: dict[str, dict[int, float]], observed: dict[int, float]) -> dict[str, dict[str, float]]:
-    """Return the errors of volumes predicted by growth at ages of each kind."""
-    pairs = [(a, b) for a in observed for b in observed if 0 < b - a <= MAX_WEEKS]
-    result = {}
-    for ages, sizes in growth.items():
-        ratios = [observed[a] * sizes[b] / sizes[a] / observed[b] - 1 for a, b in pairs if a in sizes and b in sizes]
-        result[ages] = {
-            "pairs": len(ratios),
-            "mean_absolute": round(float(np.mean(np.abs(ratios))), 3),
-            "largest": round(float(np.max(np.abs(ratios))), 3),
-            "mean": round(float(np.mean(ratios)), 3),
-        }
-    return result
+def errors(sizes: dict[int, float], observed: dict[int, float]) -> dict[str, float]:
+    """Return the errors of volumes predicted by the growth of an atlas' sizes."""
+    pairs = [(a, b) for a in observed for b in observed if 0 < b - a <= MAX_WEEKS and {a, b} <= set(sizes)]
+    ratios = np.array([observed[a] * sizes[b] / sizes[a] / observed[b] - 1 for a, b in pairs])
+    values = {"mean_absolute": np.abs(ratios).mean(), "largest": np.abs(ratios).max(), "mean": ratios.mean()}
+    return {"pairs": len(pairs)} | {name: round(float(value), 3) for name, value in values.items()}
 
 
 def main() -> None:
@@ -60,13 +53,12 @@ def main() -> None:
         ages = ages_by_size(list(sizes), list(sizes.values()))
         by_size[name] = {week: ages.volume(week) for week in sizes}
     rows = [
-        {"growth": name, "brains": other} | errors({"stated": stated[name], "by_size": by_size[name]}, stated[other])
-        for name, other in permutations(stated, 2)
-        if len(set(stated[name]) & set(stated[other])) > 1
+        {"growth": grown_by, "brains": brains, "ages": ages} | errors(sizes[grown_by], stated[brains])
+        for grown_by, brains in permutations(stated, 2)
+        if len(set(stated[grown_by]) & set(stated[brains])) > 1
+        for ages, sizes in {"stated": stated, "by_size": by_size}.items()
     ]
-    for row in rows:
-        print(row)
-    print(json.dumps({"volumes_ml": stated, "rows": rows}))
+    print_rows(rows, volumes_ml=stated)
 
 
 if __name__ == "__main__":

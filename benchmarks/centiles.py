@@ -50,7 +50,7 @@ def whole_weeks(random: np.random.Generator, subjects: int) -> Floats:
 
 
 def uneven_weeks(random: np.random.Generator, subjects: int) -> Floats:
-    """Return weeks of subjects of which half are in the last quarter."""
+    """Return weeks of subjects, half of them in the last quarter."""
     return FIRST + (LAST - FIRST) * random.beta(2.0, 1.0, subjects)
 
 

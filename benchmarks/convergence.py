@@ -10,11 +10,6 @@ is measured and compared with that of the finest run at the same material points
 
 Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
 last line is one JSON object with `runs`, the values of the finest one and the differences from it (`against_finest`).
-
-    ./run python benchmarks/convergence.py --folder FOLDER --run MESH PARAMS [MAPS]
-
-varies the Newton tolerance and the time step of a study's run instead: `tolerances` and `run_steps` give the error of
-its final positions, relative to the run with the smallest value.
 """
 
 import argparse
@@ -27,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gyriflow.anatomy.extraction import smooth_mask
 from gyriflow.anatomy.labels import read_cerebrum
@@ -38,20 +32,18 @@ from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
 from gyriflow.geometry.matching import match_points, nearest_on, surface_distance, values_at
 from gyriflow.geometry.remeshing import remesh
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, finer_surface
-from gyriflow.geometry.triangles import TriangleMesh, transformed, vertex_areas, vertex_normals
+from gyriflow.geometry.triangles import Floats, TriangleMesh, transformed, vertex_areas, vertex_normals
 from gyriflow.io.files import read_json
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh, write_tetrahedral_mesh
 from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import SCHEMES, read_yaml, write_yaml
+from gyriflow.io.yaml_files import SCHEMES, write_yaml
 from gyriflow.mesh.tetrahedralisation import tetrahedralise
 from gyriflow.metrics.measure import folding_metrics, measure_folds, size_metrics
 from gyriflow.settings.terms import CURVATURE_RADIUS_MM
+from gyriflow.shipped import ATLASES
 
-ROOT = Path(__file__).resolve().parents[1]
-Floats = NDArray[np.float64]
-
-LABELS = "atlases/spina-bifida/fetal_SB_atlas_GA21_notoperated/parcellation.nii.gz"
+LABELS = ATLASES / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
 START_WEEK, END_WEEK, OUTPUTS_A_WEEK = 21.0, 30.0, 2
 END_GI = 1.3
 """Gyrification index of the finest run at which all runs are compared."""
@@ -79,17 +71,13 @@ PARAMETERS = {
     "no_growth": {"kind": "none"},
     "fields": ["displacement"],
 }
-COMPARED = (
-    *("area", "gyrification_index", "mean_curvedness", "mean_sulcal_depth", "sulcal_depth_95", "folding_index"),
-)
-TOLERANCES, STEPS_DAYS = (1e-6, 1e-5, 1e-4, 1e-3), (0.25, 0.5, 1.0, 1.75)
-"""Newton tolerances and time steps to try with a study's run, the most accurate first."""
+COMPARED = "area", "gyrification_index", "mean_curvedness", "mean_sulcal_depth", "sulcal_depth_95", "folding_index"
 
 
 @cache
 def start_surface() -> TriangleMesh:
     """Return the surface of the hemisphere, closed and outward, in RAS+ mm."""
-    volume, scheme = read_label_volume(ROOT / LABELS), SCHEMES["spina-bifida-atlas"]
+    volume, scheme = read_label_volume(LABELS), SCHEMES["spina-bifida-atlas"]
     places = np.stack(np.indices(volume.labels.shape), axis=-1) @ volume.affine[:3, :3].T + volume.affine[:3, 3]
     x = places[..., 0]
     cerebrum_x = x[np.isin(volume.labels, scheme.cerebrum)]
@@ -166,13 +154,6 @@ def carry_surface(frames: Path, week: float) -> CarriedSurface:
     return CarriedSurface(surface, side.curvature_maps.shape_index, metrics)
 
 
-def parse() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
-    parser.add_argument("--run", type=Path, nargs="+", help="mesh, params.yaml and, if there is one, maps.h5 of a run")
-    return parser.parse_args()
-
-
 def mesh_file(folder: Path, case: Case) -> Path:
     """Return the file of a case's mesh; make the mesh if the file does not exist."""
     file = folder / f"{case.mesh_name}.xdmf"
@@ -182,13 +163,12 @@ def mesh_file(folder: Path, case: Case) -> Path:
     return file
 
 
-def fold(mesh: Path, out: Path, parameters: dict[str, Any], *maps: Path) -> dict[str, Any]:
+def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     """Run a simulation on one rank unless it is finished, and return its summary. Interrupted runs are resumed."""
     if not (out / "summary.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         write_yaml(out / "params.yaml", parameters)
         program = [sys.executable, "-m", "gyriflow.folding", str(mesh), "--params", str(out / "params.yaml")]
-        program += [f"--maps={file}" for file in maps]
         with (out / "log").open("w") as log:
             done = subprocess.run([*program, "--out", str(out)], stdout=log, stderr=log, check=False)
         if done.returncode != 0:
@@ -218,7 +198,7 @@ def difference(run: CarriedSurface, reference: CarriedSurface, start: CarriedSur
     distances = [(nearest_on(source.vertices, target)[0], vertex_areas(source)) for source, target in pairs]
     distance, distance95 = surface_distance(distances)
 
-    def rms(vectors: np.ndarray) -> float:
+    def rms(vectors: Floats) -> float:
         return float(np.sqrt(np.average((vectors**2).sum(axis=1), weights=areas)))
 
     return {
@@ -232,41 +212,8 @@ def difference(run: CarriedSurface, reference: CarriedSurface, start: CarriedSur
     }
 
 
-def errors(
-    varied: str, runs: dict[float, dict[str, Any]], folder: Path, mesh: Path, *maps: Path
-) -> list[dict[str, Any]]:
-    """Return the error of each run's final positions, relative to the first run, and its cost."""
-    rows, exact = [], None
-    for value, parameters in runs.items():
-        out = folder / f"{value:g}"
-        found = fold(mesh, out, parameters, *maps)
-        ends = parameters["start_week"], parameters["end_week"]
-        before, after = (read_positions(out / "frames.h5", week) for week in ends)
-        exact = after if exact is None else exact
-        gaps, moved = np.linalg.norm(after - exact, axis=1), np.linalg.norm(exact - before, axis=1)
-        row = {varied: value} | {name: found[name] for name in ("steps", "newton", "krylov", "cpu_seconds")}
-        row |= {"rms_mm": float(np.sqrt((gaps**2).mean())), "mean_mm": float(gaps.mean())}
-        row |= {"p95_mm": float(np.quantile(gaps, 0.95)), "largest_mm": float(gaps.max())}
-        rows.append(row | {"share": row["rms_mm"] / float(np.sqrt((moved**2).mean()))})
-        print(json.dumps(rows[-1]), flush=True)
-    return rows
-
-
-def solver_errors(arguments: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
-    """Return the errors due to the Newton tolerance and the time step of a study's run."""
-    mesh, file, *maps = arguments.run
-    values = read_yaml(file)
-    solver = values["solver"]
-    tolerances = {value: values | {"solver": solver | {"newton_tolerance": value}} for value in TOLERANCES}
-    steps = {days: values | {"step_s": days * DAY_S} for days in STEPS_DAYS}
-    return {
-        "run_steps": errors("step_days", steps, arguments.folder / "run_steps", mesh, *maps),
-        "tolerances": errors("newton_tolerance", tolerances, arguments.folder / "tolerances", mesh, *maps),
-    }
-
-
 def against_finest(folder: Path) -> dict[str, Any]:
-    """Return how all runs differ from the finest one, in the first week in which that reaches `END_GI`."""
+    """Return how all runs differ from the finest one, in the first week when that reaches `END_GI`."""
     frames = {case: folder / "runs" / case.name / "frames.h5" for case in CASES}
     start = carry_surface(frames[FINEST], START_WEEK)
     for week in read_weeks(frames[FINEST]):
@@ -279,14 +226,13 @@ def against_finest(folder: Path) -> dict[str, Any]:
     return {"finest": {"run": FINEST.name} | values, "against_finest": rows}
 
 
-def main(arguments: argparse.Namespace) -> None:
-    if arguments.run:
-        result: dict[str, Any] = solver_errors(arguments)
-    else:
-        runs = runs_of_cases(arguments.folder)
-        result = {"runs": runs, **against_finest(arguments.folder)}
-    print(json.dumps(result), flush=True)
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
+    folder = parser.parse_args().folder
+    runs = runs_of_cases(folder)
+    print(json.dumps({"runs": runs, **against_finest(folder)}), flush=True)
 
 
 if __name__ == "__main__":
-    main(parse())
+    main()

@@ -1,4 +1,4 @@
-"""Accuracy of predictions: brains of one normal atlas, folded with the growth of another, against later brains.
+"""Measure the accuracy of predictions: brains of one normal atlas, folded with the growth of another.
 
     ./run python benchmarks/horizon.py FOLDER --crl CRL --chinese CHINESE --write norms/predictions.yaml
 
@@ -8,9 +8,8 @@ atlas; the prediction is compared with every second week of the other atlas. The
 `--write` also writes as YAML: for each start, start week, horizon (GW) and model, the columns of
 `results/study/prediction.csv` listed in `NUMBERS`, and of runs the differences of folding and depth. With several
 `--start-weeks`, rows of all are written. Rows of other starts and start weeks in the file are kept; so are those of
-another `--protocol`, a name for settings that differ from the default ones, which are not used for intervals.
-With `--ensemble N`, `coverage` is the share of later brains within the intervals of N members. `held` says how often
-intervals by the other starts contain the errors of each start.
+another `--protocol`, a name for settings that differ from the default ones, which are not used for intervals. `held`
+counts how often intervals by the other starts contain the errors of each start.
 
 `--surfaces` predicts the same start brain once more from its pial surfaces, and from its pial and white surfaces, which
 gyriflow made from its labels; rows then have `given`.
@@ -27,15 +26,15 @@ from typing import Any
 
 import numpy as np
 import yaml
+from common import run_workflow
 
 from gyriflow.compare.accuracy import DEFAULT_PROTOCOL, held_intervals, log_value
 from gyriflow.io.files import read_json, read_table, write_text
 from gyriflow.io.yaml_files import read_keys
 from gyriflow.settings.terms import SIDES
 from gyriflow.shipped import ATLASES
-from gyriflow.study.paths import BRAIN, ENSEMBLE, WEEK, file_of, measures_in, pial_of, white_of
+from gyriflow.study.paths import BRAIN, WEEK, file_of, measures_in, pial_of, white_of
 from gyriflow.study.paths import RUN as FOLDED
-from workflow import call
 
 GROWN_BY = {"crl": "chinese", "chinese": "crl"}
 MODELS = ("run", "target", "atlas", "atlas_deformed", "scaled")
@@ -56,7 +55,7 @@ NOTE = (
 )
 
 
-def study(start: str, folders: dict[str, Path], weeks: range, edge_mm: float, ensemble: int | None) -> dict[str, Any]:
+def study(start: str, folders: dict[str, Path], weeks: range, edge_mm: float) -> dict[str, Any]:
     """Return the configuration of a prediction from the first brain of an atlas."""
     grown_by = GROWN_BY[start]
     used = {start: list(weeks[::2]), grown_by: list(weeks)}
@@ -65,14 +64,9 @@ def study(start: str, folders: dict[str, Path], weeks: range, edge_mm: float, en
             {"name": name, "folder": str(folders[name]), "weeks": used[name], "accept_licence": True} for name in used
         ],
         "start": f"{start}-{weeks[0]}",
-        "mesh": {
-            "order": 1,
-            "mesher": "tetgen",
-            "surface_edge_mm": edge_mm,
-            "max_surface_distance_mm": 0.5,
-        },
+        "mesh": {"order": 1, "mesher": "tetgen", "surface_edge_mm": edge_mm, "max_surface_distance_mm": 0.5},
         "folding": {"preset": "expected", "end_week": weeks[-1], "step_s": 86400, "output_every_gw": 2, "ranks": 1},
-        "runs": {RUN: {"ensemble": ensemble}},
+        "runs": {RUN: {}},
     }
 
 
@@ -80,11 +74,10 @@ def with_surfaces(config: dict[str, Any], folder: Path, start: str, cores: int) 
     """Return the configuration with the start brain given as surfaces, too, which are made in a folder."""
     brain, grown_by = config["start"], GROWN_BY[start]
     week = config["atlas"][0]["weeks"][0]
-    folder.mkdir(parents=True, exist_ok=True)
     pial, white = pial_of(*SIDES), white_of(*SIDES)
     names = [pial[side] for side in SIDES] + [white[f"{side}_surface"] for side in SIDES]
     files = [name.format(brain=brain) for name in names]
-    call(folder, config | {"metrics": {"white_surfaces": "all"}}, cores, *files)
+    run_workflow(folder, config | {"metrics": {"white_surfaces": "all"}}, cores, *files)
     left, right, *whites = (str(folder / file) for file in files)
     population = read_keys(ATLASES / start / "atlas.yaml")["series"]["normative"]["population"]
     entry = {"week": week, "population": population, "hemispheres": {"left": left, "right": right}}
@@ -100,12 +93,12 @@ def rows(folder: Path, start: str, protocol: str) -> list[dict[str, Any]]:
     Those of runs have differences of folding and from the atlas' own brain, too.
     """
     table = read_table(folder / "results" / "study" / "prediction.csv").sort_values("horizon", kind="stable")
-    given, found = {brain: brain.split("-")[2:] for brain in table["start"]}, []
+    sources, found = {brain: brain.split("-")[2:] for brain in table["start"]}, []
     for row in table[table["model"].isin(MODELS)].to_dict("records"):
         weeks = {"start_week": float(row["start_week"]), "horizon": float(row["horizon"])}
         found.append({"start": start, **weeks, "protocol": protocol, "model": row["model"]})
-        if any(given.values()):
-            found[-1]["given"] = (given[row["start"]] or ["labels"])[0]
+        if any(sources.values()):
+            found[-1]["given"] = (sources[row["start"]] or ["labels"])[0]
         found[-1] |= {name: round(float(row[name]), digits) for name, digits in NUMBERS.items()}
         if row["model"] == "run":
             found[-1] |= {name: round(float(row[name]), 3) for name in LESS_ATLAS}
@@ -138,29 +131,21 @@ def main() -> None:
     parser.add_argument("--surfaces", action="store_true", help="also predict from surfaces of the start brain")
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--edge", type=float, default=0.9, help="edges of the mesh (mm)")
-    parser.add_argument("--ensemble", type=int, metavar="N", help="members of an ensemble, for coverage")
     parser.add_argument("--write", type=Path)
     arguments = parser.parse_args()
     folders = {name: getattr(arguments, name).resolve() for name in GROWN_BY}
-    last, found, elements, covered = arguments.end_week, [], [], {}
+    last, found, elements = arguments.end_week, [], []
     for start, first in product(arguments.starts, arguments.start_weeks):
         folder = arguments.folder.resolve() / f"{start}-{first}"
-        folder.mkdir(parents=True, exist_ok=True)
-        config = study(start, folders, range(first, last + 1), arguments.edge, arguments.ensemble)
+        config = study(start, folders, range(first, last + 1), arguments.edge)
         if arguments.surfaces:
             config = with_surfaces(config, folder / "surfaces", start, arguments.cores)
         brains = config["start"] if arguments.surfaces else [config["start"]]
         files = ["results/study/prediction.csv"]
         for brain, week in product(brains, range(first + 2, last + 1, 2)):
             files += metrics_of(brain, start, week)
-        intervals = ENSEMBLE.format(run=RUN, brain=f"{start}-{first}")
-        call(folder, config, arguments.cores, *files, *([intervals] if arguments.ensemble else []))
+        run_workflow(folder, config, arguments.cores, *files)
         found += rows(folder, start, arguments.protocol)
-        if arguments.ensemble:
-            table = read_table(folder / intervals).dropna(subset=["observed"])
-            later = table[table["week"] > first]
-            print(start, later.to_string(), sep="\n")
-            covered[f"{start}-{first}"] = later.groupby("metric")["contains_observed"].mean().to_dict()
         summary = read_json(folder / f"results/runs/{RUN}/{start}-{first}/folding/summary.json")
         elements.append(int(summary["tets"]))
     written = read_keys(arguments.write)["rows"] if arguments.write and arguments.write.exists() else []
@@ -177,7 +162,7 @@ def main() -> None:
     if arguments.write:
         text = yaml.safe_dump(result, sort_keys=False, width=10_000, default_flow_style=None, allow_unicode=True)
         write_text(arguments.write, HEAD + text)
-    print(json.dumps(result | {"coverage": covered, "held": held_intervals(found).to_dict("records")}))
+    print(json.dumps(result | {"held": held_intervals(found).to_dict("records")}))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Find how large an individual difference must be for a prediction to be better than the atlas' brain of that week.
 
-    ./run python benchmarks/individuals.py FOLDER --atlas crl CRL --atlas chinese CHINESE --accept-licence --no-folding
+    ./run python benchmarks/individuals.py FOLDER --atlas crl CRL --atlas chinese CHINESE --accept-licence
 
 CRL and CHINESE are the folders of atlases' files. The individuals are synthetic: an atlas' labels, deformed by random
 smooth maps. At the start, `shape` has waves of 40 to 60 mm and `sulci` of 15 to 25 mm; their size is the root mean
@@ -9,18 +9,16 @@ over the weeks, so the individual difference is `kept`; or it is `fading` as e^(
 size replaces it.
 
 The start brains are predicted with the growth of their atlas, without the synthetic later brains, and rigidly aligned
-with these. Models are the `run`, the `atlas`' own brain of the week scaled to the predicted volume and, for values of
+with these. Models are the `atlas`' own brain of the week scaled to the predicted volume and, for values of
 DIFFERENCE_SMOOTHING_MM and FADING_GW, the predicted shape before a body follows it, at stated weeks: e.g. `8 mm 1 GW`,
 or `0 mm` without fading. The values with the best r on the individuals with odd seeds are reported on those with even
 seeds. The map of an individual depends on its kind and seed only.
 
-The last line is one JSON object: `scores`, rows with `grown_by`, `persistence`, `individual`, `horizon` (GW), `model`,
-`distance_mm`, `r_shape_index`. With `--ensemble N`, `coverage` says how often the 90 % intervals of N members contain
-the later brain's area, volume, gyrification index and depth.
+The last line is one JSON object: `rows` with `grown_by`, `persistence`, `individual`, `horizon` (GW), `model`,
+`distance_mm`, `r_shape_index`.
 """
 
 import argparse
-import json
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -30,34 +28,29 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import print_rows, r_shape_index, run_workflow
 from scipy.ndimage import map_coordinates
 
 from gyriflow.compare.comparison import aligned_distances
-from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
 from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
 from gyriflow.growth.series_shapes import follow_series
-from gyriflow.io.files import read_table
 from gyriflow.io.registrations import read_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.volumes import LabelVolume, read_label_volume, write_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_keys
 from gyriflow.shipped import ATLASES
-from gyriflow.study.paths import ENSEMBLE, MESH, PIAL, REGISTERED
-from gyriflow.units import week_tag
-from workflow import call
+from gyriflow.study.paths import MESH, PIAL, REGISTERED
 
 WAVES_MM = {"shape": (40.0, 60.0), "sulci": (15.0, 25.0)}
 MODES, FLOW_STEPS, COARSE, PAD = 40, 8, 2, 14
 KEPT_GW = {"kept": np.inf, "fading": 8.0}
 GRID = list(product((4.0, 8.0, 16.0), (1.0, 4.0, 16.0)))
 FULL, DEFAULT = "0 mm", f"{DIFFERENCE_SMOOTHING_MM:g} mm {FADING_GW:g} GW"
-METRICS = "results/brains/{brain}/metrics/metrics.csv"
-RUN = "results/runs/expected/{brain}/surfaces/week-{week}/pial.surf.gii"
 MESH_SETTINGS = {"order": 1, "mesher": "tetgen", "surface_edge_mm": 1.3, "core_edge_mm": 3}
 # a coarse mesh of a detailed surface has flat elements
 MESH_SETTINGS |= {"max_surface_distance_mm": 0.5}
@@ -132,28 +125,7 @@ def targets_of(folder: Path, brain: str, atlas: dict[float, str]) -> dict[float,
     return result
 
 
-def coverage(folder: Path, individuals: Sequence[str], weeks: Sequence[int]) -> list[dict[str, Any]]:
-    """Return for each persistence and metric how often intervals of the ensembles contain the later brain's value."""
-    tables = []
-    for name, persistence in product(individuals, KEPT_GW):
-        intervals = read_table(folder / ENSEMBLE.format(run="expected", brain=f"{name}-kept-{weeks[0]}"))
-        for week in weeks[1:]:
-            metrics = read_table(folder / METRICS.format(brain=f"{name}-{persistence}-{week}"))
-            values = metrics[metrics["hemisphere"] == "whole"].set_index("metric")["value"]
-            rows = intervals[intervals["week"] == week].assign(persistence=persistence, individual=name)
-            rows["value"] = rows["metric"].map(values)
-            rows["is_inside"] = rows["value"].between(rows["low"], rows["high"])
-            rows["width_percent"] = 100 * (rows["high"] - rows["low"]) / rows["value"]
-            tables.append(rows)
-    found = pd.concat(tables)
-    print(found[["individual", "persistence", "week", "metric", "low", "high", "value", "is_inside"]].to_string())
-    shares = found.groupby(["persistence", "metric"]).agg(
-        brains=("is_inside", "size"), coverage=("is_inside", "mean"), width_percent=("width_percent", "median")
-    )
-    return shares.reset_index().to_dict("records")
-
-
-def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int], *, folded: bool) -> list[dict[str, Any]]:
+def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int]) -> list[dict[str, Any]]:
     """Return the distances and correlations of all models of an individual, with both persistences."""
     start, rows = weeks[0], []
     brain = f"{name}-kept-{start}"
@@ -162,15 +134,11 @@ def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int], *, fold
         observed = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}"))
         atlas_brain = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
         models = targets[week] | {"atlas": scale_to_volume(atlas_brain, signed_volume(targets[week][DEFAULT]))}
-        if folded:
-            models["run"] = read_surface(folder / RUN.format(brain=brain, week=week_tag(week)))
         folds = prepare_for_comparison(observed, observed)
         for model, surface in models.items():
             row = {"grown_by": atlas, "persistence": persistence, "individual": name, "horizon": week - start}
             row |= {"model": model, "distance_mm": aligned_distances(surface, observed)["distance_mm"]}
-            values = interpolate_measures(prepare_for_comparison(surface, observed), folds)[0]["shape_index"]
-            row["r_shape_index"] = correlation(folds.shape_index, values, folds.areas)
-            rows.append(row)
+            rows.append(row | {"r_shape_index": r_shape_index(surface, observed, folds)})
     return rows
 
 
@@ -184,10 +152,10 @@ def print_chosen(scores: pd.DataFrame) -> None:
     means = scores[odd & grid].groupby("model")[["r_shape_index", "distance_mm"]].mean()
     best = means["r_shape_index"].idxmax()
     print(f"best r of shape index for odd seeds: {best}", means.to_string(float_format="%.3f"), sep="\n")
-    shown = scores[~odd & scores["model"].isin([best, DEFAULT, "run", "atlas"])]
+    even_scores = scores[~odd & scores["model"].isin([best, DEFAULT, "atlas"])]
     print("for even seeds:")
     rows = ["grown_by", "persistence", "individual", "horizon"]
-    table = shown.pivot_table(["r_shape_index", "distance_mm"], rows, "model")
+    table = even_scores.pivot_table(["r_shape_index", "distance_mm"], rows, "model")
     print(table.to_string(float_format="%.3f"))
 
 
@@ -215,19 +183,13 @@ def run_study(folder: Path, atlas: str, files: Path, arguments: argparse.Namespa
         "growth": {"brains": {"atlas": chain}},
         "start": starts,
         "mesh": MESH_SETTINGS,
-        "folding": {"preset": "expected", "end_week": weeks[-1], "output_every_gw": 10, "step_s": 172800, "ranks": 1},
-        "runs": {"expected": {"ensemble": arguments.ensemble}},
+        "folding": {"preset": "expected", "end_week": weeks[-1]},
     }
     made = [PIAL["whole"].format(brain=brain) for brain in [*chain, *(brain["id"] for brain in brains)]]
     made += [MESH["mesh"].format(brain=brain) for brain in starts]
     pairs = [*((brain, chain[0]) for brain in starts), *pairwise(chain)]
     made += [REGISTERED.format(earlier=earlier, later=later) for earlier, later in pairs]
-    if not arguments.no_folding:
-        made += [RUN.format(brain=brain, week=week_tag(week)) for brain, week in product(starts, weeks[1:])]
-    if arguments.ensemble:
-        made += [ENSEMBLE.format(run="expected", brain=brain) for brain in starts]
-        made += [METRICS.format(brain=brain["id"]) for brain in brains if brain["week"] > start]
-    call(folder, config, arguments.cores, *made)
+    run_workflow(folder, config, arguments.cores, *made)
 
 
 def main() -> None:
@@ -246,25 +208,17 @@ def main() -> None:
     parser.add_argument(
         "--weeks", type=int, nargs="+", default=[22, 26, 30], help="week of the start brains, and later weeks"
     )
-    parser.add_argument("--no-folding", action="store_true", help="compare targets only, without runs")
-    parser.add_argument("--ensemble", type=int, metavar="N", help="members of an ensemble, for coverage")
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
-    weeks, rows, covered = sorted(arguments.weeks), [], []
+    weeks, rows = sorted(arguments.weeks), []
     for atlas, files in arguments.atlas:
         folder = arguments.folder.resolve() / atlas
         run_study(folder, atlas, Path(files).resolve(), arguments)
-        score = partial(scores_of, folder, atlas=atlas, weeks=weeks, folded=not arguments.no_folding)
+        score = partial(scores_of, folder, atlas=atlas, weeks=weeks)
         with ProcessPoolExecutor(arguments.cores) as pool:
             rows += [row for found in pool.map(score, arguments.individuals) for row in found]
-        if arguments.ensemble:
-            covered += coverage(folder, arguments.individuals, weeks)
-    scores = pd.DataFrame(rows)
-    for value in ("distance_mm", "r_shape_index"):
-        table = scores.pivot_table(value, ["grown_by", "persistence", "individual", "horizon"], "model")
-        print(value, table.to_string(float_format="%.3f"), sep="\n")
-    print_chosen(scores)
-    print(json.dumps({"scores": rows, "coverage": covered}))
+    print_chosen(pd.DataFrame(rows))
+    print_rows(rows)
 
 
 if __name__ == "__main__":

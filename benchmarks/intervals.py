@@ -1,31 +1,24 @@
-"""How often do 95 % intervals of r and gain hold? Random maps with a brain's own spectrum, on surfaces of three sizes.
+"""Measure how often 95 % intervals of r and gain hold, in random maps with a brain's spectrum, on three sizes.
 
     ./run python benchmarks/intervals.py FOLDER
 
 The surface is that of the shipped atlas' brain of 29 GW, scaled to each area; its spectrum is that of its shape index
 by wavelength. Truth, run and start are random maps with this spectrum, down to 7 mm, and noise that is finer; run and
 start have the same correlation of 0.4 with the truth, so that the gain is 0. Maps of an `individual` have two sides;
-those of a `symmetric` brain are their own mirror images. `modes` are the intervals of `compare.placement`; `patches`
-draw patches of 20 mm, as versions before did. The last line is one JSON object: for each area, kind of brain and
-method, the share of intervals that hold r and gain, and of those that lie above a gain of 0.
+those of a `symmetric` brain are their own mirror images. The last line is one JSON object: for each area and kind of
+brain, the share of intervals that hold r and gain, and of those that lie above a gain of 0.
 """
 
 import argparse
-import json
 from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+from common import print_rows, run_workflow
 
 from gyriflow.compare import placement
-from gyriflow.compare.placement import (
-    Resampling,
-    make_resampling,
-    mirror_image,
-    number_patches,
-    with_interval,
-)
+from gyriflow.compare.placement import Resampling, make_resampling, mirror_image, with_interval
 from gyriflow.compare.shapes import PreparedSurface, prepare_for_comparison
 from gyriflow.geometry.matching import match_surface, values_at
 from gyriflow.geometry.remeshing import remesh
@@ -33,7 +26,6 @@ from gyriflow.geometry.triangles import Floats, TriangleMesh, area_cm2, transfor
 from gyriflow.io.surfaces import read_surface
 from gyriflow.metrics.laplace_beltrami import Modes, laplacian, modes_below
 from gyriflow.study.paths import PIAL
-from workflow import call
 
 BRAIN = "spina-bifida-operated-29"
 CONFIG = {"atlas": {"name": "spina-bifida", "series": "operated", "weeks": [29]}}
@@ -48,8 +40,8 @@ def modes_of(mesh: TriangleMesh) -> tuple[Modes, Floats]:
     return Modes(values, modes.functions[:, 1:]), 2 * np.pi / np.sqrt(values)
 
 
-def spectrum(surface: PreparedSurface) -> tuple[Floats, Floats, float]:
-    """Return wavelengths in mm, the power of the shape index per mode there, and the share of what is finer."""
+def mean_spectrum(surface: PreparedSurface) -> tuple[Floats, Floats, float]:
+    """Return wavelengths in mm, the power of the shape index per mode there, and the share of finer waves."""
     modes, wavelengths = modes_of(surface.mesh)
     values = surface.shape_index - np.average(surface.shape_index, weights=surface.areas)
     power = (modes.functions.T @ (surface.areas * values)) ** 2
@@ -64,8 +56,8 @@ def spectrum(surface: PreparedSurface) -> tuple[Floats, Floats, float]:
 class RandomMaps:
     """Random maps over a surface with a brain's spectrum, and of those its mirror images if they are `symmetric`."""
 
-    def __init__(self, surface: PreparedSurface, known: tuple[Floats, Floats, float], *, symmetric: bool) -> None:
-        lengths, power, self.finer = known
+    def __init__(self, surface: PreparedSurface, spectrum: tuple[Floats, Floats, float], *, symmetric: bool) -> None:
+        lengths, power, self.finer = spectrum
         self.modes, wavelengths = modes_of(surface.mesh)
         self.scale = np.sqrt(np.interp(np.log(wavelengths), np.log(lengths), power))
         self.match = match_surface(mirror_image(surface)[0], surface.mesh) if symmetric else None
@@ -82,32 +74,12 @@ class RandomMaps:
         return values / np.sqrt(np.average(values**2, weights=self.areas))
 
 
-class Patches:
-    """Intervals as they were: patches of 20 mm, a patch and its mirror image together."""
-
-    def __init__(self, surface: PreparedSurface, *, symmetric: bool) -> None:
-        points, areas = surface.mesh.vertices, surface.areas
-        if symmetric:
-            image = mirror_image(surface)[0].vertices
-            points = np.where((points[:, 0] < image[:, 0])[:, None], points, image)
-        self.patch, self.areas = number_patches(points, areas / (2 if symmetric else 1), 20.0), areas
-        count = int(self.patch.max()) + 1
-        drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=placement.N_DRAWS)
-        self.drawn = np.concatenate([np.ones((1, count)), drawn])
-
-    def correlations(self, x: Floats, y: Floats) -> Floats:
-        """Return the correlation of two maps, and that in each sample."""
-        columns = (np.ones_like(x), x, y, x * x, y * y, x * y)
-        w, x1, y1, xx, yy, xy = (self.drawn @ np.bincount(self.patch, self.areas * column) for column in columns)
-        return (xy * w - x1 * y1) / np.sqrt((xx * w - x1**2) * (yy * w - y1**2))
-
-
-def coverage(sampling: Resampling | Patches, maps: RandomMaps, count: int) -> dict[str, float]:
+def coverage(sampling: Resampling, maps: RandomMaps, count: int) -> dict[str, float]:
     """Return the shares of intervals that hold r and gain, and that lie above a gain of 0."""
     found = []
     for _ in range(count):
-        truth, *others = (maps.draw() for _ in range(3))
-        run, start = (sampling.correlations(truth, R * truth + np.sqrt(1 - R**2) * other) for other in others)
+        truth, *independent = (maps.draw() for _ in range(3))
+        run, start = (sampling.correlations(truth, R * truth + np.sqrt(1 - R**2) * values) for values in independent)
         (_, low, high), (_, gain_low, gain_high) = (with_interval("", x).values() for x in (run, run - start))
         found.append((low <= R <= high, gain_low <= 0 <= gain_high, gain_low > 0))
     shares = np.mean(found, axis=0).round(3)
@@ -119,27 +91,23 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--areas", type=float, nargs="+", default=[130.0, 220.0, 350.0], help="in cm²")
     parser.add_argument("--maps", type=int, default=500)
-    parser.add_argument("--methods", nargs="+", choices=["modes", "patches"], default=["modes", "patches"])
     parser.add_argument("--cores", type=int, default=2)
     arguments = parser.parse_args()
     folder, file = arguments.folder.resolve(), PIAL["whole"].format(brain=BRAIN)
-    folder.mkdir(parents=True, exist_ok=True)
-    call(folder, CONFIG, arguments.cores, file)
+    run_workflow(folder, CONFIG, arguments.cores, file)
     brain = read_surface(folder / file)
-    known, rows = spectrum(prepare_for_comparison(brain, brain)), []
+    spectrum, rows = mean_spectrum(prepare_for_comparison(brain, brain)), []
     for area, kind in product(arguments.areas, ("individual", "symmetric")):
         scaled = transformed(brain, np.diag([np.sqrt(area / area_cm2(brain))] * 3 + [1.0]))
         mesh, symmetric = remesh(scaled, EDGE_MM), kind == "symmetric"
         surface = PreparedSurface(mesh, np.zeros(len(mesh.vertices)), np.zeros(len(mesh.vertices)))
         # the shipped brain is symmetric
         with patch.object(placement, "SYMMETRY_TOL_MM", np.inf if symmetric else 0.0):
-            ways = {"modes": make_resampling(surface), "patches": Patches(surface, symmetric=symmetric)}
-        for method in arguments.methods:
-            maps = RandomMaps(surface, known, symmetric=symmetric)
-            rows.append({"area_cm2": area, "brain": kind, "method": method})
-            rows[-1] |= coverage(ways[method], maps, arguments.maps)
-            print(rows[-1], flush=True)
-    print(json.dumps({"maps": arguments.maps, "finer_share": known[2], "rows": rows}))
+            sampling = make_resampling(surface)
+        maps = RandomMaps(surface, spectrum, symmetric=symmetric)
+        rows.append({"area_cm2": area, "brain": kind} | coverage(sampling, maps, arguments.maps))
+        print(rows[-1], flush=True)
+    print_rows(rows, maps=arguments.maps, finer_share=spectrum[2])
 
 
 if __name__ == "__main__":

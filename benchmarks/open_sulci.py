@@ -1,45 +1,45 @@
-"""Measure surfaces with fused and with opened sulci, on phantoms of known shape, on brains and on known surfaces.
+"""Measure surfaces with fused and with opened sulci, on phantoms of known shape and on known surfaces.
 
 `python benchmarks/open_sulci.py [PATH …]`: without paths, phantoms, some with noise at the borders of their labels. For
-a folder named by its week with a `parcellation.nii.gz` in the labels of the spina bifida atlas, pial area, thickness
-and the ratio of the area to the cortex's volume divided by its thickness. For a file `….pial.surf.gii` with its
-`….white.surf.gii` (one hemisphere), surfaces are made from labels of 0.8 mm between both, and their area compared.
+a file `….pial.surf.gii` with its `….white.surf.gii` (one hemisphere), surfaces are made from labels of 0.8 mm between
+both, and their area compared.
 """
 
+import argparse
 import json
-import re
-import sys
-import time
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from common import print_rows
 from scipy import ndimage
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import make_simple, remove_bridges, smooth_mask
 from gyriflow.anatomy.fissure import sample
-from gyriflow.anatomy.pial import from_labels
 from gyriflow.anatomy.repair import surface_of_mask
 from gyriflow.anatomy.sulci import open_fused_sulci
-from gyriflow.anatomy.thickness import cortical_thickness, thickness_from_labels
+from gyriflow.anatomy.thickness import cortical_thickness
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import surface_mask
 from gyriflow.geometry.triangles import (
+    Floats,
+    TriangleMesh,
     area,
     area_cm2,
     convex_hull,
     euler_number,
     transformed,
     vertex_areas,
-    volume_ml,
 )
 from gyriflow.io.surfaces import read_surface
-from gyriflow.io.volumes import read_label_volume
-from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.gyrification import sulcal_depth
+
+Turn = tuple[float, float, float]
 
 # a ball with sulci around it, at x = ±X + A sin(y/L), all in mm
 RADIUS_MM, DEPTH_MM, THICKNESS_MM = 20.0, 6.0, 2.0
@@ -53,7 +53,36 @@ NOISES = (0.0, 0.1, 0.2)
 # a voxel of a slit that is further from all sulci is a crack in a crown
 MAX_OFF_MM = 1.5
 LABEL_MM, MIN_CORTEX_MM = 0.8, 1.6
-SULCI = ("fused", "opened")
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """Surfaces of a body with fused and with opened sulci, and smooth masks (i, j, k): `field`, and with slits.
+
+    `affine` is that of the mask with slits.
+    """
+
+    fused: TriangleMesh
+    opened: TriangleMesh
+    field: np.ndarray
+    slits: np.ndarray
+    affine: Floats
+    report: dict[str, Any]
+
+    def area_errors(self, exact_mm2: float) -> dict[str, float]:
+        """Return the relative errors of both areas."""
+        return {"fused": area(self.fused) / exact_mm2 - 1.0, "opened": area(self.opened) / exact_mm2 - 1.0}
+
+
+def make_surfaces(body: np.ndarray, core: np.ndarray, affine: Floats) -> Surfaces:
+    """Return the surfaces of an (i, j, k) body whose core is its white matter, made as those of a brain."""
+    volume = float(body.sum() * abs(np.linalg.det(affine[:3, :3])))
+    bridged, _ = remove_bridges(body, smooth_mask(body))
+    fused = surface_of_mask(bridged, affine, volume, EDGE_MM).mesh
+    field, _ = make_simple(bridged)
+    slits, fine, report = open_fused_sulci(field, affine, core)
+    opened = surface_of_mask(slits, fine, volume, EDGE_MM, taken_mm3=1e3 * report.get("opened_mL", 0.0)).mesh
+    return Surfaces(fused, opened, field, slits, fine, report)
 
 
 def off_sulci(points: np.ndarray) -> np.ndarray:
@@ -87,7 +116,7 @@ def truth(width_mm: float) -> dict[str, float]:
     return {"area_mm2": whole, "depth_mm": depth, "gi": whole / hull, "thickness_mm": THICKNESS_MM}
 
 
-def phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]):
+def phantom(width_mm: float, voxel_mm: float, turn_deg: Turn):
     """Return the (i, j, k) masks of the body and of its core inside the cortex, and their affine."""
     count = int(np.ceil(RADIUS_MM / voxel_mm)) + 6
     axis = np.arange(-count, count + 1) * voxel_mm + 0.13
@@ -127,7 +156,7 @@ def branching_area(radius_mm: float, depth_mm: float, n_arcs: int) -> float:
 
 def branching_phantom(
     voxel_mm: float,
-    turn_deg: tuple[float, float, float] = (20, 30, 10),
+    turn_deg: Turn = (20, 30, 10),
     *,
     radius_mm: float = RADIUS_MM,
     depth_mm: float = DEPTH_MM,
@@ -163,27 +192,23 @@ def with_noise(body: np.ndarray, core: np.ndarray, share: float, seed: int = 0) 
     return masks[0], masks[1] & masks[0]
 
 
-def try_branching(voxel_mm: float, turn_deg: tuple[float, float, float], noise: float, **shape: float) -> dict:
+def try_branching(voxel_mm: float, turn_deg: Turn, noise: float, **shape: float) -> dict[str, Any]:
     """Measure a phantom with branching sulci: areas relative to the exact one, and cracks in crowns (mm³)."""
     whole, solid, to_sulci, affine = branching_phantom(voxel_mm, turn_deg, **shape)
     body, core = with_noise(whole, solid, noise)
     sizes = {"radius_mm": RADIUS_MM, "depth_mm": DEPTH_MM, "n_arcs": 30} | shape
     exact = branching_area(sizes["radius_mm"], sizes["depth_mm"], int(sizes["n_arcs"]))
-    (field, _), volume = remove_bridges(body, smooth_mask(body)), float(body.sum() * voxel_mm**3)
-    fused = surface_of_mask(field, affine, volume, EDGE_MM).mesh
-    simple, _ = make_simple(field)
-    slits, fine, report = open_fused_sulci(simple, affine, core)
-    opened = surface_of_mask(slits, fine, volume, EDGE_MM, taken_mm3=1e3 * report.get("opened_mL", 0.0)).mesh
-    places = transform_points(np.argwhere(slits <= 0.5), fine)
-    places = places[sample(simple, affine, places) > 0.5]
+    surfaces = make_surfaces(body, core, affine)
+    places = transform_points(np.argwhere(surfaces.slits <= 0.5), surfaces.affine)
+    places = places[sample(surfaces.field, affine, places) > 0.5]
     off = sample(to_sulci, affine, places) > MAX_OFF_MM
-    row = {"voxel_mm": voxel_mm, "turn_deg": turn_deg, "noise": noise, **shape, "area_mm2": exact, **report}
-    row |= {name: area(mesh) / exact - 1.0 for name, mesh in zip(SULCI, (fused, opened), strict=True)}
-    return row | {"cracks_mm3": float(off.sum() * abs(np.linalg.det(fine[:3, :3])))}
+    row = {"voxel_mm": voxel_mm, "turn_deg": turn_deg, "noise": noise, **shape, "area_mm2": exact, **surfaces.report}
+    cracks_mm3 = float(off.sum() * abs(np.linalg.det(surfaces.affine[:3, :3])))
+    return row | surfaces.area_errors(exact) | {"cracks_mm3": cracks_mm3}
 
 
-def try_surface(pial_file: Path) -> dict:
-    """Return areas of a hemisphere's surfaces with fused and opened sulci, made of labels between its surfaces."""
+def try_surface(pial_file: Path) -> dict[str, Any]:
+    """Return area errors of a hemisphere's surfaces with fused and opened sulci, from labels between its surfaces."""
     pial, white = read_surface(pial_file), read_surface(Path(str(pial_file).replace(".pial.", ".white.")))
     # both may have been moved, and have the same vertices
     shift = np.average(pial.vertices - white.vertices, axis=0, weights=vertex_areas(white))
@@ -195,76 +220,47 @@ def try_surface(pial_file: Path) -> dict:
     shape = [size // CELLS for size in fine.shape]
     cells = [side for size in shape for side in (size, CELLS)]
     within = tuple(slice(CELLS * size) for size in shape)
-    body, core = (mask[within].reshape(cells).mean(axis=(1, 3, 5)) > 0.5 for mask in (fine, inner))
+    body, core = (np.pad(mask[within].reshape(cells).mean(axis=(1, 3, 5)) > 0.5, 6) for mask in (fine, inner))
     affine = affine @ np.diag([CELLS] * 3 + [1.0])
-    affine[:3, 3] += 0.5 * (LABEL_MM - LABEL_MM / CELLS)
-    labels = np.pad(np.where(body & core, 3, np.where(body, 2, 0)), 6)
-    affine[:3, 3] -= 6 * LABEL_MM
-    row: dict = {"area_cm2": area_cm2(pial), "volume_mL": volume_ml(pial)}
-    for name in SULCI:
-        field, _ = remove_bridges(labels > 0, smooth_mask(labels > 0))
-        report: dict = {}
-        grid = affine
-        if name == "opened":
-            field, _ = make_simple(field)
-            field, grid, report = open_fused_sulci(field, affine, labels == 3)
-        volume = float((labels > 0).sum() * LABEL_MM**3)
-        mesh = surface_of_mask(field, grid, volume, EDGE_MM, taken_mm3=1e3 * report.get("opened_mL", 0.0)).mesh
-        row[name] = {"area": area(mesh) / area(pial) - 1.0, "euler": euler_number(mesh), **report}
-    return row
+    affine[:3, 3] += 0.5 * (LABEL_MM - LABEL_MM / CELLS) - 6 * LABEL_MM
+    surfaces = make_surfaces(body, core & body, affine)
+    row = {"path": pial_file.name, "area_cm2": area_cm2(pial)} | surfaces.area_errors(area(pial))
+    return row | {"euler": euler_number(surfaces.opened), **surfaces.report}
 
 
-def measure(mesh, body, core, affine) -> dict[str, float]:
-    """Measure the quantities of `truth` on a surface of the body, and its Euler number."""
+def measure(mesh: TriangleMesh, body: np.ndarray, core: np.ndarray, affine: Floats) -> dict[str, float]:
+    """Measure the quantities of `truth` on a surface of the body."""
     hull, weights = convex_hull(mesh), vertex_areas(mesh)
     thickness = cortical_thickness(mesh, body, body & ~core, affine, fissure_x_mm=-1e3)
     depth = float(np.average(sulcal_depth(mesh, hull), weights=weights))
     result = {"area_mm2": area(mesh), "depth_mm": depth, "gi": area(mesh) / area(hull)}
-    return result | {"thickness_mm": thickness.report["mean_mm"], "euler": euler_number(mesh)}
+    return result | {"thickness_mm": thickness.report["mean_mm"]}
 
 
-def try_phantom(width_mm: float, voxel_mm: float, turn_deg: tuple[float, float, float]) -> dict:
-    """Measure the surfaces of a phantom with fused and with opened sulci."""
+def try_phantom(width_mm: float, voxel_mm: float, turn_deg: Turn) -> dict[str, Any]:
+    """Return the relative errors of a phantom's surfaces with fused and with opened sulci."""
     body, core, affine = phantom(width_mm, voxel_mm, turn_deg)
-    # as for brains: slits one voxel wide are opened
-    field, _ = remove_bridges(body, smooth_mask(body))
-    volume = float(body.sum() * voxel_mm**3)
-    fused = surface_of_mask(field, affine, volume, EDGE_MM).mesh
-    field, fine, report = open_fused_sulci(field, affine, core)
-    opened = surface_of_mask(field, fine, volume, EDGE_MM, taken_mm3=1e3 * report["opened_mL"]).mesh
-    row = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
-    return row | {name: measure(mesh, body, core, affine) for name, mesh in zip(SULCI, (fused, opened), strict=True)}
-
-
-def try_brain(path: Path) -> dict:
-    """Return area, thickness and area ratio of a brain with fused and with opened sulci."""
-    volume, scheme = read_label_volume(path, cropped=True), SCHEMES["spina-bifida-atlas"]
-    week = float(re.findall(r"\d+", path.parent.name)[0])
-    row: dict = {"week": week}
-    for name in SULCI:
-        began = time.process_time()
-        brain = from_labels(volume.labels, volume.affine, scheme, week=week, open_sulci=name == "opened")
-        seconds = time.process_time() - began
-        surface = brain.whole, brain.pose, brain.fissure_x_mm
-        report = thickness_from_labels(volume.labels, volume.affine, scheme, *surface).report
-        found = {"area_cm2": brain.report["area_cm2"]["whole"], "thickness_mm": report["mean_mm"]}
-        row[name] = found | {"area_ratio": report["area_ratio"], "euler": brain.report["euler_number"], "s": seconds}
+    surfaces, exact = make_surfaces(body, core, affine), truth(width_mm)
+    row: dict[str, Any] = {"width_mm": width_mm, "voxel_mm": voxel_mm, "turn_deg": turn_deg}
+    for name, mesh in {"fused": surfaces.fused, "opened": surfaces.opened}.items():
+        row |= {f"{name}_{key}": value / exact[key] - 1 for key, value in measure(mesh, body, core, affine).items()}
     return row
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("surfaces", type=Path, nargs="*", metavar="PATH")
+    rows = []
+    if paths := parser.parse_args().surfaces:
+        tries = [(try_surface, (path,)) for path in paths]
+    else:
+        tries = [(try_phantom, sizes) for sizes in product(WIDTHS_MM, VOXELS_MM, TURNS_DEG)]
+        tries += [(try_branching, sizes) for sizes in product(VOXELS_MM, TURNS_DEG, NOISES)]
+    for function, sizes in tries:
+        rows.append(function(*sizes))
+        print(json.dumps(rows[-1]), flush=True)
+    print_rows(rows)
+
+
 if __name__ == "__main__":
-    true, rows, paths = {width: truth(width) for width in WIDTHS_MM}, [], [Path(path) for path in sys.argv[1:]]
-    for voxel, width, turn in product(VOXELS_MM, WIDTHS_MM, TURNS_DEG) if not paths else []:
-        rows.append(row := try_phantom(width, voxel, turn))
-        fused, opened = (
-            {key: f"{row[name][key] / exact - 1:+.1%}" for key, exact in true[width].items()} for name in SULCI
-        )
-        print(f"{voxel} mm voxels, {width} mm wide, rotated {turn}: fused {fused}, opened {opened}", flush=True)
-    for voxel, turn, noise in product(VOXELS_MM, TURNS_DEG, NOISES) if not paths else []:
-        rows.append(row := try_branching(voxel, turn, noise))
-        print(row, flush=True)
-    for path in paths:
-        found = try_surface(path) if path.is_file() else try_brain(path / "parcellation.nii.gz")
-        rows.append({"path": path.name} | found)
-        print(rows[-1], flush=True)
-    print(json.dumps({"truth": true, "rows": rows}))
+    main()

@@ -42,7 +42,7 @@ IGNORED = {
 """Columns, keys, files and folders that differ between two runs of the same code."""
 FOLDERS_OF_PATH = re.compile(r"/\S*/")
 TOLERANCE = 2e-9
-"""Tables have ten digits, the last of which may be rounded differently."""
+"""Tables have ten digits, and the last may be rounded differently."""
 
 
 def run_studies(checkout: Path, out: Path, hemispheres: Path) -> None:

@@ -146,32 +146,29 @@ def theory() -> dict:
 
 
 def rates() -> dict:
-    from verification_cases.slab import Waved, amplified
-
     found = {}
     for contrast in CONTRASTS:
-        case = Waved(contrast, RATE_GROWTH, 1)
-        found[f"{contrast:g}"] = {
-            "lengths": case.lengths_mm,
-            "expected": np.log(case.expected()[1]) / RATE_GROWTH,
-            "measured": [np.log(amplified(case, cells)[1]) / RATE_GROWTH for cells in SLAB_CELLS],
-        }
+        lengths, *heights = waves_on_slab(SLAB_CELLS, contrast, RATE_GROWTH, 1)
+        expected, *simulated = (np.log(height[1]) / RATE_GROWTH for height in heights)
+        found[f"{contrast:g}"] = {"lengths": lengths, "expected": expected, "measured": simulated}
     return found
 
 
 def memory() -> dict:
-    from verification_cases.slab import Waved, amplified
-
     found = {}
     for tau in MEMORIES:
-        case = Waved(MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau)
         cells = SLAB_CELLS if np.isinf(tau) else SLAB_CELLS[2:3]
-        found[f"{tau:g}"] = {
-            "lengths": case.lengths_mm,
-            "expected": case.expected(),
-            "measured": [amplified(case, count) for count in cells],
-        }
+        lengths, expected, *simulated = waves_on_slab(cells, MEMORY_CONTRAST, MEMORY_GROWTH, MEMORY_STEPS, tau)
+        found[f"{tau:g}"] = {"lengths": lengths, "expected": expected, "measured": simulated}
     return found
+
+
+def waves_on_slab(counts: tuple[int, ...], *case: float) -> list[np.ndarray]:
+    """Return wavelengths in mm, and relative heights after each step by theory and by meshes of these cells."""
+    from verification_cases.slab import Waved, amplified
+
+    waved = Waved(*case)
+    return [waved.lengths_mm, waved.expected(), *(amplified(waved, cells) for cells in counts)]
 
 
 def deep() -> list[dict]:

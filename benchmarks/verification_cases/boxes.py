@@ -1,18 +1,52 @@
-"""Zones of boxes: a clamped flat base, and upright sides that slide in their planes."""
+"""Boxes with a clamped flat base and upright sides that slide in their planes, as slabs with a cortex of 1 mm."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gyriflow.folding.zones import Zones, zones_of_run
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, on_whole_faces
-from gyriflow.geometry.triangles import TriangleMesh, face_normals
+from gyriflow.geometry.triangles import Floats, TriangleMesh, face_normals
 from gyriflow.settings import terms
-from gyriflow.settings.folding import FoldingParameters
+from gyriflow.settings.folding import FoldingParameters, parameters_from
 
 FLAT_TOL = 0.01
 """Tolerance of a flat base or side, as a fraction of the extent."""
+RATE_PER_S = 1e-7
+CORE_PA = 300.0
+
+
+def slab_parameters(contrast: float, growth: float, **more: Any) -> FoldingParameters:
+    """Return the parameters of a slab whose cortex, `contrast` times as stiff as the core, grows by `growth` a step."""
+    values = {
+        # no parameter depends on the week
+        "start_week": 15.0,
+        "end_week": 45.0,
+        "output_weeks": [15.0, 45.0],
+        "thickness_mm": 1.0,
+        "shear_modulus_core_pa": CORE_PA,
+        "shear_modulus_cortex_pa": CORE_PA * contrast,
+        "growth_rate_per_s": RATE_PER_S,
+        "step_s": growth / RATE_PER_S,
+        "support": "free",
+        "no_growth": {"kind": "none"},
+    }
+    return parameters_from(values | more)
+
+
+def graded_depths(depth_mm: float, cells: float, fine_mm: float, coarsening: float, max_mm: float) -> Floats:
+    """Return ascending depths of nodes, the last at least `depth_mm`: even to `fine_mm`, with `cells` to 1 mm.
+
+    Below, heights of elements increase by `coarsening` to the power 1/`cells`, up to `max_mm`.
+    """
+    depths, height = [0.0], 1 / cells
+    while depths[-1] < depth_mm:
+        if depths[-1] >= fine_mm - 1e-9:
+            height = min(height * coarsening ** (1 / cells), max_mm)
+        depths.append(depths[-1] + height)
+    return np.array(depths)
 
 
 def box_zones(mesh: TetrahedralMesh, parameters: FoldingParameters) -> Zones:

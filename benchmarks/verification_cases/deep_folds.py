@@ -15,19 +15,16 @@ from gyriflow.folding.simulation import Folding, advance
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
 from gyriflow.geometry.triangles import TriangleMesh, area
-from gyriflow.settings.folding import FoldingParameters, parameters_from
+from gyriflow.settings.folding import FoldingParameters
 from gyriflow.units import M_PER_MM, MM_PER_M
 
-from .boxes import box_zones
+from .boxes import RATE_PER_S, box_zones, graded_depths, slab_parameters
 
 WIDTH_MM, DEPTH_MM = 8.0, 8.0
 """About the fastest wave at a contrast of 5, which is 7.07 mm."""
 GROOVE_MM, GROOVE_WIDTH_MM = 1.5, 0.8
 """Depth of the sulcus at the start, and the distance from its middle at which 1/e of that is left."""
-RATE_PER_S = 1e-7
-"""Rate of the cortex along the surface, and of the core in all directions, which widens the gyri and shuts the sulcus.
-"""
-CONTRAST, CORE_PA = 5.0, 300.0
+CONTRAST = 5.0
 BOTTOM = 0.25
 """Share of the depth of the sulcus that counts as its bottom."""
 FINE_DEPTH_MM = 2.5
@@ -45,25 +42,10 @@ class Slab:
     contact: str = "global"
 
     def parameters(self) -> FoldingParameters:
-        """Return the parameters of the run."""
-        return parameters_from(
-            {
-                # no parameter depends on the week
-                "start_week": 15.0,
-                "end_week": 45.0,
-                "output_weeks": [15.0, 45.0],
-                "fissure_x_mm": 0.0,
-                "thickness_mm": 1.0,
-                "shear_modulus_core_pa": CORE_PA,
-                "shear_modulus_cortex_pa": CORE_PA * CONTRAST,
-                "growth_rate_per_s": RATE_PER_S,
-                "core_growth_rate_per_s": RATE_PER_S,
-                "step_s": self.growth / RATE_PER_S,
-                "support": "free",
-                "contact": {"kind": self.contact},
-                "no_growth": {"kind": "none"},
-            }
-        )
+        """Return the parameters of the run; the core grows, too, which widens gyri and closes the sulcus."""
+        contact = {"kind": self.contact}
+        more = {"fissure_x_mm": 0.0, "core_growth_rate_per_s": RATE_PER_S, "contact": contact}
+        return slab_parameters(CONTRAST, self.growth, **more)
 
 
 @dataclass(frozen=True)
@@ -85,14 +67,10 @@ class Fold:
 
 def mesh_of(slab: Slab) -> TetrahedralMesh:
     """Return the slab, one element across, with its sulcus along y in the middle."""
-    down, size = [0.0], 1 / slab.cells
-    while down[-1] < DEPTH_MM:
-        if down[-1] >= FINE_DEPTH_MM - 1e-9:
-            size *= COARSENING ** (1 / slab.cells)
-        down.append(down[-1] + size)
+    depths = graded_depths(DEPTH_MM, slab.cells, FINE_DEPTH_MM, COARSENING, np.inf)
     # even, so that the bottom of the sulcus is a row of nodes
     x = np.linspace(-WIDTH_MM / 2, WIDTH_MM / 2, 2 * round(WIDTH_MM * slab.cells / 2) + 1)
-    mesh = grid([x, np.arange(2) / slab.cells, -np.array(down)[::-1] * DEPTH_MM / down[-1]])
+    mesh = grid([x, np.arange(2) / slab.cells, -depths[::-1] * DEPTH_MM / depths[-1]])
     mesh = mesh if slab.order == 1 else quadratic(mesh)
     vertices = mesh.vertices.copy()
     groove = GROOVE_MM * np.exp(-((vertices[:, 0] / GROOVE_WIDTH_MM) ** 2))
@@ -114,7 +92,7 @@ def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> lis
 def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
     """Return the fold after the last step."""
     top, start, places = folding.zones.cortex_facets, mesh_of(slab).vertices, state.positions * MM_PER_M
-    across, height, row = 1 / slab.cells, places[np.unique(top), 2], state.rows[-1]
+    width_mm, height, row = 1 / slab.cells, places[np.unique(top), 2], state.rows[-1]
     depth_mm, force, surface = float(np.ptp(height)), 0.0, TriangleMesh(places, folding.zones.facets)
     if (contact := folding.contact) is not None:
         u, curved = folding.solved.displacement, contact.surface
@@ -126,7 +104,7 @@ def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
         growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
         area_ratio=area(TriangleMesh(places, top)) / area(TriangleMesh(start, top)),
         depth_mm=depth_mm,
-        pressure_pa=force / (across * (1 - BOTTOM) * depth_mm * M_PER_MM**2) / (row["dt_s"] * RATE_PER_S),
+        pressure_pa=force / (width_mm * (1 - BOTTOM) * depth_mm * M_PER_MM**2) / (row["dt_s"] * RATE_PER_S),
         crossing=crossing_faces(surface),
         least_volume_ratio=row["min_J"],
     )

@@ -16,10 +16,10 @@ from scipy.fft import dct
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
-from gyriflow.settings.folding import FoldingParameters, Solver, parameters_from
+from gyriflow.settings.folding import FoldingParameters, Solver
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 
-from .boxes import box_zones
+from .boxes import RATE_PER_S, box_zones, graded_depths, slab_parameters
 from .modes import Slab, amplifications
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,6 @@ WAVES = np.arange(1, 13)
 HEIGHT_MM = 1e-4
 REFERENCE_GROWTH = 0.0086
 """Growth in a step of the reference model."""
-RATE_PER_S = 1e-7
 FINE_DEPTH_MM = 2.0
 COARSENING = 1.8
 """Ratio of heights of neighbouring elements below `FINE_DEPTH_MM`, to the power 1/(cells per cortical thickness)."""
@@ -74,40 +73,22 @@ class Waved:
     def parameters(self) -> FoldingParameters:
         """Return the parameters of the run."""
         memory_gw = self.memory / RATE_PER_S / SECONDS_PER_GW
-        values = {
-            # no parameter depends on the week
-            "start_week": 15.0,
-            "end_week": 45.0,
-            "output_weeks": [15.0, 45.0],
-            "fissure_x_mm": self.width_mm / 2,
-            "thickness_mm": 1.0,
-            "poisson_ratio": self.poisson_ratio,
-            "shear_modulus_core_pa": 300.0,
-            "shear_modulus_cortex_pa": 300.0 * self.contrast,
-            "growth_rate_per_s": RATE_PER_S,
-            "step_s": self.growth / RATE_PER_S,
-            "stress_memory_gw": "infinite" if np.isinf(memory_gw) else memory_gw,
-            "support": "free",
-            "contact": {"kind": "none"},
-            "no_growth": {"kind": "none"},
-            "solver": {"newton_tolerance": 1e-11},
-        }
-        return parameters_from(values)
+        return slab_parameters(
+            self.contrast,
+            self.growth,
+            fissure_x_mm=self.width_mm / 2,
+            poisson_ratio=self.poisson_ratio,
+            stress_memory_gw="infinite" if np.isinf(memory_gw) else memory_gw,
+            contact={"kind": "none"},
+            solver={"newton_tolerance": 1e-11},
+        )
 
 
 def mesh_of(case: Waved, cells: int, height_mm: float) -> TetrahedralMesh:
     """Return a slab with `cells` cells per cortical thickness, coarser below, and waves of a height on top."""
-    down, size = [0.0], 1 / cells
-    while down[-1] < case.width_mm:
-        if down[-1] >= FINE_DEPTH_MM - 1e-9:
-            size = min(size * COARSENING ** (1 / cells), MAX_COARSENING / cells)
-        down.append(down[-1] + size)
-    down = np.array(down)
-    down = np.where(
-        down > FINE_DEPTH_MM,
-        FINE_DEPTH_MM + (down - FINE_DEPTH_MM) * (case.width_mm - FINE_DEPTH_MM) / (down[-1] - FINE_DEPTH_MM),
-        down,
-    )
+    down = graded_depths(case.width_mm, cells, FINE_DEPTH_MM, COARSENING, MAX_COARSENING / cells)
+    stretch = (case.width_mm - FINE_DEPTH_MM) / (down[-1] - FINE_DEPTH_MM)
+    down = np.where(down > FINE_DEPTH_MM, FINE_DEPTH_MM + (down - FINE_DEPTH_MM) * stretch, down)
     x = np.linspace(0.0, case.width_mm, round(case.width_mm * cells) + 1)
     slab = grid([x, np.arange(ROWS) / cells, -down[::-1]])
     slab = slab if case.order == 1 else quadratic(slab)

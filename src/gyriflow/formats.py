@@ -68,7 +68,7 @@ def side_in_name(name: str) -> Literal["left", "right"] | None:
 
 
 class ForeignFormat(NamedTuple):
-    """What the first bytes of a file show it to be, and what to do with it unless its name ends in `suffixes`."""
+    """A format recognised by a file's first bytes, and the remedy unless the file's name ends in `suffixes`."""
 
     start: bytes
     name: str
@@ -77,7 +77,7 @@ class ForeignFormat(NamedTuple):
 
 
 START_BYTES = 512
-"""How much of a file shows its format."""
+"""Number of bytes that identify the format of a file."""
 TO_NIFTI = "Save it as NIfTI (.nii.gz), for example with 3D Slicer, ITK-SNAP or SimpleITK."
 TO_TABLE = "Save it as text separated by tabs (.tsv)."
 FOREIGN_FORMATS = (
@@ -93,6 +93,6 @@ FOREIGN_FORMATS = (
 
 
 def foreign_format(path: str | PathLike[str], start: bytes) -> ForeignFormat | None:
-    """Return the format that a file's first `START_BYTES` show, None if its name says the same or it is not known."""
+    """Return the format that a file's first `START_BYTES` show, None if its name has the same one or it is unknown."""
     shown = (form for form in FOREIGN_FORMATS if re.match(form.start, start, re.DOTALL))
     return next((form for form in shown if not str(path).lower().endswith(form.suffixes)), None)

@@ -21,7 +21,7 @@ with step(snakemake.log[0]):
     pair_of_poses = zip(files.reports, params.posed, strict=True)
     poses = [np.eye(4) if is_posed else read_pose(report).world for report, is_posed in pair_of_poses]
     pair = between_moved(read_correspondence(files.correspondence[0]), *poses)
-    # labels whose sulci stay fused have none to open; surfaces are taken as they are
+    # labels whose sulci stay fused have none to open; given surfaces count as open
     opened = read_json(files.reports[1]).get("sulci", {"sheets": 1}).get("sheets")
     options = {"further_weeks": params.further_weeks, "open_sulci": bool(params.opens_sulci and opened)}
     if files.norms:

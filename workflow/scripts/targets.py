@@ -32,7 +32,7 @@ with step(snakemake.log[0]):
         )
         for path, posed, pair in zip(files.correspondences, params.posed, poses, strict=True)
     ]
-    # labels whose sulci stay fused have none to open; surfaces are taken as they are
+    # labels whose sulci stay fused have none to open; given surfaces count as open
     opened = [read_json(path).get("sulci", {"sheets": 1}).get("sheets") for path in files.reports]
     open_sulci = params.opens_sulci and any(opened)
     found = follow_series(mesh, params.weeks, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)

@@ -40,7 +40,7 @@ BY_CORNERS, BY_FACES = (
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
 RADII = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
-# margins in voxels in which the effect of a change on connectivity is examined; the last is the whole volume
+# margins in voxels for examining how a change affects connectivity; the last is the whole volume
 MARGINS = (4, 16, 64, 100_000)
 # changed voxels get the level plus or minus this value
 CHANGED_STEP = 0.2

@@ -269,7 +269,7 @@ def side_distance(
 ) -> NDArray[np.float32]:
     """Return each voxel's distance in mm from the surface between the hemispheres, negative on the left.
 
-    A voxel of an (i, j, k) mask belongs to the hemisphere from which a flood reaches it first (watershed): through the
+    A voxel of an (i, j, k) mask belongs to the hemisphere whose flood reaches it first (watershed): through the
     `core`, the tissue inside the cortex, then the cortex by its distance from the core. It starts from the labels
     `left` and `right`, or in the core far from the mid-surface. So gyri may reach over the mid-surface.
     """

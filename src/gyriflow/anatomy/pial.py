@@ -358,7 +358,7 @@ def from_surface(
     """Return the pial surface of a brain, or of a single hemisphere (`side`), from one surface.
 
     It is repaired and posed as in `from_hemispheres`; two pieces get a gap as there. The medial wall of a hemisphere is
-    set upright next to x = `fissure_x_mm`. InputError if it is not what `side` says, or of an impossible size;
+    set upright next to x = `fissure_x_mm`. InputError if it is not a surface of `side`, or of an impossible size;
     MeshError if it cannot be made sound.
     """
     brain = _Brain(week, {"source": "hemisphere", "side": side} if side else {"source": "pial"})
@@ -455,7 +455,7 @@ def _two_sides(surface: RepairedSurface, is_left: Mask, plane: MidPlane, pose: P
 
 
 def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -> PialSurface:
-    """Return the pial surface of a single hemisphere, beside the mid-sagittal plane."""
+    """Return the pial surface of a single hemisphere, next to the mid-sagittal plane."""
     brain.warn(pose.warnings)
     every = np.ones(len(surface.mesh.faces), dtype=bool)
     mesh, is_cap, _ = _without_islands(surface, {side: every}, np.eye(4), brain)
@@ -472,7 +472,7 @@ def _one_side(surface: RepairedSurface, side: Side, pose: Pose, brain: _Brain) -
 def _without_islands(
     surface: RepairedSurface, sides: Mapping[Side, Mask], of_file: Floats, brain: _Brain
 ) -> tuple[TriangleMesh, Mask, Mask]:
-    """Leave out what is apart from a side's largest piece; return the surface, masks of its caps and faces kept."""
+    """Remove all but the largest piece of a side; return the surface, masks of its caps and of the faces kept."""
     is_kept, warnings = fissure.largest_pieces(surface.mesh, sides, np.asarray(np.linalg.inv(of_file), dtype=float))
     brain.warn(warnings)
     is_cap = surface.is_cap if len(surface.is_cap) else np.zeros_like(is_kept)

@@ -27,14 +27,14 @@ WIDTHS, HEIGHTS = (0.65, 0.93), (0.54, 0.82)
 CUT_SHARES = ((21.0, 0.23), (23.0, 0.17), (27.0, 0.15), (31.0, 0.12), (36.0, 0.103))
 # a share above this multiple of it is doubtful: individuals vary more than atlases
 MAX_CUT_FACTOR = 2.0
-# a median cortical thickness, also of bodies that are no brains
+# range of a median cortical thickness, also of bodies other than brains
 THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
 # shift of one hemisphere along the mid-plane, in cube roots of its volume
 MAX_USUAL_SHIFT = 0.08
-# usual limits of the ratio of mean thickness between brains a week apart and further: CRL's has 1.2 from 21 to 22 GW
+# usual limits of the ratio of mean thickness a week later and later still: CRL's has 1.2 from 21 to 22 GW
 MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
@@ -76,14 +76,14 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
 
 
 def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
-    """Raise InputError, with a guess of the unit, if positive values are no thickness by their median."""
+    """Raise InputError, with a guess of the unit, if the median of the positive values is not a cortical thickness."""
     known = values[np.isfinite(values) & (values > 0)]
     median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
     if low <= median <= high:
         return
     unit = next((unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high), None)
-    remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check what the map holds and its unit."
-    problem = "holds values that are no cortical thickness"
+    remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check the quantity and the unit of the map."
+    problem = "does not contain cortical thickness"
     raise InputError(
         problem, path=path, found=f"a median of {median:.4g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
     )

@@ -22,7 +22,7 @@ MIN_CONFIDENCE, MAX_RESIDUAL = 1.07, 0.13
 MIN_SIDE_RATIO = 1.07
 # poses within this angle of the axes of files (RAS, LPS) are likely a priori
 CONVENTION_DEG = 35.0
-# tolerances in which the shape agrees with the axes of the file: tilt of the mid-plane, and pitch
+# tolerances for agreement of the shape with the axes of the file: tilt of the mid-plane, and pitch
 TILT_TOL_DEG, PITCH_TOL_DEG = 10.0, 15.0
 # two files share their coordinates if their poses differ by less; distances are in sizes
 COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 5.0, 0.08, 0.15

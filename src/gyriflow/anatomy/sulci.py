@@ -131,7 +131,7 @@ def _mark_sheet(
 ) -> None:
     """Set `distance` (i, j, k) to that between the banks in mm, where neighbours along an axis have different banks.
 
-    These are further apart than `min_mm`; voxels that the plane half-way between them passes are set.
+    Only distances above `min_mm`, and voxels that the plane half-way between the banks passes, are set.
     """
     step = np.eye(3, dtype=int)[axis]
     first = np.argwhere(cortex & np.roll(cortex, -1, axis))

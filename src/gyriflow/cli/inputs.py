@@ -1,4 +1,4 @@
-"""Open each file that a study names once, say what it holds, and find what a run would refuse minutes later."""
+"""Open each file that a study names once, describe its content, and find what a run would refuse minutes later."""
 
 import re
 from collections.abc import Callable, Iterator

@@ -15,11 +15,11 @@ QUANTITIES = ("area", "volume", "gyrification_index", "mean_sulcal_depth")
 FOLDING, SMOOTH = "gyrification_index", 0.02
 """The metric whose logarithm is that of the folding, its value − 1 + `SMOOTH`: a smooth brain has about 1."""
 LEVEL, MIN_STARTS = 0.9, 9
-"""Coverage of intervals where enough starts were tested, and that number: the errors of fewer cannot tell it."""
+"""Coverage of intervals if at least this number of starts was tested."""
 DEFAULT_PROTOCOL = "default"
 """The protocol of tests that count: the default settings."""
 ATLAS_MARGIN = 0.02
-"""Difference of the mean r of the shape index from which on the atlas' own brain is said to be better."""
+"""Difference of the mean r of the shape index above which the atlas' own brain is reported as better."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ErrorInTests:
 
 
 def log_value(metric: str, value: Any) -> Any:
-    """Return the logarithm in which errors of a metric are counted; for `FOLDING` that of the folding."""
+    """Return the logarithm of a metric, whose differences are errors; for `FOLDING` that of the folding."""
     return np.log(value - 1 + SMOOTH if metric == FOLDING else value)
 
 
@@ -96,7 +96,7 @@ def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests
     # a start that was not tested as far does not count for the coverage
     is_as_far = (counted["week"] >= week) | (counted["horizon"] >= horizon)
     count = len(np.unique(number_of[is_as_far.to_numpy()]))
-    # the largest error of each start, about the bias of the others if that is to be corrected
+    # the largest error of each start, about the bias of the others if bias is corrected
     largest = []
     for number, values in enumerate(errors):
         others, others_corrected = _bias(np.delete(means, number))
@@ -185,7 +185,7 @@ def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week
             f"In tests over {tested:g} weeks the atlas' own brain was more like the observed brain than the prediction "
             f"(mean r of the shape index {atlas:.2f} and {run:.2f}): the start's individual differences had faded or "
             "changed by then, or the start was an average with few of them. For the places of folds, use the atlas' "
-            "own brain, which is given beside the prediction."
+            "own brain, which is stored with the prediction."
         )
     held_words = {str(row.Index).replace("_", " "): f"{row.held} of {row.tests}" for row in held.itertuples()}
     tested_brains = pd.DataFrame(tests)[["start", "start_week"]].drop_duplicates().itertuples(index=False)

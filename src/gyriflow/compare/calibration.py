@@ -170,8 +170,8 @@ def run_score(
 class Surrogate:
     """A Gaussian process that predicts the score of a run from its parameters.
 
-    It is fitted to n runs at `points` (n, d) of the unit box, in which the lowest and highest value of each parameter
-    (`bounds`) are 0 and 1, with `scores` (n,); a diverged run gets a score worse than all others. The kernel is
+    It is fitted to n runs at `points` (n, d) of the unit box, whose sides are the `bounds` of
+    each parameter, with `scores` (n,); a diverged run gets a score worse than all others. The kernel is
     Matérn's (ν = 5/2), with a length for each parameter, plus noise. `seed` determines the candidates for the next
     runs.
     """

@@ -40,8 +40,8 @@ def interval_table(
     """Return the intervals of whole brains by week and metric.
 
     The tables have the metrics (week, hemisphere, metric, value, unit) of the run, of all its members, and of the
-    observed brains of its weeks, which may be empty. `tests` are the rows of `norms/predictions.yaml`, empty if the run
-    is no prediction.
+    observed brains of its weeks, which may be empty. `tests` are the rows of `norms/predictions.yaml`, empty unless the
+    run is a prediction.
 
     The spread of the members and the largest error of the tests are added in logarithms, as √(spread² + error²), about
     the mean of the members less the bias of the tests if that is corrected. Those of later weeks are never narrower.
@@ -88,7 +88,7 @@ def ensemble_maps(
     Vertices of `members` correspond to those of the run; `shape_indices` (n,) are those of the run and of the members.
     position_sd_mm is the root mean square distance of the members, aligned rigidly with the run, from their mean
     position, with n − 1, NaN for fewer than two; sulcus_probability and gyrus_probability are the shares of run and
-    members in which the vertex is sulcus or gyrus.
+    members whose vertex is sulcus or gyrus.
     """
     areas = vertex_areas(run)
     shapes = [member.vertices for member in members]

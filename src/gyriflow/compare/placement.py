@@ -27,7 +27,7 @@ MODE_EDGE_MM = 2.0
 MODES_PER_BLOCK = 12
 """Successive modes that are drawn among each other, so that each sample has the power of all wavelengths."""
 PATCH_EDGE_MM = 20.0
-"""Width of the patches in which distances are resampled: wider than a gyrus with its sulcus."""
+"""Width of the patches for resampling distances: wider than a gyrus with its sulcus."""
 N_DRAWS = 2000
 """Bootstrap samples."""
 INTERVAL = (0.025, 0.975)
@@ -40,7 +40,7 @@ NO_HEADROOM = "no headroom"
 
 @dataclass(frozen=True, eq=False)
 class Resampling:
-    """A surface's modes, and patches for what is finer: the units that are drawn in a bootstrap of maps over it.
+    """A surface's modes, and patches for finer parts: the units that a bootstrap of maps over it draws.
 
     Folds run across borders of patches, but the modes of a random map are independent. If the brain is its own mirror
     image, the modes are those of its left half with a free rim, and both sides are drawn together.
@@ -70,7 +70,7 @@ class Resampling:
 
     @cached_property
     def drawn(self) -> Floats:
-        """How often each unit is in the surface (once) and in each bootstrap sample, (1 + N_DRAWS, units)."""
+        """Numbers of times that each unit is in the surface (once) and in each sample, (1 + N_DRAWS, units)."""
         modes, patches = self.basis[1].shape[1], int(self.patch.max()) + 1
         blocks = np.array_split(np.arange(modes), max(1, round(modes / MODES_PER_BLOCK)))
         return draw_units([*map(len, blocks), patches])

@@ -1,4 +1,4 @@
-"""Tables of simulated and predicted brains against observed ones, with the simplest predictions beside them."""
+"""Tables of simulated and predicted brains against observed ones, with the simplest predictions for comparison."""
 
 from collections.abc import Mapping
 from typing import Any

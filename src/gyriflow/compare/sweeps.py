@@ -173,7 +173,7 @@ def nearest_runs(comparison: pd.DataFrame, members: pd.DataFrame, varied: Sequen
 
     Columns subject, observed, hemisphere, measure, the varied values of the nearest run, run, distance, the values and
     the distance of the second nearest (`next_…`), and flag: "ok", or what makes the choice doubtful (a value at the end
-    of the range, or not resolved). If no run resolves the band, there is no run and the flag is `NO_NEAREST`.
+    of the range, or not resolved). If no run resolves the band, the run is empty and the flag is `NO_NEAREST`.
     """
     keys, varied = ["subject", "observed", "hemisphere", "measure"], list(varied)
     columns = [*keys, *varied, "run", "distance", *(f"next_{name}" for name in varied), "next_distance", "flag"]

@@ -1,4 +1,4 @@
-"""The state of a run between two steps, and its checkpoint, from which it resumes on any number of ranks.
+"""The state of a run between two steps, and its checkpoint, which resumes on any number of ranks.
 
 Arrays are in the mesh file's order. A checkpoint contains a hash of its mesh, parameters and code, and a checksum of
 its content; one that does not match or is corrupt is not used.

@@ -28,7 +28,7 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
 
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
-    """Return a warning at the first step in which too few elements lie through the cortex, else an empty text."""
+    """Return a warning at the first step with too few elements through the cortex, else an empty text."""
     # NaN: no element has its centre in the cortex
     through = [
         0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]

@@ -53,7 +53,7 @@ class Domain:
     edge. `mesh` is the updated reference, which moves with every step; `space` is that of displacements in m on it.
 
     For all vertices in the file's order, equal on every rank: `positions` (n, 3) in m, the connected `part` of the mesh
-    (n,), and the global node `node_of_vertex` (n,). For the local nodes, of which the first `n_owned` are owned and the
+    (n,), and the global node `node_of_vertex` (n,). For the local nodes, the first `n_owned` owned and the
     others ghosts: the vertex `vertex_of_node` (k,). For the local elements: their nodes in the file's order, `cells`
     (c, 4) or (c, 10), their index in the file `tet_of_cell` (c,), and their `volumes` (c,) in m³.
     """

@@ -63,7 +63,7 @@ an observed brain), and the distance from these, as a multiple of them."""
 MIN_VOLUME_ON_WAY = 0.2
 """Fraction of an element's volume that it should keep on the way from one shape to the next."""
 STRAIGHTENING_ROUNDS = 4
-"""Rounds in which nodes on the edges of invalid curved elements are moved halfway, at last fully, to the middle."""
+"""Rounds that move nodes on the edges of invalid curved elements halfway, at last fully, to the middle."""
 MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5

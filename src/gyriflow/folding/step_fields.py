@@ -34,7 +34,7 @@ class StepFields:
 
     Fields are computed with the problem of the step, whose mesh stays at the start of the step until the next one
     begins. Without stress memory, stress, strain and contact pressure of a step are proportional to its length, so they
-    are given per week; but a pressure and an elastic change of volume that tissue keeps are given as they are. Growth
+    are given per week; but a pressure and an elastic change of volume that tissue keeps are not divided by time. Growth
     towards shapes leaves no stress and elastic strain but next to contact, where they depend on the mesh: there are
     none.
     """

@@ -30,7 +30,7 @@ FEEDBACK_GW = 0.2
 FEEDBACK_SMOOTHING_MM = 1.0
 """Length over which that feedback is smoothed: next to folds that press on each other the misfit is rough."""
 FEEDBACK_FROM_MM = 1e-4
-"""Misfit (root mean square) below which there is no feedback: that of the solver's tolerance."""
+"""Misfit (root mean square) below which feedback is off: that of the solver's tolerance."""
 DAY_S = 86_400.0
 MAX_LOG_STRETCH = 0.7
 """Largest principal Hencky strain of an element's growth in a step: to half or twice its length."""

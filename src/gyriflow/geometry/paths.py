@@ -21,7 +21,7 @@ STRAIGHT_MM = 5.0
 """Distance from an element that would be inverted within which the path is straight (Gaussian)."""
 STRAIGHTENING_ROUNDS = 3
 MIN_SPACING_GW = 0.5
-"""Time between two observed shapes below which growth from one to the other cannot be told from registration noise."""
+"""Time between two observed shapes below which growth from one to the other is within registration noise."""
 
 
 @dataclass(frozen=True, eq=False)

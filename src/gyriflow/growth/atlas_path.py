@@ -24,7 +24,7 @@ from .series_shapes import SeriesShapes, sizes_of
 class AtlasPath:
     """Shapes (k, n, 3) in mm of the mesh with `tets` at k ascending `weeks`, each in the pose of the atlas' brain.
 
-    At the weeks that are `stops` there is no brain of the atlas.
+    The atlas has no brain at the weeks that are `stops`.
     """
 
     tets: Ints

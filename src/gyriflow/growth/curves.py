@@ -104,7 +104,7 @@ def fitted(
     penalty on its second differences (on its first ones below three degrees of freedom; P-splines, Eilers and Marx
     1996). The penalty leaves `degrees_of_freedom`, at most one less than the number of weeks. With at least twice as
     many weeks, outliers lose their weight (Tukey's biweight, started from least absolute deviations), but with
-    `keeps_first` not those of the first week, from which all growth is counted. The standard deviation is Bayesian
+    `keeps_first` not those of the first week, the reference of all growth. The standard deviation is Bayesian
     (Wahba 1983), from the scatter of the weeks about the curve.
 
     At least two different weeks and positive sizes are needed; several brains may share a week. InputError for other

@@ -43,7 +43,7 @@ REFINED_DEG = (20.0, 10.0, 5.0)
 """Steps by which the best of them is then rotated about the three axes, in turn."""
 
 NEAR_MM = 3.0
-"""Margin around the cerebrum in which brains are compared for the deformation."""
+"""Margin around the cerebrum for comparing brains during deformation."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ def fit_onto_surface(
 
     Each round pulls the vertices to the nearest points of the other surface whose normals agree. Vertices of the other
     surface also pull their nearest points, so that the fundus of a sulcus has an effect although it is nearest to no
-    vertex. The pull is smoothed along the moving surface, in each round as `pull_mm` says.
+    vertex. The pull is smoothed along the moving surface, in each round over `pull_mm`.
 
     With `inner` (n, 3), where the tissue `INNER_MM` below the vertices is in the brain of the other surface, points are
     matched by that, too (`match_layers`). So a fold without a slit opens to both banks of a sulcus.

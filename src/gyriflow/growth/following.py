@@ -112,6 +112,6 @@ def _measured_curve(curves: pd.DataFrame | None, series: str | None, quantity: s
             else "the start brain is in no series of brains of two weeks or more"
         )
         remedy = "List brains of other weeks, or give growth a table such as {area_cm2: {21: 99, 30: 252}}"
-        raise InputError(f"there is no measured curve of {quantity} to follow", found=reason, remedy=remedy)
+        raise InputError(f"no measured curve of {quantity} to follow", found=reason, remedy=remedy)
     weeks, values = (rows[name].to_numpy(dtype=float) for name in ("week", "value"))
     return Curve(weeks, values, np.zeros(len(rows)))

@@ -28,7 +28,7 @@ TABLE_LOOK = (
 
 
 def write_figure(png: AnyPath, pdf: AnyPath, figure: Figure) -> None:
-    """Write a figure as pixels, `DPI` to the inch, and as vectors, in which pictures keep their pixels."""
+    """Write a figure as pixels, `DPI` to the inch, and as vectors; pictures keep their pixels."""
     with atomic_write(png) as temporary:
         figure.savefig(temporary, dpi=DPI)
     for picture in figure.findobj(AxesImage):

@@ -1,7 +1,7 @@
 """Frames of a simulation: one HDF5 file, with an XDMF file that ParaView opens as a time series.
 
 It has `tets` (m, 4) or (m, 10), and for each output week a group `week_21.00` with `positions` (n, 3) in mm, fields at
-the vertices, and in `cell_fields` those of elements. Positions, from which metrics are computed, are in double
+the vertices, and in `cell_fields` those of elements. Positions, the basis of metrics, are in double
 precision, fields in single.
 """
 

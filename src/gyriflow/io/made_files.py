@@ -1,4 +1,4 @@
-"""Files that gyriflow makes in a folder in which a user or another program may have some, too."""
+"""Files that gyriflow makes in a folder that may contain files of a user or another program, too."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

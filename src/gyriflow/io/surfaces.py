@@ -370,7 +370,7 @@ def _warn_of_tkr_ras(metadata: Mapping[str, str], path: AnyPath) -> None:
 
 
 REAL_RAS = b"\0\0\0\2\0\0\0\1"
-"""FreeSurfer's tag, behind the faces, of a surface in scanner coordinates."""
+"""FreeSurfer's tag, after the faces, of a surface in scanner coordinates."""
 
 
 def _read_freesurfer_surface(path: Path) -> RawSurface:

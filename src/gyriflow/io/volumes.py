@@ -36,7 +36,7 @@ MAX_LABEL_ERROR = 0.05
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
 GOOD_RAS_OFFSET = 28
-"""Where MGH's header says whether its directions are valid, in bytes."""
+"""Offset in bytes of the flag for valid directions in an MGH header."""
 MAX_COMPRESSION = 1100
 """How many times shorter gzip makes a file at most (1032 times), with some room."""
 
@@ -103,7 +103,7 @@ class VolumeHeader(NamedTuple):
 
 
 def read_header(path: AnyPath) -> VolumeHeader:
-    """Return what the header of a volume says, without reading its values; InputError where it cannot be read."""
+    """Return the header of a volume without reading its values; InputError if it cannot be read."""
     image, unit, space = _load(path), "mm", "scanner"
     if isinstance(image, nib.Nifti1Pair):
         unit = _length_unit(image.header, path)

@@ -34,7 +34,7 @@ REGULAR_VOLUME = 1 / (6 * np.sqrt(2))
 def edge_length_at(
     depth: NDArray[np.float64], surface_edge_mm: float, core_edge_mm: float, order: int = 1
 ) -> NDArray[np.float64]:
-    """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both orders are as far apart."""
+    """Return edge lengths in mm of elements at depths in mm; deep down, nodes of both orders have the same distance."""
     below = np.maximum(depth - FINE_DEPTH_EDGES / order * surface_edge_mm, 0.0)
     return np.minimum(surface_edge_mm + order * EDGE_GROWTH * below, core_edge_mm)
 

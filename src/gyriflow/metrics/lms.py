@@ -36,7 +36,8 @@ MIN_SUBJECTS_FOR_SKEWNESS = 100
 SKEWNESS, SKEWNESS_SD = 0.2, 1.0
 """Mean and standard deviation of the prior of the skewness: 0 is the lognormal distribution, 1 the normal one."""
 SHAPE_WEIGHT = 0.6
-"""Weight of the error of ln S at a week, beside that of its mean, in the degrees of freedom of Student's distribution.
+"""Weight of the error of ln S at a week, relative to that of its mean, in the degrees of freedom of Student's
+distribution.
 
 Such errors are nearer to normal than those of the mean, and make fewer extreme scores."""
 MAX_LEVERAGE = 0.9

@@ -237,7 +237,7 @@ def predicted_table(
 ) -> pd.DataFrame:
     """Return the metrics of a predicted brain, its start and the atlas' brain, and the difference from the atlas in %.
 
-    Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble beside them.
+    Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble next to them.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def accuracy_table(accuracy: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def range_text(values: pd.Series, pattern: str = ".2f") -> str:
-    """Return the minimum and the maximum as text, once if they are equal; a dash if there are no numbers."""
+    """Return the minimum and the maximum as text, once if they are equal; a dash without numbers."""
     ends = [format(value, pattern).replace("-", "−") for value in (values.min(), values.max()) if np.isfinite(value)]
     return " to ".join(dict.fromkeys(ends)) or "–"
 

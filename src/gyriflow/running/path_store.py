@@ -1,4 +1,4 @@
-"""Where the path of an atlas is kept for other studies: beside the atlas' files, named by all that it depends on."""
+"""Storage of an atlas' path for other studies: next to the atlas' files, named by everything it depends on."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ SCRIPTS = ("pial", "register", "match_surfaces", "tetrahedralise", "targets")
 
 
 def path_store(study: Study, path: Chain, contents: Mapping[str, str]) -> Path | None:
-    """Return the file in which a path is kept, in the folder where the atlas' files are put; None for other brains.
+    """Return the file of a path in the folder of the atlas' files; None for other brains.
 
     Its name has a hash of the contents of the files of all its brains, of the settings of their surfaces, and of the
     code. `contents` are hashes by path (`provenance.input_contents`).

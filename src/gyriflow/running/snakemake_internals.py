@@ -1,4 +1,4 @@
-"""What gyriflow uses of Snakemake beside its public interface, tried with Snakemake 9.27.0 and 9.27.1."""
+"""Parts of Snakemake that gyriflow uses outside its public interface, tried with Snakemake 9.27.0 and 9.27.1."""
 
 import hashlib
 import json

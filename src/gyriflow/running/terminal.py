@@ -39,7 +39,7 @@ FAILED_JOB_PREFIXES = (
 
 @dataclass
 class Job:
-    """A running job and its log, beside which a simulation writes its progress."""
+    """A running job and its log; a simulation writes its progress in the same folder."""
 
     rule: str
     name: str

@@ -131,7 +131,7 @@ class Growth(Settings):
         return self.definition.measured == "sizes" and "measured" in (self.area_cm2, self.volume_ml)
 
     def own_keys(self) -> dict[str, Any]:
-        """Return the model and the keys that it uses, as they are written in a file."""
+        """Return the model and the keys that it uses, in the form of a file."""
         return self.model_dump(mode="json", include={"model", *self.definition.keys, *self.definition.resolved})
 
     def unused_keys(self, used: Collection[str]) -> Iterator[KeyProblem]:

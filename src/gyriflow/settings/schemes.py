@@ -22,13 +22,13 @@ class SchemeSettings(Settings):
     cerebrum: tuple[Label, ...]
     """Labels that together fill the cerebrum inside the pial surface. Not all of them need to occur."""
     cortex: tuple[Label, ...] = ()
-    """Labels of the cortex, one of which must occur. Used to open the fissure and to measure cortical thickness."""
+    """Labels of the cortex; at least one must occur. Used to open the fissure and to measure cortical thickness."""
     left: tuple[Label, ...] = ()
     """Labels of the left hemisphere only. With `right` they separate the hemispheres."""
     right: tuple[Label, ...] = ()
     """Labels of the right hemisphere only."""
     white_matter: tuple[Label, ...] = ()
-    """Labels of white matter, one of which must occur."""
+    """Labels of white matter; at least one must occur."""
     ventricles: tuple[Label, ...] = ()
     """Labels of fluid, which is left out where it is not enclosed by tissue."""
     cerebellum: tuple[Label, ...] = ()

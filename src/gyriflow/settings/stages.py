@@ -68,7 +68,7 @@ class MetricsSettings(Settings):
     """Measurement of curvature and of spectra of gyrification (SpAnGy), the same for observed and simulated brains."""
 
     curvature_radius_mm: float = Field(CURVATURE_RADIUS_MM, ge=0.5, le=20)
-    """Radius of the neighbourhood in which curvature is fitted: at least two edge lengths of the surfaces. [mm]"""
+    """Radius of the neighbourhood for fitting curvature: at least two edge lengths of the surfaces. [mm]"""
     spangy_modes: Modes = SPANGY_MODES
     """Number of eigenmodes, 2 to 20000; or the last complete band, `B4`, `B5` or `B6`. Each needs four times as many
     modes as the one before."""

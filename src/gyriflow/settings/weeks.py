@@ -41,7 +41,7 @@ def read_week(text: str, unit: str = "weeks", notation: WeekNotation | None = No
 
 
 def week_of(value: Any) -> Any:
-    """Return the number of weeks that a text gives, such as 22.14 for 22+1; other values as they are."""
+    """Return the number of weeks that a text gives, such as 22.14 for 22+1; other values unchanged."""
     if not isinstance(value, str):
         return value
     try:

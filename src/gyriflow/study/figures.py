@@ -1,4 +1,4 @@
-"""The figures and tables of a study: of which brains and runs they are, and the inputs and options that depend on them.
+"""The figures and tables of a study: their brains and runs, and the inputs and options that depend on these.
 
 A function has the name of an entry of `workflow/figures.yaml`, which has the text and the other inputs and options. An
 entry without a function is drawn for each of the records that it names, or once.

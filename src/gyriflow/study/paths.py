@@ -79,7 +79,7 @@ FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
 VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.h5"
-"""A registration with a factor of its smoothing, and labels perturbed with a seed (0: as they are)."""
+"""A registration with a factor of its smoothing, and labels perturbed with a seed (0: unchanged)."""
 MESH = {
     "mesh": f"{BRAIN}/mesh/brain.xdmf",
     "data": f"{BRAIN}/mesh/brain.h5",
@@ -115,7 +115,7 @@ PREPARED = {
 """Surfaces that all runs from a start brain are compared with in a week, prepared for comparison, with curvature."""
 PREDICTION = f"{RUN}/metrics/prediction.csv"
 ATLAS_BRAIN = f"{RUN}/surfaces/{WEEK}/atlas.pial.surf.gii"
-"""The atlas' own brain beside a prediction: aligned with it, with its volume."""
+"""The atlas' own brain for comparison with a prediction: aligned with it, with its volume."""
 ENSEMBLE_MAPS = f"{RUN}/metrics/{WEEK}/{{side}}.ensemble.shape.gii"
 """Maps of the spread of an ensemble on a hemisphere."""
 GROWTH_SD = f"{RUN}/surfaces/growth_sd.shape.gii"

@@ -161,7 +161,7 @@ MAX_BEYOND_ATLAS_GW = 0.5
 class Chain:
     """A start brain and the brains of a growth series through which its mesh is carried, one for each week.
 
-    `correspondences` are the files that map each brain to the next; `posed` says for each of both whether the map
+    `correspondences` are the files that map each brain to the next; `posed` is for each of both whether the map
     refers to its posed surface (True) or to the coordinates of its files. `variation` is that of a member of an
     ensemble.
 
@@ -226,7 +226,7 @@ def member_chain(
         if chain.later and chain == _chain("self", chain.brains, series):
             raise InputError(
                 f"the members of the ensemble of run {run} would be equal: the surfaces of "
-                f"{start.id} and its later brains are matched by their vertices, so there are no registrations to vary",
+                f"{start.id} and its later brains are matched by their vertices, so no registration can be varied",
                 remedy="Remove ensemble, or set growth.matched_surfaces to false.",
             )
         # ages of one series have the same error
