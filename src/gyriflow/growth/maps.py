@@ -25,20 +25,13 @@ def growth_per_week(
 ) -> dict[tuple[float, float], dict[str, Floats]]:
     """Return maps of the mean growth between output weeks, by interval, at the vertices of the surface at its end.
 
-    Parameters
-    ----------
-    frames
-        {week: (surface, fields)} with log growth per step, averaged since the previous output week:
-        `tangential_growth_per_step` and `radial_growth_per_step` (n,), and `growth_direction_per_step` (n, 3), the
-        tangential direction of largest growth, as long as the difference of the two principal tangential log growths.
-    step_s
-        Length of that step in s.
+    `frames` are by week the surface and its fields, of log growth per step averaged since the previous output week:
+    `tangential_growth_per_step` and `radial_growth_per_step` (n,), and `growth_direction_per_step` (n, 3), the
+    tangential direction of largest growth, as long as the difference of the two principal tangential log growths.
+    `step_s` is the length of that step in s.
 
-    Returns
-    -------
-    dict
-        area_growth_percent_per_gw and thickness_growth_percent_per_gw (n,), and growth_direction_x, _y, _z, the
-        vectors of the frames as logarithms per week.
+    Returns area_growth_percent_per_gw and thickness_growth_percent_per_gw (n,), and growth_direction_x, _y, _z, the
+    vectors of the frames as logarithms per week.
     """
     steps = SECONDS_PER_GW / step_s
     # area grows with the square of the mean tangential stretch

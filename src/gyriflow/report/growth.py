@@ -38,13 +38,9 @@ def growth_chart(
     Series of brains share the panels of area and volume. Up to four series with rates have a panel of bars each, on one
     scale.
 
-    Parameters
-    ----------
-    areas : columns series, subject, week, area_cm2, volume_ml
-    rates : columns series, from_week, to_week, rate_per_s (1/s)
-    folding_rate_per_s
-        Growth rate of the simulations in 1/s, drawn as a line over the bars: a number, or values by week, linear in
-        between and constant beyond.
+    `areas` has the columns series, subject, week, area_cm2, volume_ml; `rates` series, from_week, to_week, rate_per_s
+    (1/s). `folding_rate_per_s` is the growth rate of the simulations in 1/s, drawn as a line over the bars: a number,
+    or values by week, linear in between and constant beyond.
     """
     names = list(dict.fromkeys(areas["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))

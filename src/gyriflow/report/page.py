@@ -35,11 +35,9 @@ def page_figures(
 ) -> list[dict[str, Any]]:
     """Return the figures and tables of a page: section, title, content (as `contents`), caption, first, technical.
 
-    Parameters
-    ----------
-    figures : name, section, title, caption in reStructuredText, technical, first, path and names of each
-        Titles and captions contain the names in braces. The first one that may be `first` is shown in the summary.
-    contents : {path: HTML, or a picture's data URL and its width in inches}
+    `figures` have name, section, title, caption in reStructuredText, technical, first, path and names of each; titles
+    and captions contain the names in braces. The first one that may be `first` is shown in the summary. `contents` are
+    by path HTML, or a picture's data URL and its width in inches.
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
@@ -78,12 +76,9 @@ def sections(figures: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[
 class Tables:
     """The tables of a study on its pages.
 
-    Attributes
-    ----------
-    quality, metrics, centiles : as for `brain_rows`
-    warnings : columns subject, run, step, level, message
-    runs, validation : as for `scores_table`; None if nothing was simulated
-    intervals : those of the ensemble of the one prediction, if any
+    `quality`, `metrics` and `centiles` are as for `brain_rows`; `warnings` has the columns subject, run, step, level,
+    message. `runs` and `validation` are as for `scores_table`, None if nothing was simulated; `intervals` those of the
+    ensemble of the one prediction, if any.
     """
 
     quality: pd.DataFrame
@@ -111,14 +106,10 @@ def study_page(
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the report of a study.
 
-    Parameters
-    ----------
-    brains : as for `brain_rows`
-    pictures : data URL and width in inches of the small pictures of each brain that has a page, by its id
-    figures : the output of `page_figures`
-    norm : name of the norm's brains
-    prediction : the output of `Study.prediction_facts`; `accuracy`, the content of `norms/predictions.yaml`; and
-        `tests`, the output of `compare.accuracy.prediction_facts`
+    Brains are as for `brain_rows`, figures the output of `page_figures`; `norm` is the name of the norm's brains.
+    `pictures` are data URL and width in inches of the small pictures of each brain that has a page, by its id.
+    `prediction` is the output of `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
+    and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
     runs, validation = tables.runs, tables.validation
     title, sentence, scores = "Measured cortical folding", quality_verdict(tables.quality), ""
@@ -202,18 +193,12 @@ def report_page(
     configuration: str,
     **content: Any,
 ) -> str:
-    """Return the page.
+    """Return the page from its Jinja template; values are escaped.
 
-    Parameters
-    ----------
-    template : Jinja template of the page; values are escaped
-    parts : style, three, notice, controls, viewer
-        The style sheet and the scripts of the 3D view with their licence, inserted unescaped.
-    view : the output of `surfaces_view`
-    provenance : the output of `software`, and files (brain, what, sha256)
-    methods : reStructuredText
-    configuration : text, without paths
-    content : the output of `study_page` or `brain_page`
+    `parts` are the style sheet (`style`) and the scripts of the 3D view with their licence (`three`, `notice`,
+    `controls`, `viewer`), inserted unescaped. `view` is the output of `surfaces_view`, `provenance` that of `software`
+    with files (brain, what, sha256), `methods` reStructuredText, `configuration` text without paths, and `content` the
+    output of `study_page` or `brain_page`.
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     # a script must not contain its own end tag
@@ -252,15 +237,10 @@ def brain_rows(
 ) -> list[dict[str, Any]]:
     """Return what a page says of each brain: its facts, its numbers, and its verdict with the cause or the warnings.
 
-    Numbers are by title of the metric, each with the text below it.
-
-    Parameters
-    ----------
-    brains : id, week, population, source, licence, covariates and whether it is synthetic, as configured
-    quality : columns subject, verdict, cause, warnings
-        The table of quality control.
-    metrics, centiles : the study's; `centile_text` is shown below each number
-    linked : ids of the brains whose source is on a page of their own
+    Numbers are by title of the metric, each with the text below it: `centile_text`. Brains have id, week, population,
+    source, licence, covariates and whether they are synthetic, as configured. `quality`, the table of quality control,
+    has the columns subject, verdict, cause, warnings; `metrics` and `centiles` are the study's. `linked` are the ids of
+    the brains whose source is on a page of their own.
     """
     judged = quality.set_index("subject").fillna("")
     values, texts = (
@@ -294,11 +274,8 @@ def brain_rows(
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
     """Return a row for each run: how it ended, and its scores at the last week with an observed brain.
 
-    Parameters
-    ----------
-    runs : columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex,
-        order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm
-    validation : the study's table of validation
+    `runs` has the columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex, order,
+    least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
@@ -358,11 +335,8 @@ def verdict(
 ) -> str:
     """Return a sentence that compares the best run at the last week with the scaled start, and the worst warning.
 
-    Parameters
-    ----------
-    runs, validation : as for `scores_table`
-    warnings : columns level and message
-    sentence : used if there is no observed brain
+    `runs` and `validation` are as for `scores_table`, `warnings` has the columns level and message. The `sentence` is
+    used if there is no observed brain.
     """
     if validation is not None and len(validation):
         last = validation[validation["week"] == validation["week"].max()]

@@ -61,11 +61,8 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
     """Draw coronal sections through the elements of a run at its start and at its end.
 
     Columns are the cortical weight with the elements, the growth zone (0 or 1), the tangential growth in a step, and
-    the normals in the cortex.
-
-    Parameters
-    ----------
-    model : elements (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at their nodes
+    the normals in the cortex. `model` are the elements (m, 4) or (m, 10), and by week the arrays of
+    `folding.zones.model_fields` at their nodes.
     """
     tets, weeks = model
     largest = max(float(fields["increment"].max()) for fields in weeks.values())
@@ -118,13 +115,8 @@ def outlines_chart(
     """Draw the outlines of runs over those of the observed brain, a row per plane, a column per week.
 
     The coronal and axial planes pass through the middle of the observed brain, the sagittal plane through its right
-    hemisphere. All panels have one scale. At most the last five weeks are shown.
-
-    Parameters
-    ----------
-    runs : {run: {week: surface in RAS+ mm}}
-        Each is rigidly aligned with the observed brain of its week.
-    observed : {week: observed surface in RAS+ mm}
+    hemisphere. All panels have one scale. At most the last five weeks are shown. Surfaces in RAS+ mm are by run and
+    week, observed ones by week; those of runs are aligned rigidly with the observed brain of their week.
     """
     weeks, colours = sorted(observed)[-MAX_WEEKS:], run_colours(runs)
     runs = {

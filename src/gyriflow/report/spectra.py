@@ -79,11 +79,8 @@ def spectra_weeks_chart(
 
     Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
     the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
-
-    Parameters
-    ----------
-    spectra
-        Columns subject, run, week, hemisphere, proxy, band, relative_power, complete, denominator_complete, resolved.
+    `spectra` has the columns subject, run, week, hemisphere, proxy, band, relative_power, complete,
+    denominator_complete, resolved.
     """
     with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
     bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
@@ -121,20 +118,15 @@ def influence_spectra(
     week: float,
     observed_name: str = OBSERVED_BRAIN,
 ) -> Figure:
-    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week.
+    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week (in GW).
 
     A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. They
     are hatched or open if the band, or one in the denominator of the relative power, is cut off, or if the surface does
     not resolve it. A band without any power is labelled as beyond the modes.
 
-    Parameters
-    ----------
-    members : {run: columns subject, week, hemisphere, proxy, band, relative_power, complete, denominator_complete,
-        resolved}. None for a run that ended before the week.
-    observed : the same of observed brains, with run "real"
-    values : {run: {parameter: value}}
-        The varied parameters, in the order of the sweep.
-    week : in GW
+    `members` are by run tables as for `spectra_weeks_chart`, None for a run that ended before the week; `observed`
+    those of observed brains, whose run is "real". `values` are by run the varied parameters with their values, in the
+    order of the sweep.
     """
     labels = dict(zip(values, value_labels(list(values.values())), strict=True))
     simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]

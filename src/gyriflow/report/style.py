@@ -75,11 +75,8 @@ def panel_figure(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure and its panels, row by row, with letters.
 
-    Parameters
-    ----------
-    per_row : panels of a full row, which is as wide as a page
-    panel_in, foot_in : height of a row and of the legend, in inches
-    grid : further arguments of `Figure.subplots`
+    A full row of `per_row` panels is as wide as a page; `panel_in` and `foot_in` are the heights of a row and of the
+    legend in inches. `grid` are further arguments of `Figure.subplots`.
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
@@ -163,13 +160,8 @@ def run_legend(
 ) -> None:
     """Draw a legend below the panels: runs, observed brains if named, subjects, and `extra` entries.
 
-    Runs have lines or `bars`. The legend has as many columns as its longest label allows, and the figure grows by its
-    rows.
-
-    Parameters
-    ----------
-    colours : {run: colour}
-    markers : {subject: marker}
+    Runs have lines or `bars` of their `colours`; `markers` are by subject. The legend has as many columns as its
+    longest label allows, and the figure grows by its rows.
     """
     handles: list[Artist] = [
         Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)

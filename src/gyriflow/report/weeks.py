@@ -52,12 +52,9 @@ MANY_BRAINS = 30
 class Layer:
     """Points of one look, in all panels that have some.
 
-    Attributes
-    ----------
-    rows
-        Columns panel, week, and the `value`. If there is a column `trusted`, marks are open where it is False.
-    style : arguments of `Axes.plot`; of a band, of `Axes.fill_between`
-    value : name of a column, or of those of the lower and the upper edge of a band
+    The rows have the columns panel, week, and the `value`: the name of a column, or those of the lower and the upper
+    edge of a band. If there is a column `trusted`, marks are open where it is False. `style` are the arguments of
+    `Axes.plot`, of a band those of `Axes.fill_between`.
     """
 
     rows: pd.DataFrame
@@ -152,12 +149,9 @@ def metrics_chart(
     The scans of a subject are joined. Subjects have markers if there are at most eight; groups of brains have colours.
     Metrics that the table lacks are left out.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-        `run` is "real" for observed brains; InputError if the table has none of the metrics.
-    subjects : {brain: subject}, if known
-    groups : {brain: its value of a covariate}
+    `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run` is "real" for observed brains.
+    InputError if the table has none of the metrics. `subjects` are the subjects of brains, if known, `groups` their
+    values of a covariate, both by brain.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
@@ -207,17 +201,9 @@ def norms_chart(
     Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the spread of individuals is known. Stars
     are observed brains: black in the reference, else coloured, as are groups. Lines are runs.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-    curves : columns hemisphere, metric, week, expected, q05, q25, q75, q95
-    reference
-        Brains that the curves were fitted to.
-    brains
-        Brains with the same hemispheres as the reference. Only they, and simulations from them, are drawn.
-    subjects, groups : as for `metrics_chart`
-
-    InputError if the table has none of the metrics.
+    Metrics, subjects and groups are as for `metrics_chart`; `curves` has the columns hemisphere, metric, week,
+    expected, q05, q25, q75, q95, which were fitted to the `reference` brains. `brains` have the same hemispheres as the
+    reference: only they, and simulations from them, are drawn. InputError if the table has none of the metrics.
     """
     whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
     rows, titles = _shown(whole, Shown.NORMS)
@@ -254,11 +240,8 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
     """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
 
     Observed brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
-
-    Parameters
-    ----------
-    regions : columns subject, run, week, hemisphere, region, metric, value, unit
-    asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    `regions` has the columns subject, run, week, hemisphere, region, metric, value, unit; `asymmetry` subject, run,
+    week, region, metric, asymmetry_index.
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
     colours, lines = region_colours(rows["region"]), dict(zip(run_colours(rows["run"]), LINES, strict=False))
@@ -291,11 +274,8 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
 def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
 
-    Runs are solid lines, simpler predictions dashed.
-
-    Parameters
-    ----------
-    prediction : columns run, start, horizon, model (`run` or a simpler prediction), r_shape_index and distance_mm
+    Runs are solid lines, simpler predictions dashed. `prediction` has the columns run, start, horizon, model (`run` or
+    a simpler prediction), r_shape_index and distance_mm.
     """
     columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
     colours = run_colours(prediction["run"], runs)
@@ -329,13 +309,9 @@ def displacement_chart(
 ) -> Figure:
     """Draw the maximal and the mean displacement norm of all nodes per week.
 
-    Norms are divided by the weeks between output weeks. Runs are lines, published values grey.
-
-    Parameters
-    ----------
-    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
-    published
-        `displacement` has `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
+    Norms are divided by the weeks between output weeks. Runs are lines, published values grey. `displacement` has the
+    columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; that of `published` has
+    `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
     named = runs_by_name(displacement)
     colours, published_rows = run_colours(named["run"], runs), _published_norms(published)
