@@ -2,8 +2,7 @@
 
 from dataclasses import asdict
 
-from gyriflow.growth.channels import channels, perturb_labels
-from gyriflow.growth.registration_quality import register_and_measure, require_good
+from gyriflow.growth.registration import channels, perturb_labels, register_and_measure, require_good
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_values
 from gyriflow.settings.schemes import FILLED

@@ -13,9 +13,7 @@ from ..geometry.deformations import Deformation, carry, transform_points
 from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
 from ..settings.terms import NO_REGION
-from .channels import Channels
-from .diffeomorphic import register
-from .registration_quality import measure_quality, require_good
+from .registration import Channels, measure_quality, register, require_good
 
 log = logging.getLogger(__name__)
 

@@ -18,19 +18,14 @@ log = logging.getLogger(__name__)
 
 DEGREES_OF_FREEDOM = 4.0
 """Degrees of freedom of a fitted curve: a size, a growth rate, its change, and a little more."""
-
 SPACING_WEEKS = 0.1
 """Spacing of the points at which a fitted curve is stored."""
-
 MIN_SCATTER = 0.005
 """Relative scatter of measured sizes that is never taken for an outlier."""
-
 TUKEY = 4.685
 """Residual over scatter beyond which a week has no weight (Beaton and Tukey 1974)."""
-
 MIN_WEEKS_PER_DEGREE = 2.0
 """Weeks per degree of freedom that are needed to detect outliers."""
-
 ROUNDS = 50
 KNOT_INTERVALS = 12
 Z_95 = 1.96

@@ -260,7 +260,7 @@ def growth_maps(
 ) -> Figure:
     """Draw the growth found by a run towards target shapes, with lines along the largest growth in the surface.
 
-    `frames` are by week the surface in RAS+ mm and its fields, `growth` the maps of `growth.maps.growth_per_week`, with
+    `frames` are by week the surface in RAS+ mm and its fields, `growth` the maps of `growth.rates.growth_per_week`, with
     their intervals in the names. The `quantity` is that of area, or that across the surface
     (`thickness_growth_percent_per_gw`). Maps without directions, as of standard deviations, have no lines.
     """

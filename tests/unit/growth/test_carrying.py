@@ -19,12 +19,12 @@ from gyriflow.growth.carrying import (
     carry_regions,
     carry_surface,
     carry_to_pose,
+    follow_surfaces,
     maps_on_template,
+    match_surfaces,
+    outward,
 )
-from gyriflow.growth.channels import Channels, channels, perturb_labels
-from gyriflow.growth.diffeomorphic import register
-from gyriflow.growth.matched_surfaces import follow_surfaces, match_surfaces, outward
-from gyriflow.growth.registration_quality import measure_quality, require_good
+from gyriflow.growth.registration import Channels, channels, measure_quality, perturb_labels, register, require_good
 from gyriflow.io.registrations import (
     WeeklyShapes,
     read_correspondence,
