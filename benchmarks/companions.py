@@ -36,7 +36,7 @@ from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import diffuse, harmonic_continuation, stiffness_matrix
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.tetrahedra import boundary_surface, linear_pieces
-from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume, vertex_areas, vertex_normals
+from gyriflow.geometry.triangles import Floats, TriangleMesh, vertex_areas, vertex_normals
 from gyriflow.growth.series_shapes import CONTINUATION_TOL, fit_body
 from gyriflow.io.frames import read_positions
 from gyriflow.io.registrations import read_weekly_shapes
@@ -141,7 +141,7 @@ def compare(models: dict[str, TriangleMesh], goal: TriangleMesh) -> dict[str, di
     folds, areas = prepare_for_comparison(goal, goal), vertex_areas(goal)
     found = {}
     for name, model in models.items():
-        surface = scale_to_volume(model, signed_volume(goal))
+        surface = scale_to_volume(model, goal)
         values, _ = interpolate_measures(prepare_for_comparison(surface, goal), folds)
         distance, _, _ = nearest_on(goal.vertices, align(surface, goal))
         r = correlation(folds.shape_index, values["shape_index"], folds.areas)

@@ -37,7 +37,7 @@ from gyriflow.compare.placement import correlation, interpolate_measures
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
+from gyriflow.geometry.triangles import Floats, TriangleMesh
 from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
 from gyriflow.growth.series_shapes import follow_series
 from gyriflow.io.files import read_table
@@ -161,7 +161,7 @@ def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int], *, fold
     for persistence, week in product(KEPT_GW, weeks[1:]):
         observed = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}"))
         atlas_brain = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
-        models = targets[week] | {"atlas": scale_to_volume(atlas_brain, signed_volume(targets[week][DEFAULT]))}
+        models = targets[week] | {"atlas": scale_to_volume(atlas_brain, targets[week][DEFAULT])}
         if folded:
             models["run"] = read_surface(folder / RUN.format(brain=brain, week=week_tag(week)))
         folds = prepare_for_comparison(observed, observed)

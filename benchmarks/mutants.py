@@ -88,10 +88,10 @@ BY_TESTS = {
         ("src/gyriflow/compare/placement.py", "asymmetry_mm < SYMMETRY_TOL_MM", "asymmetry_mm < 0"),
     ],
     "compare/test_prediction.py": [
-        ("src/gyriflow/compare/prediction.py", 'if model != "run"]', 'if model != "target"]'),
-        ("src/gyriflow/compare/prediction.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
-        ("src/gyriflow/compare/prediction.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
-        ("src/gyriflow/compare/prediction.py", 'week - labels["start_week"]', "week"),
+        ("src/gyriflow/compare/comparison.py", 'if model != "run"]', 'if model != "target"]'),
+        ("src/gyriflow/compare/comparison.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
+        ("src/gyriflow/compare/comparison.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
+        ("src/gyriflow/compare/comparison.py", 'week - labels["start_week"]', "week"),
     ],
     "compare/test_comparison.py": [
         ("src/gyriflow/compare/comparison.py", 'row[f"observed_{name}_{unit}"] - 1', "100"),
