@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
@@ -111,7 +111,7 @@ def study_page(
     `prediction` is the output of `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
     and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
-    runs, validation = tables.runs, tables.validation
+    runs, validation, centiles = tables.runs, tables.validation, tables.centiles
     title, sentence, scores = "Measured cortical folding", quality_verdict(tables.quality), ""
     if runs is not None:
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
@@ -124,12 +124,17 @@ def study_page(
     if prediction:
         title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
         title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
-        numbers = predicted_table(tables.metrics, prediction, tables.centiles, tables.intervals)
+        numbers = predicted_table(tables.metrics, prediction, centiles, tables.intervals)
         accuracy = accuracy_table(prediction["accuracy"])
         has_centiles = any("centile" in str(head) for head in numbers)
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
         prediction["individuals"] = norm if has_centiles else ""
-    return _shared(brains, tables, tables.warnings, figures, norm, pictures) | {
+    centiles = centiles[centiles["run"] == MEASURED]
+    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
+    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
+    # an atlas has too few brains for centiles among themselves
+    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
+    return {
         "title": title,
         "verdict": sentence,
         "prediction": prediction,
@@ -137,6 +142,14 @@ def study_page(
         "alone": False,
         "numbers": "",
         "runs": scores,
+        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
+        "pictures": pictures,
+        "norm": norm,
+        "flags": flags,
+        "spread_unknown": SPREAD_UNKNOWN,
+        "warnings": "" if tables.warnings.empty else html_table(group_warnings(tables.warnings)),
+        "weeks": next((item for item in figures if item["first"]), None),
+        "sections": sections([item for item in figures if not item["first"]]),
     }
 
 
@@ -144,43 +157,11 @@ def brain_page(
     brain: Mapping[str, Any], tables: Tables, figures: Sequence[Mapping[str, Any]], *, norm: str
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
-    own = tables.metrics["subject"] == brain["id"]
-    warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
-    return _shared([brain], tables, warnings, figures, norm, {}) | {
-        "title": f"Measured cortical folding, {brain['id']}",
-        "verdict": "",
-        "prediction": None,
-        "folded": [],
-        "alone": True,
-        "numbers": html_table(brain_table(tables.metrics[own], tables.centiles)),
-        "runs": "",
-    }
-
-
-def _shared(
-    brains: Sequence[Mapping[str, Any]],
-    tables: Tables,
-    warnings: pd.DataFrame,
-    figures: Sequence[Mapping[str, Any]],
-    norm: str,
-    pictures: Mapping[str, tuple[str, float]],
-) -> dict[str, Any]:
-    """Return the variables that pages of studies and of brains share."""
-    centiles = tables.centiles[tables.centiles["run"] == MEASURED]
-    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
-    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
-    # an atlas has too few brains for centiles among themselves
-    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    return {
-        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
-        "pictures": pictures,
-        "norm": norm,
-        "flags": flags,
-        "spread_unknown": SPREAD_UNKNOWN,
-        "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
-        "weeks": next((item for item in figures if item["first"]), None),
-        "sections": sections([item for item in figures if not item["first"]]),
-    }
+    metrics, warnings = (table[table["subject"] == brain["id"]] for table in (tables.metrics, tables.warnings))
+    page = study_page([brain], replace(tables, warnings=warnings, runs=None), figures, norm=norm, pictures={})
+    numbers = html_table(brain_table(metrics, tables.centiles))
+    title = f"Measured cortical folding, {brain['id']}"
+    return page | {"title": title, "verdict": "", "alone": True, "numbers": numbers}
 
 
 def report_page(
@@ -302,16 +283,12 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
         for group in map(models.get_group, ("run", "atlas", "scaled"))
     )
     means = {name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean() for name in ("run", "atlas")}
-    better = [
-        words
-        for words, is_better in (
-            ("closer", means["atlas"]["distance_mm"] < means["run"]["distance_mm"]),
-            ("more similar in shape index", means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"]),
-        )
-        if is_better
-    ]
-    words = " and ".join(better)
-    simpler = f" On average the atlas' own brain was {words}; it is given beside the prediction." if better else ""
+    is_better = {
+        "closer": means["atlas"]["distance_mm"] < means["run"]["distance_mm"],
+        "more similar in shape index": means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"],
+    }
+    better = " and ".join(words for words, holds in is_better.items() if holds)
+    simpler = f" On average the atlas' own brain was {better}; it is given beside the prediction." if better else ""
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
         f"{prediction['tests']['advantage']} This is a prediction, not a scan. "
