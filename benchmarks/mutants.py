@@ -123,10 +123,10 @@ BY_TESTS = {
         ("src/gyriflow/compare/accuracy.py", 'errors["start"] != start', 'errors["start"] != ""'),
     ],
     "compare/test_ensemble.py": [
-        ("src/gyriflow/compare/ensemble.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
-        ("src/gyriflow/compare/ensemble.py", "tested.coverage), tested.largest)", "tested.coverage), 0.0)"),
-        ("src/gyriflow/compare/ensemble.py", "max(widest, half)", "half"),
-        ("src/gyriflow/compare/ensemble.py", "logs.mean() - tested.bias", "logs.mean() + tested.bias"),
+        ("src/gyriflow/compare/accuracy.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
+        ("src/gyriflow/compare/accuracy.py", "tested.coverage), tested.largest)", "tested.coverage), 0.0)"),
+        ("src/gyriflow/compare/accuracy.py", "max(widest, half)", "half"),
+        ("src/gyriflow/compare/accuracy.py", "logs.mean() - tested.bias", "logs.mean() + tested.bias"),
     ],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),

@@ -2,7 +2,7 @@
 
 from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table
 from gyriflow.compare.shapes import PreparedSurface
-from gyriflow.growth.following import sizes_on_curves
+from gyriflow.growth.curves import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml

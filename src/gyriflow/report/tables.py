@@ -27,16 +27,8 @@ _TABLE = Environment(autoescape=True).from_string(
 
 COMMON_PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
-    *(
-        "growth_of",
-        "growth_rate_per_s",
-        "core_growth_rate_per_s",
-        "stress_memory_gw",
-        "support",
-        "contact.kind",
-        "no_growth.kind",
-    ),
-    *("step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
+    *("growth_of", "growth_rate_per_s", "core_growth_rate_per_s", "stress_memory_gw", "support"),
+    *("contact.kind", "no_growth.kind", "step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
@@ -212,7 +204,7 @@ def predicted_table(
     Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble beside them.
     `metrics` is as for `metrics_table`, `centiles` as for `brain_table`; `prediction` is the output of
     `Study.prediction_facts` with `tests`, that of `compare.accuracy.prediction_facts`; `intervals` that of
-    `compare.ensemble.interval_table`.
+    `compare.accuracy.interval_table`.
     """
     rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(metrics_shown(Shown.PREDICTION))]
     rows = rows.assign(name=_named).set_index("name")
