@@ -74,11 +74,7 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
     if share < USUAL_NEAR:
         # with few regions most vertices have none, but the regions themselves lie along the surface
         distance, _ = cKDTree(np.concatenate(list(points.values()))).query(centres, distance_upper_bound=REACH_MM)
-        _check_share_near(max(share, float(np.isfinite(distance).mean())))
-    return by_side
-
-
-def _check_share_near(share: float) -> None:
+        share = max(share, float(np.isfinite(distance).mean()))
     if share < MIN_NEAR:
         raise InputError(
             "the regions do not lie along the pial surface",
@@ -88,11 +84,9 @@ def _check_share_near(share: float) -> None:
             "volumes by C_RAS: convert them with mris_convert --to-scanner.",
         )
     if share < USUAL_NEAR:
-        log.warning(
-            "only %.0f %% of the regions and the pial surface are within %g mm of each other: are they in one space?",
-            100 * share,
-            REACH_MM,
-        )
+        text = "only %.0f %% of the regions and the pial surface are within %g mm of each other: are they in one space?"
+        log.warning(text, 100 * share, REACH_MM)
+    return by_side
 
 
 def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deformation | None:

@@ -16,16 +16,7 @@ from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import labels_at, match_points, values_at
 from ..geometry.poses import Pose
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    flipped,
-    signed_volume,
-    transformed,
-    vertex_areas,
-    vertex_normals,
-)
+from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, transformed, vertex_areas, vertex_normals
 
 MAX_DISTANCE_MM = 2.0
 """Largest mean distance of a mesh's surface from the matched surface that it follows."""
@@ -170,7 +161,7 @@ def carry_to_pose(mesh: TriangleMesh, pose: Pose, between: Sequence[Corresponden
 
 def carry_regions(
     labels: NDArray[np.integer], source: TriangleMesh, target: TriangleMesh, between: Correspondence
-) -> Ints:
+) -> NDArray[np.int64]:
     """Transfer the region labels of the (n,) vertices of `source` to those of `target`.
 
     The source is carried into the target's space. Each vertex of the target gets the label of the nearest point whose

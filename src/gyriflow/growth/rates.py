@@ -21,11 +21,8 @@ def growth_rates(weeks: Sequence[float], areas_mm2: Sequence[float], volumes_mm3
     rates refer to the size at the start of the interval. The folding model grows by (1 + rate·dt) in every step: rates
     for it, which reproduce the ratios as long as steps are short, are ln(θ)/(2Δt) and ln(V₂/V₁)/(3Δt).
 
-    Returns
-    -------
-    DataFrame
-        from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s, volume_ratio, core_rate_per_s,
-        core_compound_rate_per_s, by ascending week.
+    Columns from_week, to_week, area_ratio (θ), rate_per_s, compound_rate_per_s, volume_ratio, core_rate_per_s,
+    core_compound_rate_per_s, by ascending week.
     """
     order = np.argsort(weeks)
     week, area, volume = (np.asarray(column, dtype=float)[order] for column in (weeks, areas_mm2, volumes_mm3))

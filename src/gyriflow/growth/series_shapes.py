@@ -225,13 +225,9 @@ def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -
     mean, far = surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
     log.info("GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm", week, mean, far)
     if mean > MAX_MISFIT_MM:
-        log.warning(
-            "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body "
-            "cannot reach all of it without inverted elements or crossing folds",
-            week,
-            mean,
-            far,
-        )
+        text = "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body "
+        text += "cannot reach all of it without inverted elements or crossing folds"
+        log.warning(text, week, mean, far)
 
 
 def sizes_of(mesh: TetrahedralMesh, positions: Sequence[Floats] | Floats) -> dict[str, Floats]:

@@ -10,14 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..settings.terms import OBSERVED_BRAIN
-from .style import (
-    RUN_COLOURS,
-    from_zero,
-    panel_figure,
-    styled,
-    week_axis,
-    wrap,
-)
+from .style import RUN_COLOURS, from_zero, panel_figure, styled, week_axis, wrap
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series, without that of the simulations."""

@@ -13,7 +13,7 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
-from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render
+from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render, uniform_colours
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
@@ -63,6 +63,11 @@ class Row:
     label: str
     panels: Sequence[Panel | None]
     absent: str = ""
+
+
+def plain_panel(mesh: TriangleMesh, colour: str) -> Panel:
+    """Return a surface of one colour."""
+    return Panel(mesh, uniform_colours(mesh, colour))
 
 
 def round_length(limit_mm: float) -> float:

@@ -18,19 +18,8 @@ from ..settings.folding import AXES, FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2
 from .labels import column_label, map_title, value_labels
-from .panels import MAX_COLUMNS, Panel, Row, panel_grid
-from .scene import (
-    MAP,
-    UNKNOWN_COLOUR,
-    VIEWS,
-    View,
-    colour_scale,
-    half_extents,
-    paint,
-    render,
-    restricted,
-    uniform_colours,
-)
+from .panels import MAX_COLUMNS, Panel, Row, panel_grid, plain_panel
+from .scene import MAP, UNKNOWN_COLOUR, VIEWS, View, colour_scale, half_extents, paint, render, restricted
 from .style import NEUTRAL_COLOUR, OBSERVED_SURFACE_COLOUR, RIGHT_COLOUR, RUN_COLOURS, SIMULATED_SURFACE_COLOUR, styled
 
 SurfaceMap = tuple[TriangleMesh, Floats]
@@ -64,10 +53,6 @@ def _ordered(*groups: Mapping) -> list:
     """Return the keys of all groups: weeks and intervals sorted, names in their order."""
     keys = list(dict.fromkeys(key for group in groups for key in group))
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
-
-
-def _plain(mesh: TriangleMesh, colour: str) -> Panel:
-    return Panel(mesh, uniform_colours(mesh, colour))
 
 
 def _mapped(surface_map: SurfaceMap, scale: ScalarMappable, directions: Floats | None = None) -> Panel:
@@ -121,13 +106,13 @@ def runs_by_week(
     """
     special: dict[Any, str] = {predicted: SIMULATED_SURFACE_COLOUR}
     groups = {
-        name: {week: _plain(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
+        name: {week: plain_panel(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
         for name, meshes in runs.items()
         if meshes
     }
     if observed:
         groups[observed_name] = {
-            key: _plain(mesh, special.get(key, OBSERVED_SURFACE_COLOUR)) for key, mesh in observed.items()
+            key: plain_panel(mesh, special.get(key, OBSERVED_SURFACE_COLOUR)) for key, mesh in observed.items()
         }
     if not deviations:
         return brain_grid(groups, views)
@@ -260,8 +245,8 @@ def growth_maps(
 ) -> Figure:
     """Draw the growth found by a run towards target shapes, with lines along the largest growth in the surface.
 
-    `frames` are by week the surface in RAS+ mm and its fields, `growth` the maps of `growth.rates.growth_per_week`, with
-    their intervals in the names. The `quantity` is that of area, or that across the surface
+    `frames` are by week the surface in RAS+ mm and its fields; `growth` are the maps of `growth.rates.growth_per_week`,
+    with their intervals in the names. The `quantity` is that of area, or that across the surface
     (`thickness_growth_percent_per_gw`). Maps without directions, as of standard deviations, have no lines.
     """
     intervals = list(pairwise(sorted(frames)))
@@ -295,7 +280,7 @@ def influence_picture(
     maps = {name: _map_of(halves, "shape_index") for name, halves in brains.items() if halves}
     scale, colours = scale_of("shape_index", np.empty(0)), {observed_name: OBSERVED_SURFACE_COLOUR}
     groups = {
-        "": {name: _plain(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
+        "": {name: plain_panel(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
         "shape index\n": {name: _mapped(surface_map, scale) for name, surface_map in maps.items()},
     }
     rows = [

@@ -21,7 +21,7 @@ from ..quantities import VERTEX_MAPS
 from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, new_figure, styled, wrap
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, styled, wrap
 
 VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "needs review": ("Warnings:", "#E69F00")}
 """Heading above the warnings of a page, and colour of the verdict."""
@@ -79,7 +79,8 @@ def quality_page(brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence
     `row` is the output of `quality_row`.
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
-    figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
+    height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
+    figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
     # lines break between facts only

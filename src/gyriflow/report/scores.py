@@ -19,7 +19,6 @@ from .style import (
     MUTED_COLOUR,
     OBSERVED_COLOUR,
     RUN_COLOURS,
-    new_figure,
     panel_figure,
     run_colours,
     run_legend,
@@ -109,10 +108,11 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     drawn = table[table["row"].isin(places)]
     weeks = drawn["onset_week"].dropna()
     if not len(weeks):
-        figure = new_figure(FULL_WIDTH_IN, 0.4)
+        figure = Figure(figsize=(FULL_WIDTH_IN, 0.4), layout="constrained")
         figure.text(0.0, 0.5, "No sulcus begins after the start.", va="center")
         return figure
-    figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2))
+    height_in = 1.2 + ROW_IN * max(len(places), 2)
+    figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     axes = figure.subplots()
     colours = run_colours(onset["run"], runs)
     beyond = np.ceil(weeks.max() + 0.5)

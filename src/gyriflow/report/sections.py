@@ -16,16 +16,7 @@ from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
 from ..settings.terms import OBSERVED_BRAIN
 from .labels import week_label
-from .style import (
-    FULL_WIDTH_IN,
-    MUTED_COLOUR,
-    OBSERVED_COLOUR,
-    SINGLE_COLUMN_IN,
-    add_letters,
-    new_figure,
-    run_colours,
-    styled,
-)
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_COLOUR, SINGLE_COLUMN_IN, add_letters, run_colours, styled
 
 PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
 """The axis normal to each plane, and those to the right and up in its picture."""
@@ -66,7 +57,7 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
     """
     tets, weeks = model
     largest = max(float(fields["increment"].max()) for fields in weeks.values())
-    figure = new_figure(FULL_WIDTH_IN, 4.2)
+    figure = Figure(figsize=(FULL_WIDTH_IN, 4.2), layout="constrained")
     rows = figure.subplots(2, 4, sharex="row", sharey="row")
     scales = {"weight": 1.0, "growing": 1.0, "increment": largest}
     titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
@@ -130,7 +121,7 @@ def outlines_chart(
     tall = [(high - low)[up] for *_, up in PLANES.values()]
     inches_per_mm = min((FULL_WIDTH_IN - LEFT_IN) / (len(weeks) * wide), MAX_PANEL_IN / wide)
     width = max(SINGLE_COLUMN_IN, LEFT_IN + inches_per_mm * len(weeks) * wide)
-    figure = new_figure(width, inches_per_mm * sum(tall) + ABOVE_IN)
+    figure = Figure(figsize=(width, inches_per_mm * sum(tall) + ABOVE_IN), layout="constrained")
     panels = figure.subplots(len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall})
     for row, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         centre = (low[right] + high[right]) / 2

@@ -65,11 +65,6 @@ styled = mpl.rc_context(MATPLOTLIB_SETTINGS)
 """Decorator: draw a figure in the project's style, without changing global settings."""
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure with constrained layout."""
-    return Figure(figsize=(width_in, height_in), layout="constrained")
-
-
 def panel_figure(
     count: int, *, per_row: int = 3, panel_in: float = 1.9, foot_in: float = 0.7, **grid: Any
 ) -> tuple[Figure, list[Axes]]:
@@ -80,7 +75,8 @@ def panel_figure(
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
-    figure = new_figure(FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row), foot_in + panel_in * lines)
+    width_in = FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row)
+    figure = Figure(figsize=(width_in, foot_in + panel_in * lines), layout="constrained")
     panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
     for spare in panels[count:]:
         spare.remove()
