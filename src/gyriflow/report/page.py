@@ -224,13 +224,12 @@ def brain_rows(
     the brains whose source is on a page of their own.
     """
     judged = quality.set_index("subject").fillna("")
-    values, texts = (
-        {(row.subject, row.metric): getattr(row, column) for row in table.itertuples() if row.hemisphere == "whole"}
-        for table, column in (
-            (metrics[metrics["run"] == MEASURED].dropna(subset=["value"]), "value"),
-            (centiles[centiles["run"] == MEASURED].assign(text=centile_text), "text"),
-        )
+    measured, rated = (
+        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["value"].notna()]
+        for table in (metrics, centiles)
     )
+    values = dict(zip(zip(measured["subject"], measured["metric"], strict=True), measured["value"], strict=True))
+    texts = dict(zip(zip(rated["subject"], rated["metric"], strict=True), centile_text(rated), strict=True))
     shown = [name for name in metrics_shown(Shown.BRAINS) if name in {metric for _, metric in values}]
     rows = []
     for brain in brains:
@@ -331,33 +330,23 @@ def verdict(
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
     # the table has the list as JSON
-    reached, end = max(json.loads(run["weeks"])), float(run["end_week"])
+    reached, end, order = max(json.loads(run["weeks"])), float(run["end_week"]), int(run["order"])
     words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")
-    if too_coarse := _resolution(run):
-        words.append(too_coarse)
+    elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
+    needed = f"{ELEMENTS_NEEDED[order]:g} needed): folds may be artefacts"
+    if not elements >= ELEMENTS_NEEDED[order]:  # not a number: no element lies in the cortex
+        words.append(f"cortex not resolved ({elements:.3g} elements through it, {needed}")
+    elif pd.notna(week):
+        down = f"down to {run['least_elements_through_cortex']:.3g} elements through it, {needed} from then on"
+        words.append(f"cortex not resolved from {week_label(round(week, 2))} on ({down}")
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
         words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
-    if (elements := run["elements_through_cortex"]) > 0:
-        error, text = element_error(int(run["order"]), elements)
+    if elements > 0:
+        error, text = element_error(order, elements)
         words += [text] if error > LARGE_ELEMENT_ERROR else []
     return "; ".join(words)
-
-
-def _resolution(run: Mapping[str, Any] | pd.Series) -> str:
-    """Describe where the mesh of a run is too coarse, at the start or later; "" if it is fine enough."""
-    needed = ELEMENTS_NEEDED[int(run["order"])]
-    at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
-    if not at_start >= needed:  # not a number: no element lies in the cortex
-        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds may be artefacts"
-    if pd.isna(week):
-        return ""
-    return (
-        f"cortex not resolved from {week_label(round(week, 2))} on "
-        f"(down to {run['least_elements_through_cortex']:.3g} elements through it, {needed:g} needed): "
-        "folds may be artefacts from then on"
-    )
 
 
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
