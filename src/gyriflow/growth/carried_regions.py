@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +95,7 @@ def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 
     """
     try:
         deformation = register(brain, drawn, threads=threads).deformation
-        quality = replace(measure_quality(brain, drawn, deformation), dice_cortex=float("nan"))
+        quality = measure_quality(brain, drawn, deformation) | {"dice_cortex": float("nan")}
         require_good(quality, pair="with the brain of the named sulci")
     except InputError as error:
         # a study can go on with numbered sulci

@@ -7,8 +7,8 @@ the overlap, the folding of the map, and the displacement at its rim.
 import io
 import logging
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from zlib import crc32
 
@@ -290,31 +290,15 @@ MAX_FOLDED = 0.005
 """Largest share of the cerebrum's volume where the map may fold."""
 
 
-@dataclass(frozen=True)
-class RegistrationQuality:
-    """Measures of the quality of a registration.
-
-    Dice is the overlap 2|A∩B|/(|A| + |B|) of the masks of the earlier brain with those of the later brain carried back,
-    NaN without a cortex. The Jacobian determinant of the map in the earlier cerebrum is described by its minimum, the
-    share of the volume where it is ≤ 0, the standard deviation of its logarithm elsewhere, and its mean, the ratio of
-    volumes. `rim_mm` and `inside_mm` are 95 % quantiles of the displacement at the rim of the grid and in the cerebrum;
-    the rim should have less, since nothing is compared there.
-    """
-
-    dice_cerebrum: float
-    dice_cortex: float
-    least_determinant: float
-    folded_share: float
-    log_growth_sd: float
-    volume_ratio: float
-    rim_mm: float
-    inside_mm: float
-
-
-def measure_quality(earlier: Channels, later: Channels, deformation: Deformation) -> RegistrationQuality:
+def measure_quality(earlier: Channels, later: Channels, deformation: Deformation) -> dict[str, float]:
     """Measure the quality of a deformation between two brains from their unsmoothed masks.
 
-    Folding is measured in the earlier cerebrum, on the deformation's own grid.
+    dice_cerebrum and dice_cortex are the overlap 2|A∩B|/(|A| + |B|) of the masks of the earlier brain with those of the
+    later brain carried back, NaN without a cortex. The Jacobian determinant of the map in the earlier cerebrum, on the
+    deformation's own grid, is described by its minimum (least_determinant), the share of the volume where it is ≤ 0
+    (folded_share), the standard deviation of its logarithm elsewhere (log_growth_sd), and its mean, the ratio of
+    volumes (volume_ratio). rim_mm and inside_mm are 95 % quantiles of the displacement at the rim of the grid and in
+    the cerebrum; the rim should have less, since nothing is compared there.
     """
     grid = transform_points(np.indices(earlier.tissue.shape).reshape(3, -1).T, earlier.affine)
     places = transform_points(carry(deformation, grid), np.linalg.inv(later.affine)).T
@@ -326,21 +310,21 @@ def measure_quality(earlier: Channels, later: Channels, deformation: Deformation
     lengths = np.linalg.norm(deformation.displacement, axis=-1)
     rim = np.ones(lengths.shape, dtype=bool)
     rim[1:-1, 1:-1, 1:-1] = False
-    return RegistrationQuality(
-        dice_cerebrum=_dice(earlier, later, CEREBRUM_BIT, places),
-        dice_cortex=_dice(earlier, later, CORTEX_BIT, places) if with_cortex else float("nan"),
-        least_determinant=float(growth.min()),
-        folded_share=float((growth <= 0).mean()),
-        log_growth_sd=float(np.log(growth[growth > 0]).std()),
-        volume_ratio=float(growth.mean()),
-        rim_mm=float(np.quantile(lengths[rim], 0.95)),
-        inside_mm=float(np.quantile(map_coordinates(lengths, index.T, order=1, mode="nearest"), 0.95)),
-    )
+    return {
+        "dice_cerebrum": _dice(earlier, later, CEREBRUM_BIT, places),
+        "dice_cortex": _dice(earlier, later, CORTEX_BIT, places) if with_cortex else float("nan"),
+        "least_determinant": float(growth.min()),
+        "folded_share": float((growth <= 0).mean()),
+        "log_growth_sd": float(np.log(growth[growth > 0]).std()),
+        "volume_ratio": float(growth.mean()),
+        "rim_mm": float(np.quantile(lengths[rim], 0.95)),
+        "inside_mm": float(np.quantile(map_coordinates(lengths, index.T, order=1, mode="nearest"), 0.95)),
+    }
 
 
 def register_and_measure(
     earlier: Channels, later: Channels, *, is_filled: bool, smoothing: float = 1.0, threads: int = 1
-) -> tuple[Registration, RegistrationQuality]:
+) -> tuple[Registration, dict[str, float]]:
     """Register two brains by `register` and measure the quality.
 
     If the cortex of one `is_filled` from surfaces, it may be far from that of labels, which are coarse or of another
@@ -348,29 +332,28 @@ def register_and_measure(
     """
     found = register(earlier, later, smoothing=smoothing, threads=threads)
     quality = measure_quality(earlier, later, found.deformation)
-    if not (is_filled and quality.dice_cortex < MIN_DICE["cortex"]):
+    if not (is_filled and quality["dice_cortex"] < MIN_DICE["cortex"]):
         return found, quality
-    overlap = f"Dice {quality.dice_cortex:.2f}, expected {MIN_DICE['cortex']:.2f} or more"
+    overlap = f"Dice {quality['dice_cortex']:.2f}, expected {MIN_DICE['cortex']:.2f} or more"
     log.warning("the cortex filled from surfaces is not that of the labels (%s): registered without cortex", overlap)
     brains = [replace(brain, cortex=None) for brain in (earlier, later)]
     return register_and_measure(*brains, is_filled=False, smoothing=smoothing, threads=threads)
 
 
-def require_good(quality: RegistrationQuality, *, pair: str, only_warn: bool = False) -> None:
+def require_good(quality: Mapping[str, float], *, pair: str, only_warn: bool = False) -> None:
     """Raise InputError, with all measures, if a registration of a named `pair` of brains must not be used.
 
     With `only_warn`, log a warning instead.
     """
-    values = asdict(quality)
     faults = [
-        f"Dice of the {mask} {values[f'dice_{mask}']:.3f} below {limit:g}"
+        f"Dice of the {mask} {quality[f'dice_{mask}']:.3f} below {limit:g}"
         for mask, limit in MIN_DICE.items()
-        if values[f"dice_{mask}"] < limit
+        if quality[f"dice_{mask}"] < limit
     ]
-    if quality.folded_share > MAX_FOLDED:
-        faults.append(f"the map folds in {quality.folded_share:.2%} of the cerebrum, above {MAX_FOLDED:.2%}")
+    if (folded := quality["folded_share"]) > MAX_FOLDED:
+        faults.append(f"the map folds in {folded:.2%} of the cerebrum, above {MAX_FOLDED:.2%}")
     if faults:
-        numbers = ", ".join(f"{name} {value:.3g}" for name, value in values.items())
+        numbers = ", ".join(f"{name} {value:.3g}" for name, value in quality.items())
         error = InputError(
             f"the registration {pair} has failed: {'; '.join(faults)}",
             found=numbers,
