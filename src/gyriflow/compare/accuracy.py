@@ -26,6 +26,9 @@ DEFAULT_PROTOCOL = "default"
 """The protocol of tests that count: the default settings."""
 ATLAS_MARGIN = 0.02
 """Difference of the mean r of the shape index from which on the atlas' own brain is said to be better."""
+SULCUS, GYRUS = -0.375, 0.375
+"""Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
+1992."""
 
 
 @dataclass(frozen=True)
@@ -199,9 +202,6 @@ def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week
     return {"errors": errors, "held": held_words, "advantage": advantage, "starts": starts}
 
 
-SULCUS, GYRUS = -0.375, 0.375
-"""Largest shape index of a sulcus and smallest of a gyrus: the limits of rut and ridge of Koenderink & van Doorn
-1992."""
 UNTESTED = ErrorInTests(starts=0, largest=0.0, bias=0.0, is_corrected=False, coverage=LEVEL, is_beyond=False)
 """The intervals of a run without tests are those of its members."""
 

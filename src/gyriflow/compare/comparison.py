@@ -34,6 +34,8 @@ type VertexDistances = tuple[TriangleMesh, Floats]
 type Group = Literal["size", "distance", "folds", "quality", "intervals"]
 GROUPS: tuple[Group, ...] = ("size", "distance", "folds", "quality", "intervals")
 """Groups of columns of `compare`. Columns of the others are computed alike if some are left out."""
+FIRST_COLUMNS = ["run", "kind", "start", "start_week", "week", "observed", "horizon", "model"]
+"""The labels of a row of `comparison_table`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,10 +225,6 @@ def roughness_mm(mesh: TriangleMesh) -> float:
     means = links @ mesh.vertices / np.asarray(links.sum(axis=1))
     offsets: Floats = ((means - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
     return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))
-
-
-FIRST_COLUMNS = ["run", "kind", "start", "start_week", "week", "observed", "horizon", "model"]
-"""The labels of a row of `comparison_table`."""
 
 
 def simple_predictions(

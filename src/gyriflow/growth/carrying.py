@@ -24,6 +24,8 @@ MAX_TURN_DEG = 30.0
 """Largest rotation between the matched vertices of two posed brains."""
 MAX_SCATTER = 0.3
 """Largest root mean square distance of matched vertices after alignment and scaling, as a share of the size."""
+MAX_OUTSIDE = 0.001
+"""Largest share of points that may lie outside the grid of a displacement."""
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
@@ -109,10 +111,6 @@ def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Fl
 
 def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
     return np.unique(np.sort(mesh.faces, axis=1), axis=0)
-
-
-MAX_OUTSIDE = 0.001
-"""Largest share of points that may lie outside the grid of a displacement."""
 
 
 def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Floats:

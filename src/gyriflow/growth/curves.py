@@ -35,6 +35,10 @@ MIN_WEEKS_PER_DEGREE = 2.0
 ROUNDS = 50
 KNOT_INTERVALS = 12
 Z_95 = 1.96
+THICKNESS = "thickness_mm"
+"""Column of the table of areas with the mean cortical thickness, if known. Thickness may decrease."""
+SPACING_GW = 0.25
+"""Spacing of the weeks at which a run stores a curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,12 +228,6 @@ def _refuse_shrinking(name: str, weeks: Floats) -> None:
         expected="growth",
         remedy="Leave out the brains that do not fit, or correct the table.",
     )
-
-
-THICKNESS = "thickness_mm"
-"""Column of the table of areas with the mean cortical thickness, if known. Thickness may decrease."""
-SPACING_GW = 0.25
-"""Spacing of the weeks at which a run stores a curve."""
 
 
 def fits_of_series(areas: pd.DataFrame) -> dict[str, dict[str, CurveFit]]:

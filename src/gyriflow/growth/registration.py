@@ -36,6 +36,27 @@ PERTURBATION_VOXELS, PERTURBATION_SCALE = 0.5, 2.0
 """Root mean square shift of perturbed boundaries along each axis, and the SD of the Gaussian that makes it smooth."""
 BRIGHT = 0.99
 """Quantile of the intensity inside the cerebrum that counts as 1."""
+WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
+AFFINE = "-a -dof 12 -m SSD -n 60x30"
+DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -wp 0"
+SMOOTHING_VOXELS = (2.5, 0.8)
+"""SD of the smoothing of updates and of the deformation."""
+MAX_ROTATED_SHARE = 0.7
+"""A rotated start is taken if its difference is below this share of that without rotation."""
+N_POINTS = 3000
+"""Number of points of the cerebrum at which starts are compared."""
+_ANGLES = list(product(range(0, 360, 45), range(-90, 91, 45), range(0, 360, 45)))
+START_ROTATIONS: Floats = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
+START_ROTATIONS = START_ROTATIONS[np.argsort(-np.trace(START_ROTATIONS, axis1=1, axis2=2), kind="stable")]
+"""Rotations of the start, the identity first. Every rotation is within about 35 degrees of one of them."""
+REFINED_DEG = (20.0, 10.0, 5.0)
+"""Steps by which the best of them is then rotated about the three axes, in turn."""
+NEAR_MM = 3.0
+"""Margin around the cerebrum in which brains are compared for the deformation."""
+MIN_DICE = {"cerebrum": 0.95, "cortex": 0.60}
+"""Below these overlaps a registration is refused. Overlap of a cortex of one voxel is low."""
+MAX_FOLDED = 0.005
+"""Largest share of the cerebrum's volume where the map may fold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +181,6 @@ def _resample(values: NDArray[np.float32], affine: Floats, grid: Floats, shape: 
     )
 
 
-WEIGHTS = {"cerebrum": 0.5, "cortex": 1.0, "intensity": 0.5}
-
-AFFINE = "-a -dof 12 -m SSD -n 60x30"
-DEFORMABLE = "-m NCC 3x3x3 -n 60x40x15 -wp 0"
-SMOOTHING_VOXELS = (2.5, 0.8)
-"""SD of the smoothing of updates and of the deformation."""
-MAX_ROTATED_SHARE = 0.7
-"""A rotated start is taken if its difference is below this share of that without rotation."""
-N_POINTS = 3000
-"""Number of points of the cerebrum at which starts are compared."""
-_ANGLES = list(product(range(0, 360, 45), range(-90, 91, 45), range(0, 360, 45)))
-START_ROTATIONS: Floats = Rotation.from_euler("xyz", _ANGLES, degrees=True).as_matrix()
-START_ROTATIONS = START_ROTATIONS[np.argsort(-np.trace(START_ROTATIONS, axis1=1, axis2=2), kind="stable")]
-"""Rotations of the start, the identity first. Every rotation is within about 35 degrees of one of them."""
-REFINED_DEG = (20.0, 10.0, 5.0)
-"""Steps by which the best of them is then rotated about the three axes, in turn."""
-NEAR_MM = 3.0
-"""Margin around the cerebrum in which brains are compared for the deformation."""
-
-
 @dataclass(frozen=True, eq=False)
 class Registration:
     """A deformation from the earlier brain to the later one.
@@ -282,12 +283,6 @@ def _find_start(earlier: Channels, later: Channels, names: tuple[str, ...]) -> t
 def _place(brain: Channels) -> tuple[Floats, float]:
     index = np.argwhere(brain.tissue & CEREBRUM_BIT > 0)
     return transform_points(index, brain.affine).mean(axis=0), len(index) * brain.voxel_mm**3
-
-
-MIN_DICE = {"cerebrum": 0.95, "cortex": 0.60}
-"""Below these overlaps a registration is refused. Overlap of a cortex of one voxel is low."""
-MAX_FOLDED = 0.005
-"""Largest share of the cerebrum's volume where the map may fold."""
 
 
 def measure_quality(earlier: Channels, later: Channels, deformation: Deformation) -> dict[str, float]:

@@ -24,6 +24,16 @@ PULL_TOL = 1e-3
 """Relative tolerance of that smoothing; the next round makes up for the error."""
 REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
+FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
+"""Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
+MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
+"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
+MAX_MISFIT_MM = 0.25
+"""Mean distance of a body from the surface it is fitted to above which a warning is logged."""
+CONTINUATION_TOL = 1e-4
+"""Relative tolerance of the harmonic continuation that a body follows."""
+Target = tuple[TriangleMesh, Floats | None]
+"""A surface, and where the tissue below the vertices that are fitted to it is in its brain (n, 3), if it counts."""
 
 
 def fit_onto_surface(
@@ -68,19 +78,6 @@ def fit_onto_surface(
 def points_below(surface: TriangleMesh) -> Floats:
     """Return the (n, 3) points `INNER_MM` below the vertices of a surface."""
     return surface.vertices - INNER_MM * vertex_normals(surface)
-
-
-FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
-"""Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
-MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
-"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
-MAX_MISFIT_MM = 0.25
-"""Mean distance of a body from the surface it is fitted to above which a warning is logged."""
-CONTINUATION_TOL = 1e-4
-"""Relative tolerance of the harmonic continuation that a body follows."""
-
-Target = tuple[TriangleMesh, Floats | None]
-"""A surface, and where the tissue below the vertices that are fitted to it is in its brain (n, 3), if it counts."""
 
 
 class FittedBody(Protocol):
