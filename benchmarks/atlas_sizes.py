@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from common import print_rows
 
-from gyriflow.growth.atlas_ages import ages_by_size
+from gyriflow.growth.atlas_path import ages_by_size
 from gyriflow.io.volumes import read_label_volume
 
 MAX_WEEKS = 12

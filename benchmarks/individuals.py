@@ -35,7 +35,7 @@ from gyriflow.compare.comparison import aligned_distances
 from gyriflow.compare.shapes import prepare_for_comparison, scale_to_volume
 from gyriflow.geometry.deformations import between_moved, transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import Floats, TriangleMesh, signed_volume
+from gyriflow.geometry.triangles import Floats, TriangleMesh
 from gyriflow.growth.expected import DIFFERENCE_SMOOTHING_MM, FADING_GW, expected_positions
 from gyriflow.growth.series_shapes import follow_series
 from gyriflow.io.registrations import read_correspondence
@@ -133,7 +133,7 @@ def scores_of(folder: Path, name: str, atlas: str, weeks: Sequence[int]) -> list
     for persistence, week in product(KEPT_GW, weeks[1:]):
         observed = read_surface(folder / PIAL["whole"].format(brain=f"{name}-{persistence}-{week}"))
         atlas_brain = read_surface(folder / PIAL["whole"].format(brain=f"{atlas}-{week}"))
-        models = targets[week] | {"atlas": scale_to_volume(atlas_brain, signed_volume(targets[week][DEFAULT]))}
+        models = targets[week] | {"atlas": scale_to_volume(atlas_brain, targets[week][DEFAULT])}
         folds = prepare_for_comparison(observed, observed)
         for model, surface in models.items():
             row = {"grown_by": atlas, "persistence": persistence, "individual": name, "horizon": week - start}

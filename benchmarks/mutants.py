@@ -88,10 +88,10 @@ BY_TESTS = {
         ("src/gyriflow/compare/placement.py", "asymmetry_mm < SYMMETRY_TOL_MM", "asymmetry_mm < 0"),
     ],
     "compare/test_prediction.py": [
-        ("src/gyriflow/compare/prediction.py", 'if model != "run"]', 'if model != "target"]'),
-        ("src/gyriflow/compare/prediction.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
-        ("src/gyriflow/compare/prediction.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
-        ("src/gyriflow/compare/prediction.py", 'week - labels["start_week"]', "week"),
+        ("src/gyriflow/compare/comparison.py", 'if model != "run"]', 'if model != "target"]'),
+        ("src/gyriflow/compare/comparison.py", "drawn[key] - atlas[key]", "drawn[key] - atlas[key][0]"),
+        ("src/gyriflow/compare/comparison.py", "table[name] / curve - 1}", "curve / table[name] - 1}"),
+        ("src/gyriflow/compare/comparison.py", 'week - labels["start_week"]', "week"),
     ],
     "compare/test_comparison.py": [
         ("src/gyriflow/compare/comparison.py", 'row[f"observed_{name}_{unit}"] - 1', "100"),
@@ -123,10 +123,10 @@ BY_TESTS = {
         ("src/gyriflow/compare/accuracy.py", 'errors["start"] != start', 'errors["start"] != ""'),
     ],
     "compare/test_ensemble.py": [
-        ("src/gyriflow/compare/ensemble.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
-        ("src/gyriflow/compare/ensemble.py", "tested.coverage), tested.largest)", "tested.coverage), 0.0)"),
-        ("src/gyriflow/compare/ensemble.py", "max(widest, half)", "half"),
-        ("src/gyriflow/compare/ensemble.py", "logs.mean() - tested.bias", "logs.mean() + tested.bias"),
+        ("src/gyriflow/compare/accuracy.py", "np.sqrt(1 + 1 / n)", "np.sqrt(1 / n)"),
+        ("src/gyriflow/compare/accuracy.py", "tested.coverage), tested.largest)", "tested.coverage), 0.0)"),
+        ("src/gyriflow/compare/accuracy.py", "max(widest, half)", "half"),
+        ("src/gyriflow/compare/accuracy.py", "logs.mean() - tested.bias", "logs.mean() + tested.bias"),
     ],
     "compare/test_deviation.py": [
         ("src/gyriflow/compare/deviation.py", "SMOOTHING_MM = 3.0", "SMOOTHING_MM = 0.0"),

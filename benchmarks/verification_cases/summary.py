@@ -4,11 +4,12 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from gyriflow.report.style import FULL_WIDTH_IN, MATPLOTLIB_SETTINGS, MUTED_COLOUR, RUN_COLOURS, new_figure
+from gyriflow.report.style import FULL_WIDTH_IN, MATPLOTLIB_SETTINGS, MUTED_COLOUR, RUN_COLOURS
 
 from .closed_forms import short_wave_rate, thin_film
 from .modes import Slab, growth_rates
@@ -78,7 +79,7 @@ def plain(value, digits: int = 4):
 def draw(found: dict, slab_cells: tuple[int, ...], folder: Path) -> None:
     """Draw growth rates by wavelength without stress memory into a folder, one panel per contrast."""
     with mpl.rc_context(MATPLOTLIB_SETTINGS):
-        figure = new_figure(FULL_WIDTH_IN, 2.6)
+        figure = Figure(figsize=(FULL_WIDTH_IN, 2.6), layout="constrained")
         panels = figure.subplots(1, len(found))
         for axes, (contrast, case) in zip(panels, found.items(), strict=True):
             lengths = np.array(case["lengths"])

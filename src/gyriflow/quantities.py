@@ -6,6 +6,7 @@ Units are written as in the tables: "1/mm2" for mm⁻², "1" for none.
 
 from dataclasses import dataclass, replace
 from enum import Flag, auto
+from typing import Any
 
 
 class Registry[Record](dict[str, Record]):
@@ -36,18 +37,18 @@ NOWHERE = Shown(0)
 class VertexMap:
     """A value at each vertex of a surface.
 
-    `name` is that of the array in its file; `bids_suffix` and `description` are used in the export, whose values are
-    those of our file times `export_sign`, so that names of other tools have their signs. `is_averaged`: its mean is
-    given by region. A map with `colours`, a colour map of Matplotlib, is drawn, between `limits` or else from 0 to the
-    `quantile` of the vertices, and as far below 0 if it `is_signed` or has negative values. The colour bar has
-    the `label` with the unit, or with what the `ends` of the scale mean. `mean_shown`: where its mean is shown.
+    `name` is that of the array in its file. The maps of measured brains are exported with a `bids_suffix` and a
+    `description`, and with values times `export_sign`, so that names of other tools have their signs. `is_averaged`:
+    its mean is given by region. A map with `colours`, a colour map of Matplotlib, is drawn, between `limits` or else
+    from 0 to the `quantile` of the vertices, and as far below 0 if it `is_signed` or has negative values. The colour
+    bar has the `label` with the unit, or with what the `ends` of the scale mean. `mean_shown`: where its mean is shown.
     """
 
     name: str
     unit: str
     label: str
-    bids_suffix: str
-    description: str
+    bids_suffix: str = ""
+    description: str = ""
     export_sign: int = 1
     is_averaged: bool = True
     colours: str = ""
@@ -138,51 +139,22 @@ _BRAIN_MAPS = (
         "Template distance", is_averaged=False,
     ),
 )  # fmt: skip
+_SIGNED: Any = {"colours": SIGNED_COLOURS, "is_signed": True}
 _DEVIATION_MAPS = (
-    VertexMap(
-        "distance_mm", "mm", "distance, outwards", "distance",
-        "Distance of the real surface from the expected one, positive outwards", colours=SIGNED_COLOURS, is_signed=True,
-    ),
-    VertexMap(
-        "log_area", "1", "logarithm of the area's ratio", "logArea",
-        "Logarithm of the real over the expected area, positive where the real one is larger",
-        colours=SIGNED_COLOURS, is_signed=True,
-    ),
-    VertexMap(
-        "thickness_difference_mm", "mm", "difference of thickness", "thicknessDifference",
-        "Real less expected cortical thickness, positive where the real one is thicker",
-        colours=SIGNED_COLOURS, is_signed=True,
-    ),
-)  # fmt: skip
+    VertexMap("distance_mm", "mm", "distance, outwards", **_SIGNED),
+    VertexMap("log_area", "1", "logarithm of the area's ratio", **_SIGNED),
+    VertexMap("thickness_difference_mm", "mm", "difference of thickness", **_SIGNED),
+)
+_DRAWN: Any = {"colours": POSITIVE_COLOURS, "is_averaged": False}
+_PROBABILITY: Any = {"limits": (0.0, 1.0), **_DRAWN}
 _SIMULATION_MAPS = (
-    VertexMap(
-        "displacement_mm", "mm", "displacement since the start", "displacement",
-        "Displacement since the start of the simulation", is_averaged=False, colours=POSITIVE_COLOURS,
-    ),
-    VertexMap(
-        "area_growth_percent_per_gw", "% per week", "growth of area", "areaGrowth",
-        "Growth of area, positive where it grows", is_averaged=False, colours=POSITIVE_COLOURS,
-    ),
-    VertexMap(
-        "thickness_growth_percent_per_gw", "% per week", "growth across the surface", "thicknessGrowth",
-        "Growth along the normal of the surface, positive where it grows", is_averaged=False,
-    ),
-    VertexMap(
-        "position_sd_mm", "mm", "SD of position", "positionSd",
-        "Standard deviation of the position over the members of an ensemble",
-        is_averaged=False, colours=POSITIVE_COLOURS,
-    ),
-    VertexMap(
-        "sulcus_probability", "1", "probability of a sulcus", "sulcusProbability",
-        "Share of a run and the members of its ensemble in which the vertex is in a sulcus",
-        is_averaged=False, colours=POSITIVE_COLOURS, limits=(0.0, 1.0),
-    ),
-    VertexMap(
-        "gyrus_probability", "1", "probability of a gyrus", "gyrusProbability",
-        "Share of a run and the members of its ensemble in which the vertex is on a gyrus",
-        is_averaged=False, colours=POSITIVE_COLOURS, limits=(0.0, 1.0),
-    ),
-)  # fmt: skip
+    VertexMap("displacement_mm", "mm", "displacement since the start", **_DRAWN),
+    VertexMap("area_growth_percent_per_gw", "% per week", "growth of area", **_DRAWN),
+    VertexMap("thickness_growth_percent_per_gw", "% per week", "growth across the surface", is_averaged=False),
+    VertexMap("position_sd_mm", "mm", "SD of position", **_DRAWN),
+    VertexMap("sulcus_probability", "1", "probability of a sulcus", **_PROBABILITY),
+    VertexMap("gyrus_probability", "1", "probability of a gyrus", **_PROBABILITY),
+)
 VERTEX_MAPS = Registry({record.name: record for record in (*_BRAIN_MAPS, *_DEVIATION_MAPS, *_SIMULATION_MAPS)})
 """The maps, by name."""
 

@@ -5,7 +5,7 @@ import numpy as np
 from gyriflow.compare.shapes import scale_to_volume
 from gyriflow.geometry.alignment import align
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
+from gyriflow.geometry.triangles import TriangleMesh, vertex_areas
 from gyriflow.growth.expected import positions_at
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_surface, write_surface
@@ -18,4 +18,4 @@ with step(snakemake.log[0]):
     start, _ = boundary_surface(read_tetrahedral_mesh(files.mesh))
     shapes = np.stack(targets.surfaces["atlas"])
     atlas = TriangleMesh(positions_at(snakemake.params.week, shapes, targets.weeks, vertex_areas(start)), start.faces)
-    write_surface(snakemake.output[0], align(scale_to_volume(atlas, signed_volume(predicted)), predicted))
+    write_surface(snakemake.output[0], align(scale_to_volume(atlas, predicted), predicted))

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.compare.ensemble import interval_table
+from gyriflow.compare.accuracy import interval_table
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step

@@ -1,6 +1,6 @@
 """Write maps of the spread of an ensemble at a week on a hemisphere of its run."""
 
-from gyriflow.compare.ensemble import ensemble_maps
+from gyriflow.compare.accuracy import ensemble_maps
 from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_vertex_maps
 from gyriflow.step import step
 

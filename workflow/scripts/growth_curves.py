@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from gyriflow.growth.curves import curve_table, errors
-from gyriflow.growth.following import fits_of_series
+from gyriflow.growth.curves import curve_table, errors, fits_of_series
 from gyriflow.io.files import read_table, write_table
 from gyriflow.step import step
 

@@ -1,6 +1,6 @@
 """Write the growth that a run towards shapes has found, as maps on the pial surface: one set per output week."""
 
-from gyriflow.growth.maps import growth_per_week
+from gyriflow.growth.rates import growth_per_week
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.io.surfaces import write_vertex_maps
 from gyriflow.io.yaml_files import read_yaml

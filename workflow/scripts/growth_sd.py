@@ -1,6 +1,6 @@
 """Write the standard deviation of the growth maps of an ensemble."""
 
-from gyriflow.growth.maps import growth_sd
+from gyriflow.growth.rates import growth_sd
 from gyriflow.io.surfaces import read_vertex_maps, write_vertex_maps
 from gyriflow.step import step
 

@@ -2,7 +2,7 @@
 
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.geometry.triangles import merged, transformed
-from gyriflow.growth.matched_surfaces import match_surfaces, outward
+from gyriflow.growth.carrying import match_surfaces, outward
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.settings.terms import SIDES

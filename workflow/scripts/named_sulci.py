@@ -6,7 +6,7 @@ import numpy as np
 
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.growth.carried_regions import PLACES_MM, regions_by_deformation, register_to_drawn_sulci
-from gyriflow.growth.channels import channels
+from gyriflow.growth.registration import channels
 from gyriflow.io.surfaces import read_pose, read_surface, write_vertex_labels
 from gyriflow.io.volumes import LabelSource, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml

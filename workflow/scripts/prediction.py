@@ -1,7 +1,6 @@
 """Compare a run that predicts a brain, and simple baselines, with the observed brains."""
 
-from gyriflow.compare.comparison import ObservedBrain
-from gyriflow.compare.prediction import comparison_table, simple_predictions
+from gyriflow.compare.comparison import ObservedBrain, comparison_table, simple_predictions
 from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh

@@ -4,7 +4,7 @@ from gyriflow.anatomy.fissure import nearer_left
 from gyriflow.anatomy.plausible import require_plausible_thickness
 from gyriflow.folding.start_regions import start_regions
 from gyriflow.geometry.tetrahedra import boundary_faces, boundary_surface
-from gyriflow.growth.following import run_parameters
+from gyriflow.growth.curves import run_parameters
 from gyriflow.io.files import read_json, read_table
 from gyriflow.io.registrations import read_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface, read_surface_maps

@@ -1,9 +1,6 @@
 """Register a brain with one of a later week; refuse a failed registration."""
 
-from dataclasses import asdict
-
-from gyriflow.growth.channels import channels, perturb_labels
-from gyriflow.growth.registration_quality import register_and_measure, require_good
+from gyriflow.growth.registration import channels, perturb_labels, register_and_measure, require_good
 from gyriflow.io.registrations import write_correspondence
 from gyriflow.io.volumes import read_values
 from gyriflow.settings.schemes import FILLED
@@ -23,4 +20,4 @@ with step(snakemake.log[0], *files.brains):
     # one member of an ensemble must not end the study
     require_good(quality, pair=f"{names.earlier} to {names.later}", only_warn=params.is_varied)
     report = {"seconds": found.seconds, "channels": list(found.channels), "turned_deg": found.turned_deg}
-    write_correspondence(snakemake.output[0], found.deformation, report | asdict(quality))
+    write_correspondence(snakemake.output[0], found.deformation, report | quality)

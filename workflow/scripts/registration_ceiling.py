@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from gyriflow.compare.comparison import ObservedBrain
-from gyriflow.compare.prediction import comparison_table
+from gyriflow.compare.comparison import ObservedBrain, comparison_table
 from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh, transformed

@@ -1,9 +1,8 @@
 """Validate a run: compare its simulated brains with the observed ones, week by week."""
 
-from gyriflow.compare.comparison import ObservedBrain
-from gyriflow.compare.prediction import add_curves, comparison_table
+from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table
 from gyriflow.compare.shapes import PreparedSurface
-from gyriflow.growth.following import sizes_on_curves
+from gyriflow.growth.curves import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
 from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.yaml_files import read_yaml

@@ -1,4 +1,4 @@
-"""Comparison of a predicted surface with an observed brain: one row with all columns, from which tables choose."""
+"""Comparison of predicted surfaces with observed brains: rows with all columns, and tables with simple predictions."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import igl
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..geometry.alignment import align
@@ -26,13 +27,15 @@ from .placement import (
     number_patches,
     with_interval,
 )
-from .shapes import PreparedSurface, cortex_dice, curvature_differences, prepare_for_comparison
+from .shapes import PreparedSurface, cortex_dice, curvature_differences, prepare_for_comparison, scale_to_volume
 
 type VertexDistances = tuple[TriangleMesh, Floats]
 """A surface, and the (n,) distances of its vertices from another one in mm."""
 type Group = Literal["size", "distance", "folds", "quality", "intervals"]
 GROUPS: tuple[Group, ...] = ("size", "distance", "folds", "quality", "intervals")
 """Groups of columns of `compare`. Columns of the others are computed alike if some are left out."""
+FIRST_COLUMNS = ["run", "kind", "start", "start_week", "week", "observed", "horizon", "model"]
+"""The labels of a row of `comparison_table`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,3 +225,77 @@ def roughness_mm(mesh: TriangleMesh) -> float:
     means = links @ mesh.vertices / np.asarray(links.sum(axis=1))
     offsets: Floats = ((means - mesh.vertices) * vertex_normals(mesh)).sum(axis=1)
     return float(np.sqrt(np.average(offsets**2, weights=vertex_areas(mesh))))
+
+
+def simple_predictions(
+    start: TriangleMesh, target: TriangleMesh, registered: Mapping[str, TriangleMesh], atlas: TriangleMesh | None
+) -> dict[str, TriangleMesh]:
+    """Predict a week without mechanics: closed surfaces in mm by model.
+
+    The model `scaled` is the start brain with the volume of the target, `target` the surface that the run grows towards
+    in this week. `registered` has further models on the boundary of the start's mesh, among them `atlas`, the atlas
+    interpolated to this week; its own surface of this week, if there is one, replaces it. Either is scaled to the
+    volume of the target.
+    """
+    atlas = registered["atlas"] if atlas is None else atlas
+    models = {"scaled": scale_to_volume(start, target), **registered}
+    return models | {"atlas": scale_to_volume(atlas, target), "target": target}
+
+
+def comparison_table(
+    labels: Mapping[str, Any],
+    models: Mapping[float, Mapping[str, TriangleMesh]],
+    observed: Mapping[float, ObservedBrain],
+    *,
+    radius_mm: float,
+) -> pd.DataFrame:
+    """Compare the predicted surfaces of each week with the observed brain: a row per week and model.
+
+    Labels are run; kind ("explained" if growth was measured on the observed brains, else "predicted"); start (id of the
+    start brain) and start_week. Models are by week closed surfaces in mm, that of the run as `run`; all others are
+    baselines. `radius_mm` is that of the fitted curvature.
+
+    Columns are the labels, week, observed (id of the observed brain), horizon (weeks since the start), model, those of
+    `compare`, and those of `model_columns` where there are baselines.
+    """
+    rows = []
+    for week in sorted(models):
+        brain = observed[week]
+        found = {model: compare(surface, brain, radius_mm=radius_mm) for model, surface in models[week].items()}
+        samples = {model: drawn for model, (_, drawn) in found.items()}
+        scores = model_columns(samples) if len(found) > 1 else {"run": {}}
+        place = {"week": week, "observed": brain.id, "horizon": round(week - labels["start_week"], 6)}
+        rows += [{**labels, **place, "model": model, **row, **scores[model]} for model, (row, _) in found.items()]
+    table = pd.DataFrame(rows)
+    return table[[*FIRST_COLUMNS, *table.columns.difference(FIRST_COLUMNS, sort=False)]]
+
+
+def model_columns(samples: Mapping[str, Mapping[str, Floats]]) -> dict[str, dict[str, float]]:
+    """Compare the models of a week with each other, by the `samples` of `compare` of each.
+
+    Columns by model: skill = 1 − distance / distance of the best baseline (chosen anew in each sample, so the interval
+    includes the uncertainty of that choice); r_less_atlas and distance_less_atlas_mm, the differences of r of the shape
+    index and of distance_mm from those of the model `atlas`, if there is one. All have 95 % intervals …_low and …_high,
+    of paired samples.
+    """
+    best = np.min([drawn["distance_mm"] for model, drawn in samples.items() if model != "run"], axis=0)
+    columns: dict[str, dict[str, float]] = {}
+    for model, drawn in samples.items():
+        columns[model] = with_interval("skill", 1 - drawn["distance_mm"] / best)
+        if atlas := samples.get("atlas"):
+            for name, key in (("r_less_atlas", "r_shape_index"), ("distance_less_atlas_mm", "distance_mm")):
+                columns[model] |= with_interval(name, drawn[key] - atlas[key])
+    return columns
+
+
+def add_curves(table: pd.DataFrame, sizes: Mapping[float, Mapping[str, float]]) -> pd.DataFrame:
+    """Add the sizes by the curves that a run followed, and how far the run is off them.
+
+    `sizes` are area_cm2 and volume_ml by week, none of a run that followed no curve. Columns curve_area_cm2 and
+    curve_volume_ml, area_off_curve and volume_off_curve (fractions of the curve's); NaN without a curve.
+    """
+    for name in ("area_cm2", "volume_ml"):
+        curve = np.array([sizes.get(week, {}).get(name, np.nan) for week in table["week"]])
+        columns = {f"curve_{name}": curve, f"{name.split('_')[0]}_off_curve": table[name] / curve - 1}
+        table = table.join(pd.DataFrame(columns, index=table.index))
+    return table

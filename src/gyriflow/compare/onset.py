@@ -9,16 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..geometry.matching import labels_at, match_surface
-from ..geometry.triangles import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    convex_hull,
-    face_areas,
-    face_components,
-    submesh,
-    vertex_areas,
-)
+from ..geometry.triangles import Floats, TriangleMesh, convex_hull, face_areas, face_components, submesh, vertex_areas
 from ..metrics.curvature import curvature
 from ..metrics.gyrification import sulcal_depth
 
@@ -35,7 +26,7 @@ BOTTOM_QUANTILE, CROWN_QUANTILE = 0.9, 0.1
 
 def find_named_sulci(
     mesh: TriangleMesh, side: str, labels: NDArray[np.integer] | None, names: Mapping[int, str], *, radius_mm: float
-) -> tuple[Ints, dict[int, str]]:
+) -> tuple[NDArray[np.int64], dict[int, str]]:
     """Find the sulci of a hemisphere and name them by the regions that they lie in.
 
     Returns the (n,) number of the sulcus at each vertex, 0 outside, and the names of the numbers: see `find_sulci` and
@@ -47,7 +38,7 @@ def find_named_sulci(
     return name_sulci(mesh, sulci, np.zeros_like(sulci) if labels is None else labels, names, side)
 
 
-def find_sulci(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> Ints:
+def find_sulci(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> NDArray[np.int64]:
     """Number the sulci of a hemisphere at its (n,) vertices, 1 for the largest, 0 outside of sulci.
 
     A sulcus is a connected valley (negative mean curvature) deeper than `MIN_DEPTH_MM` below the hull, with an area of
@@ -69,7 +60,7 @@ def find_sulci(mesh: TriangleMesh, depth_mm: Floats, mean_curvature: Floats) -> 
 
 def name_sulci(
     mesh: TriangleMesh, sulci: NDArray[np.integer], labels: NDArray[np.integer], names: Mapping[int, str], side: str
-) -> tuple[Ints, dict[int, str]]:
+) -> tuple[NDArray[np.int64], dict[int, str]]:
     """Divide the sulci of a hemisphere among the regions of the cortex, and name the parts.
 
     Sulci are the (n,) numbers of `find_sulci`, labels (n,) those of the vertices; `names` are those of labels that are

@@ -31,6 +31,10 @@ NOT_TESTABLE, NOT_TESTED = "not testable", "not tested"
 MISSING = "–"
 OBSERVED = "observed "
 """Prefix of observed brains among the brains of a table."""
+type Found = tuple[str, str] | None
+"""The result here and the verdict on it; None if it was not run."""
+type Row = tuple[str, str, str, Found]
+"""Result, place, the paper's number, and what was found here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,27 +112,31 @@ def replication_table(
     Spectra are of the shape index and, as in the paper, cut at the largest Weyl number of all surfaces compared, per
     side. Values of whole bands are listed in addition.
     """
-    modes = published["weyl_number"]
-    rows = [
+    modes, largest, index = (published[name] for name in ("weyl_number", "largest", "gyrification_index"))
+    at_back: Found = None
+    if from_back is not None:
+        verdict = _verdict(pd.Series([from_back <= MAX_OCCIPITAL_SHARE]))
+        at_back = f"at {from_back:.0%} of the brain's length from the back", verdict
+    rows: list[Row] = [
         *_displacements(published["displacement"], displacement),
-        _largest(published["largest"], from_back),
+        (largest["finding"], largest["place"], "stated", at_back),
         _growth_rate(published["growth_rate"], rates, used_rate),
         *_modes(modes, _sweep_of(modes, sweeps)),
-        _gyrification(published["gyrification_index"], surfaces or {}),
+        (index["finding"], index["place"], index["paper"], _gyrification(surfaces or {})),
     ]
     for entry in published["nearest"]:
         sweep = _sweep_of(entry, sweeps)
-        here, verdict = _nearest(entry, sweep.nearest) if sweep else (MISSING, NOT_RUN)
         result = f"nearest {entry['parameter']} by {entry['measure']}, {entry['week']} GW"
-        rows.append((result, entry["place"], f"{entry['value']:g}", here, verdict))
+        rows.append((result, entry["place"], f"{entry['value']:g}", _nearest(entry, sweep.nearest) if sweep else None))
     for entry in published["findings"]:
         sweep = _sweep_of(entry, sweeps)
-        here, verdict = _finding(entry["check"], sweep, mirror_mm) if sweep else (MISSING, NOT_RUN)
-        rows.append((entry["finding"], entry["place"], "stated", here, verdict))
+        found = _finding(entry["check"], sweep, mirror_mm) if sweep else None
+        rows.append((entry["finding"], entry["place"], "stated", found))
     for entry in published["untested"]:
-        rows.append((entry["finding"], entry["place"], "stated", entry["reason"], NOT_TESTED))
+        rows.append((entry["finding"], entry["place"], "stated", (entry["reason"], NOT_TESTED)))
     rows += _costs(published["cost"], summary, costs)
-    return pd.DataFrame(rows, columns=["result", "place", "paper", "here", "verdict"])
+    table = [(*row, *(found or (MISSING, NOT_RUN))) for *row, found in rows]
+    return pd.DataFrame(table, columns=["result", "place", "paper", "here", "verdict"])
 
 
 def place_of_largest(before: Floats, after: Floats, pial: Ints) -> float:
@@ -147,75 +155,59 @@ def _sweep_of(entry: Mapping[str, Any], sweeps: Sequence[SweepTables]) -> SweepT
     return next((sweep for sweep in sweeps if sweep.repeats(entry)), None)
 
 
-def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+def _displacements(published: Mapping[str, Any], displacement: pd.DataFrame) -> Iterator[Row]:
     table = displacement.set_index(["nodes", "from_week"])
     for source in published["rows"]:
         for column, name in (("max_mm", "largest"), ("mean_mm", "mean")):
             for week, paper in zip(published["from_weeks"], source[column], strict=True):
                 value, pial = (float(table[column].get((nodes, float(week)), "nan")) for nodes in ("all", "pial"))
-                here, verdict = MISSING, NOT_RUN
-                if np.isfinite(value):
-                    here, error = f"all nodes {value:.2f} (surface {pial:.2f})", value / paper - 1
-                    verdict = AGREES if abs(error) <= AGREEMENT_TOL else f"{error:+.0%}"
+                here = f"all nodes {value:.2f} (surface {pial:.2f})", _agreement(value / paper - 1)
                 result = f"{name} displacement, {week}-{week + 1} GW (mm), {source['source']}"
-                yield result, published["place"], f"{paper:.2f}", here, verdict
+                yield result, published["place"], f"{paper:.2f}", here if np.isfinite(value) else None
 
 
-def _largest(published: Mapping[str, Any], from_back: float | None) -> tuple[str, ...]:
-    here, verdict = MISSING, NOT_RUN
-    if from_back is not None:
-        here = f"at {from_back:.0%} of the brain's length from the back"
-        verdict = _verdict(pd.Series([from_back <= MAX_OCCIPITAL_SHARE]))
-    return published["finding"], published["place"], "stated", here, verdict
-
-
-def _growth_rate(published: Mapping[str, Any], rates: pd.DataFrame | None, used: Any) -> tuple[str, ...]:
-    first, last = published["weeks"]
-    here, verdict = MISSING, NOT_RUN
+def _growth_rate(published: Mapping[str, Any], rates: pd.DataFrame | None, used: Any) -> Row:
+    (first, last), found = published["weeks"], None
     if rates is not None:
         within = rates.loc[(rates["from_week"] >= first) & (rates["to_week"] <= last), "rate_per_s"]
         if len(within):
             here = f"{within.min():.2g} to {within.max():.2g} by areas; {used} used"
-            verdict = _verdict(within >= published["min_per_s"])
+            found = here, _verdict(within >= published["min_per_s"])
     paper = f"at least {published['min_per_s']:g} by areas; {published['used_per_s']:g} used, twice as much"
-    return f"growth rate of the cortex, {first}-{last} GW (1/s)", published["place"], paper, here, verdict
+    return f"growth rate of the cortex, {first}-{last} GW (1/s)", published["place"], paper, found
 
 
-def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: CostSettings) -> Iterator[tuple[str, ...]]:
+def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: CostSettings) -> Iterator[Row]:
     weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
     energy_wh = summary["cpu_seconds"] / 3600 * costs.core_power_w / weeks
     values = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * costs.carbon_g_per_kwh)
     size = f"{summary['tets']} elements, {summary['ranks']} ranks"
     size += f", {costs.core_power_w:g} W a core, {costs.carbon_g_per_kwh:g} g/kWh"
     for entry, value in zip(published["rows"], values, strict=True):
-        result = f"{entry['quantity']} per gestational week"
-        paper = f"{entry['value']:g} ({published['machine']})"
-        yield result, published["place"], paper, f"{value:.3g} ({size})", NOT_COMPARABLE
+        paper, found = f"{entry['value']:g} ({published['machine']})", (f"{value:.3g} ({size})", NOT_COMPARABLE)
+        yield f"{entry['quantity']} per gestational week", published["place"], paper, found
 
 
-def _gyrification(published: Mapping[str, Any], surfaces: Mapping[str, TriangleMesh]) -> tuple[str, ...]:
+def _gyrification(surfaces: Mapping[str, TriangleMesh]) -> Found:
     """Give the paper's index: pial area over that of one convex hull of both hemispheres, the fissure included."""
     ratios = {brain: area(mesh) / area(convex_hull(mesh)) for brain, mesh in surfaces.items()}
-    here = "; ".join(f"{brain}: {ratio:.2f}" for brain, ratio in ratios.items())
-    verdict = NOT_TESTABLE if ratios else NOT_RUN
-    return published["finding"], published["place"], published["paper"], here or MISSING, verdict
+    return ("; ".join(f"{brain}: {ratio:.2f}" for brain, ratio in ratios.items()), NOT_TESTABLE) if ratios else None
 
 
-def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[tuple[str, ...]]:
+def _modes(published: Mapping[str, Any], sweep: SweepTables | None) -> Iterator[Row]:
     for side in ("right", "left"):
-        here, verdict = MISSING, NOT_RUN
+        found = None
         if sweep:
             is_number = (sweep.comparison["measure"] == WEYL_NUMBER) & (sweep.comparison["hemisphere"] == side)
             numbers = sweep.comparison.loc[is_number, ["value", "observed_value"]].to_numpy(dtype=float)
             if numbers.size:
-                error = numbers.max() / published[side] - 1
                 here = f"{numbers.max():.0f}, the largest of {numbers.min():.0f} to {numbers.max():.0f}"
-                verdict = AGREES if abs(error) <= AGREEMENT_TOL else f"{error:+.0%}"
+                found = here, _agreement(numbers.max() / published[side] - 1)
         paper = f"{published[side]}, the largest of all surfaces"
-        yield f"modes of the spectra, {side}", published["place"], paper, here, verdict
+        yield f"modes of the spectra, {side}", published["place"], paper, found
 
 
-def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]:
+def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> Found:
     texts, equal = [], []
     for measure, bands in ((f"{entry['measure']}_weyl", "cut"), (entry["measure"], "whole bands")):
         for row in nearest[nearest["measure"] == measure].to_dict("records"):
@@ -225,8 +217,7 @@ def _nearest(entry: Mapping[str, Any], nearest: pd.DataFrame) -> tuple[str, str]
             # the paper's bands are cut
             if bands == "cut" and pd.notna(row["run"]):
                 equal.append(row["flag"] == "ok" and row[entry["parameter"]] == entry["value"])
-    verdict = NOT_TESTABLE if texts and not equal else _verdict(pd.Series(equal))
-    return "; ".join(texts) or MISSING, verdict
+    return ("; ".join(texts), _verdict(pd.Series(equal)) if equal else NOT_TESTABLE) if texts else None
 
 
 def _finding(check: str, sweep: SweepTables, mirror_mm: float | None) -> tuple[str, str]:
@@ -277,7 +268,9 @@ def _cut_shares(comparison: pd.DataFrame) -> pd.DataFrame:
     return table.reindex(columns=list(bands.values()))
 
 
+def _agreement(error: float) -> str:
+    return AGREES if abs(error) <= AGREEMENT_TOL else f"{error:+.0%}"
+
+
 def _verdict(holds: pd.Series) -> str:
-    if holds.empty:
-        return NOT_RUN
     return AGREES if holds.all() else "in part" if holds.any() else "not as in the paper"

@@ -70,14 +70,14 @@ def prepare_for_comparison(
     if mesh is observed:
         even = remesh(observed, EDGE_MM)
     else:
-        even = align(remesh(scale_to_volume(mesh, volumes[1]), EDGE_MM), observed)
+        even = align(remesh(scale_to_volume(mesh, observed), EDGE_MM), observed)
     fitted = curvature(even, radius_mm=radius_mm)
     return PreparedSurface(even, fitted.mean, fitted.shape_index)
 
 
-def scale_to_volume(mesh: TriangleMesh, volume_mm3: float) -> TriangleMesh:
-    """Scale a closed surface uniformly to a volume."""
-    factor = (volume_mm3 / signed_volume(mesh)) ** (1 / 3)
+def scale_to_volume(mesh: TriangleMesh, other: TriangleMesh) -> TriangleMesh:
+    """Scale a closed surface uniformly to the volume of another one."""
+    factor = (signed_volume(other) / signed_volume(mesh)) ** (1 / 3)
     return transformed(mesh, np.diag([factor] * 3 + [1.0]))
 
 

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,7 @@ from ..geometry.deformations import Deformation, carry, transform_points
 from ..geometry.matching import labels_at, match_points
 from ..geometry.triangles import Floats, Ints, TriangleMesh, vertex_normals
 from ..settings.terms import NO_REGION
-from .channels import Channels
-from .diffeomorphic import register
-from .registration_quality import measure_quality, require_good
+from .registration import Channels, measure_quality, register, require_good
 
 log = logging.getLogger(__name__)
 
@@ -76,11 +73,7 @@ def regions_from_volume(points: Mapping[str, Floats], regions: NDArray[np.intege
     if share < USUAL_NEAR:
         # with few regions most vertices have none, but the regions themselves lie along the surface
         distance, _ = cKDTree(np.concatenate(list(points.values()))).query(centres, distance_upper_bound=REACH_MM)
-        _check_share_near(max(share, float(np.isfinite(distance).mean())))
-    return by_side
-
-
-def _check_share_near(share: float) -> None:
+        share = max(share, float(np.isfinite(distance).mean()))
     if share < MIN_NEAR:
         raise InputError(
             "the regions do not lie along the pial surface",
@@ -90,11 +83,9 @@ def _check_share_near(share: float) -> None:
             "volumes by C_RAS: convert them with mris_convert --to-scanner.",
         )
     if share < USUAL_NEAR:
-        log.warning(
-            "only %.0f %% of the regions and the pial surface are within %g mm of each other: are they in one space?",
-            100 * share,
-            REACH_MM,
-        )
+        text = "only %.0f %% of the regions and the pial surface are within %g mm of each other: are they in one space?"
+        log.warning(text, 100 * share, REACH_MM)
+    return by_side
 
 
 def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 1) -> Deformation | None:
@@ -104,7 +95,7 @@ def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 
     """
     try:
         deformation = register(brain, drawn, threads=threads).deformation
-        quality = replace(measure_quality(brain, drawn, deformation), dice_cortex=float("nan"))
+        quality = measure_quality(brain, drawn, deformation) | {"dice_cortex": float("nan")}
         require_good(quality, pair="with the brain of the named sulci")
     except InputError as error:
         # a study can go on with numbered sulci

@@ -13,10 +13,8 @@ from ..geometry.paths import path_through
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
 from ..geometry.triangles import Floats, TriangleMesh
 from ..settings.growth import BEFORE_GW
-from .atlas_ages import MIN_AGE_SPACING_GW, AtlasAges
-from .atlas_path import AtlasPath, positions_at, resample_by_size
-from .fitting import fit_onto_surface
-from .series_shapes import FittedBody, SeriesShapes, fit_body, tissue_below, with_stops
+from .atlas_path import MIN_AGE_SPACING_GW, AtlasAges, AtlasPath, positions_at, resample_by_size
+from .series_shapes import FittedBody, SeriesShapes, fit_body, fit_onto_surface, tissue_below, with_stops
 
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""

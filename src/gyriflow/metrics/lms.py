@@ -97,7 +97,7 @@ class WeeklyNorm:
         locations, scales = self._bases(weeks)
         at = np.atleast_1d(np.asarray(values, dtype=float))
         terms = _terms(locations @ self.location, scales @ self.scale, self.skewness, at, self.is_positive)
-        slopes = np.hstack([terms.by_location[:, None] * locations, terms.by_scale[:, None] * scales])
+        slopes = np.hstack([terms.by_location[:, None] * locations, -terms.z[:, None] * scales])
         if len(self.covariance) > slopes.shape[1]:
             slopes = np.hstack([slopes, terms.by_skewness[:, None]])
         error = np.sqrt(np.maximum(_squares(slopes, self.covariance), 0.0))
@@ -287,11 +287,10 @@ def _squares(rows: Floats, covariance: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """z of values and its slopes by location, ln scale and skewness, and two slopes of the log-likelihood."""
+    """z of values, its slopes by location and skewness (by ln scale it is −z), and two slopes of the log-likelihood."""
 
     z: Floats
     by_location: Floats
-    by_scale: Floats
     by_skewness: Floats
     slope_location: Floats
     slope_skewness: Floats
@@ -301,7 +300,7 @@ def _terms(location: Floats, log_scale: Floats, skewness: float, values: Floats,
     scale = np.exp(log_scale)
     if not is_positive:
         z, zero = (values - location) / scale, np.zeros(len(values))
-        return _Terms(z, -1 / scale, -z, zero, z / scale, zero)
+        return _Terms(z, -1 / scale, zero, z / scale, zero)
     logs = np.log(values) - location
     power = np.exp(skewness * logs)
     # the limits for small skewness
@@ -312,7 +311,6 @@ def _terms(location: Floats, log_scale: Floats, skewness: float, values: Floats,
     return _Terms(
         z=z,
         by_location=-power / scale,
-        by_scale=-z,
         by_skewness=by_skewness / scale,
         slope_location=z * power / scale - skewness,
         slope_skewness=logs - z * by_skewness / scale,

@@ -1,8 +1,8 @@
 """Measure a brain: the metrics of its surfaces and the maps over them.
 
 A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hemisphere or both), `thickness_metrics` or
-`spectrum_metrics` (one hemisphere); a map is an entry of `Folds.maps` or added by `measure_brain`. Each has a record in
-`gyriflow.quantities`.
+`spectrum_metrics` (one hemisphere); a map is an entry of `measure_folds` or added by `measure_brain`. Each has a record
+in `gyriflow.quantities`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,16 +15,7 @@ from numpy.typing import NDArray
 from ..errors import MeshError
 from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import crossing_faces
-from ..geometry.triangles import (
-    Floats,
-    TriangleMesh,
-    area,
-    area_cm2,
-    convex_hull,
-    signed_volume,
-    vertex_areas,
-    volume_ml,
-)
+from ..geometry.triangles import Floats, TriangleMesh, area, area_cm2, convex_hull, vertex_areas, volume_ml
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.terms import CURVATURE_RADIUS_MM, PROXIES, SPANGY_MODES, SPECTRUM_PREFIXES, MassMatrix
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -35,48 +26,38 @@ from .thickness import at_part
 
 type Metrics = dict[str, float]
 """Values by the names of their records, in their units."""
-LABEL_VOLUMES = {"volume_tissue": "tissue", "volume_ventricles": "ventricles", "volume_cortex": "cortex"}
-"""The metrics that are volumes of labels, and what these are called in the reports of surfaces."""
+LABEL_VOLUMES = ("tissue", "ventricles", "cortex")
+"""The volumes of labels in the reports of surfaces that are metrics, with `volume_` in front."""
 
 
 @dataclass(frozen=True, eq=False)
 class Folds:
     """The folds of a hemisphere's surface of n vertices, pial or white.
 
-    Hull and envelope are without what lies over cuts; depth (in mm) and local gyrification are (n,).
+    Hull and envelope are without what lies over cuts; `maps` are arrays (n,) of those in `BrainMetrics.maps`.
     """
 
     mesh: TriangleMesh
     curvature_maps: Curvature
     hull: Pieces
     envelope: Pieces
-    depth: Floats
-    local_gyrification: Floats
-
-    def maps(self) -> dict[str, NDArray]:
-        """Return the arrays per vertex by name, of those in `BrainMetrics.maps`."""
-        return {
-            "shape_index": self.curvature_maps.shape_index,
-            "curvedness": self.curvature_maps.curvedness,
-            "mean_curvature": self.curvature_maps.mean,
-            "gaussian_curvature": self.curvature_maps.gaussian,
-            "sulcal_depth_mm": self.depth,
-            "local_gyrification_index": self.local_gyrification,
-            "reliable": self.curvature_maps.reliable.astype(np.int32),
-        }
+    maps: dict[str, NDArray]
 
 
 def measure_folds(mesh: TriangleMesh, curvature_radius_mm: float) -> Folds:
     """Return the folds of a hemisphere's surface; see `curvature.curvature` for the radius."""
+    fitted = curvature(mesh, radius_mm=curvature_radius_mm)
     hull, around = convex_hull(mesh), pieces_over(envelope(mesh), mesh)
-    return Folds(
-        mesh=mesh,
-        curvature_maps=curvature(mesh, radius_mm=curvature_radius_mm),
-        hull=pieces_over(hull, mesh),
-        envelope=around,
-        depth=sulcal_depth(mesh, hull),
-        local_gyrification=local_gyrification_index(mesh, around),
-    )
+    maps: dict[str, NDArray] = {
+        "shape_index": fitted.shape_index,
+        "curvedness": fitted.curvedness,
+        "mean_curvature": fitted.mean,
+        "gaussian_curvature": fitted.gaussian,
+        "sulcal_depth_mm": sulcal_depth(mesh, hull),
+        "local_gyrification_index": local_gyrification_index(mesh, around),
+        "reliable": fitted.reliable.astype(np.int32),
+    }
+    return Folds(mesh, fitted, pieces_over(hull, mesh), around, maps)
 
 
 def hemisphere_spectra(
@@ -142,7 +123,7 @@ def folding_metrics(sides: Sequence[Folds]) -> Metrics:
     def mean(values: NDArray) -> float:
         return float(np.average(values, weights=weights))
 
-    depth = np.concatenate([side.depth for side in sides])
+    depth = np.concatenate([side.maps["sulcal_depth_mm"] for side in sides])
     deep = np.quantile(depth, 0.95, weights=weights, method="inverted_cdf")
     return {
         "gyrification_index": gyrification_index(meshes, [side.hull for side in sides]),
@@ -263,9 +244,9 @@ def measure_brain(
     """
     meshes = {name: mesh for name, mesh in (("left", left), ("right", right)) if mesh is not None}
     for mesh in (whole, *meshes.values()):
-        if (volume_mm3 := signed_volume(cap(mesh))) <= 0:
-            volume = f"volume {volume_mm3 * ML_PER_MM3:.3g} mL"
-            raise MeshError("the faces of the surface look inwards", found=volume, remedy="Turn the faces round.")
+        if (volume := volume_ml(cap(mesh))) <= 0:
+            text = f"volume {volume:.3g} mL"
+            raise MeshError("the faces of the surface look inwards", found=text, remedy="Turn the faces round.")
     folds = {name: measure_folds(mesh, curvature_radius_mm) for name, mesh in meshes.items()}
     spectra = {
         name: hemisphere_spectra(part.mesh, part.curvature_maps, spangy_modes, spangy_mass)
@@ -285,7 +266,7 @@ def measure_brain(
     # without caps of medial walls
     whole_metrics["area"] = sum(area_cm2(mesh) for mesh in meshes.values())
     volumes = label_volumes_ml or {}
-    whole_metrics |= {metric: volumes[name] for metric, name in LABEL_VOLUMES.items() if name in volumes}
+    whole_metrics |= {f"volume_{name}": volumes[name] for name in LABEL_VOLUMES if name in volumes}
     bent = [np.average(part.curvature_maps.mean, weights=vertex_areas(part.mesh)) for part in folds.values()]
     mean_curvature = float(np.average(bent, weights=[area_cm2(mesh) for mesh in meshes.values()]))
     metrics = {"whole": whole_metrics | area_ratio(whole_metrics, mean_curvature)}
@@ -293,7 +274,7 @@ def measure_brain(
     for name, mesh in meshes.items():
         found = spectra[name]
         metrics[name] = size_metrics(mesh) | folding_and_thickness([name]) | spectrum_metrics(found, area(mesh))
-        maps[name] = folds[name].maps()
+        maps[name] = dict(folds[name].maps)
         if np.isfinite(thickness[name]).any():
             maps[name]["thickness_mm"] = thickness[name]
         for proxy, part in found.items():
@@ -319,4 +300,4 @@ def measure_white(
     for name, parts in {"whole": list(folds.values()), **{name: [part] for name, part in folds.items()}}.items():
         values = {"area": sum(area(part.mesh) for part in parts) * CM2_PER_MM2} | folding_metrics(parts)
         metrics[name] = {f"white_{metric}": values[metric] for metric in metrics_shown(Shown.WHITE)}
-    return _table(metrics), {name: part.maps() for name, part in folds.items()}
+    return _table(metrics), {name: part.maps for name, part in folds.items()}

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 from scipy import stats
 
-from ..errors import InputError
 from ..geometry.triangles import Floats
 from ..quantities import METRICS
 from ..settings.schemes import LabelScheme
@@ -36,16 +34,6 @@ SCORES = ("expected", "sd", "z", "z_low", "z_high", "centile", "centile_low", "c
 """Columns of `measured_scores` that follow the value and its unit."""
 
 
-def _scored(
-    norm: "PublishedNorm | WeeklyNorm", week: float, value: float, centiles: tuple[float, float] = (0.0, 100.0)
-) -> dict[str, Any]:
-    """Return the first eight of `SCORES`, with centiles between the given ones."""
-    low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
-    z, interval = norm.scores([week], [value])
-    scores = np.clip(np.append(z, interval), *stats.norm.ppf(np.array(centiles) / 100))
-    return dict(zip(SCORES, (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores)), strict=False))
-
-
 @dataclass(frozen=True)
 class PublishedNorm:
     """A published curve: mean and standard deviation as polynomials of the week, highest power first.
@@ -66,33 +54,11 @@ class PublishedNorm:
     tissue: str = ""
     side: Side | None = None
 
-    def values(self, weeks: ArrayLike, z: float) -> Floats:
-        """Return the values with a z at weeks (n,)."""
-        mean, sd = self._curves(weeks)
-        return mean + z * sd
-
-    def scores(self, weeks: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
-        """Return z of values (n,) at weeks, and NaN (2, n) for its unknown interval."""
-        mean, sd = self._curves(weeks)
-        z = (np.asarray(values, dtype=float) - mean) / sd
-        return z, np.full((2, len(z)), np.nan)
-
-    def _curves(self, weeks: ArrayLike) -> tuple[Floats, Floats]:
-        at = np.asarray(weeks, dtype=float)
-        return np.polyval(np.array(self.mean), at), np.polyval(np.array(self.sd), at)
-
 
 def published_norms(data: Mapping[str, Any]) -> dict[str, PublishedNorm]:
-    """Return the norms of a file of `norms/`, by structure; InputError where a standard deviation is not positive."""
-    norms = {}
+    """Return the norms of a file of `norms/`, by structure."""
     shared = {key: data[key] for key in ("weeks", "unit", "subjects", "scheme") if key in data}
-    for name, entry in data["structures"].items():
-        norm = PublishedNorm(**shared, **entry)
-        lowest = float(np.polyval(norm.sd, np.linspace(norm.weeks[0], norm.weeks[1], 201)).min())
-        if lowest <= 0:
-            raise InputError(f"the norm of {name} has no standard deviation", found=f"{lowest:.3g}", expected="above 0")
-        norms[name] = norm
-    return norms
+    return {name: PublishedNorm(**shared, **entry) for name, entry in data["structures"].items()}
 
 
 @dataclass(frozen=True)
@@ -130,7 +96,11 @@ def published_scores(brain: LabelledBrain, norms: Mapping[str, PublishedNorm]) -
         elif not norm.weeks[0] <= brain.week <= norm.weeks[1]:
             flag = "outside the norm's weeks"
         row = {"structure": name, "value": value, "unit": norm.unit, "brains": norm.subjects, "flag": flag}
-        rows.append(row | (_scored(norm, brain.week, value) if flag in {"ok", "other labels"} else {}))
+        if flag in {"ok", "other labels"}:
+            expected, sd = (float(np.polyval(np.array(curve), brain.week)) for curve in (norm.mean, norm.sd))
+            z = (value - expected) / sd
+            row |= {"expected": expected, "sd": sd, "z": z, "centile": 100 * stats.norm.cdf(z)}
+        rows.append(row)
     columns = ["structure", "week", "value", "unit", "expected", "sd", "z", "centile", "brains", "flag"]
     table = pd.DataFrame(rows, columns=["subject", *columns]).astype({"brains": float})
     return table.assign(subject=brain.subject, week=brain.week)
@@ -163,11 +133,6 @@ class CohortNorms:
     norms: Mapping[tuple[str, str], tuple[str, WeeklyNorm]]
     individuals: bool
     made_with: Mapping[str, Any]
-
-    @property
-    def hemispheres(self) -> str:
-        """The hemispheres of its brains."""
-        return " ".join(sorted({hemisphere for hemisphere, _ in self.norms}))
 
     def volumes_ml(self, weeks: Sequence[float]) -> Floats:
         """Return the median volumes (k,) of whole brains in mL at weeks, NaN outside those of the norm."""
@@ -238,7 +203,7 @@ def measured_scores(metrics: pd.DataFrame, reference: Sequence[str], cohort: Coh
     # the whole of a brain with one hemisphere is that hemisphere: it has half of the volume and area of others
     sides = metrics.groupby(BRAIN)["hemisphere"].transform(lambda names: " ".join(sorted(set(names))))
     is_reference = (metrics["run"] == MEASURED) & metrics["subject"].isin(reference)
-    expected = sides[is_reference] if len(reference) else [cohort.hemispheres]
+    expected = sides[is_reference] if len(reference) else [" ".join(sorted({side for side, _ in cohort.norms}))]
     table = _with_norm(metrics.assign(is_comparable=sides.isin(expected)))
     rows = []
     for row in table.to_dict("records"):
@@ -279,7 +244,12 @@ def _score(
         return score | {"flag": SPREAD_UNKNOWN, "expected": float(norm.values([week], 0.0)[0])}
     if norm.is_positive and value <= 0:
         return score | {"flag": "not positive"}
-    score |= _scored(norm, week, value, FEW_CENTILES if is_small else (0.0, 100.0))
+    low, expected, high = (float(norm.values([week], z)[0]) for z in (-1.0, 0.0, 1.0))
+    z, interval = norm.scores([week], [value])
+    ends = np.array(FEW_CENTILES if is_small else (0.0, 100.0)) / 100
+    scores = np.clip(np.append(z, interval), *stats.norm.ppf(ends))
+    numbers = (expected, 0.5 * (high - low), *scores, *100 * stats.norm.cdf(scores))
+    score |= dict(zip(SCORES, numbers, strict=False))
     if score["sd"] <= MIN_SPREAD * abs(score["expected"]):
         return {"brains": norm.subjects, "flag": "no spread"}
     return score | {"flag": "few brains" if is_small else "ok"}

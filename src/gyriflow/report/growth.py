@@ -10,14 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..settings.terms import OBSERVED_BRAIN
-from .style import (
-    RUN_COLOURS,
-    from_zero,
-    panel_figure,
-    styled,
-    week_axis,
-    wrap,
-)
+from .style import RUN_COLOURS, from_zero, panel_figure, styled, week_axis, wrap
 
 SERIES_COLOURS = (RUN_COLOURS[0], *RUN_COLOURS[2:])
 """Colours of the series, without that of the simulations."""
@@ -38,13 +31,9 @@ def growth_chart(
     Series of brains share the panels of area and volume. Up to four series with rates have a panel of bars each, on one
     scale.
 
-    Parameters
-    ----------
-    areas : columns series, subject, week, area_cm2, volume_ml
-    rates : columns series, from_week, to_week, rate_per_s (1/s)
-    folding_rate_per_s
-        Growth rate of the simulations in 1/s, drawn as a line over the bars: a number, or values by week, linear in
-        between and constant beyond.
+    `areas` has the columns series, subject, week, area_cm2, volume_ml; `rates` series, from_week, to_week, rate_per_s
+    (1/s). `folding_rate_per_s` is the growth rate of the simulations in 1/s, drawn as a line over the bars: a number,
+    or values by week, linear in between and constant beyond.
     """
     names = list(dict.fromkeys(areas["series"]))
     colours = dict(zip(names, cycle(SERIES_COLOURS), strict=False))

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
@@ -35,11 +35,9 @@ def page_figures(
 ) -> list[dict[str, Any]]:
     """Return the figures and tables of a page: section, title, content (as `contents`), caption, first, technical.
 
-    Parameters
-    ----------
-    figures : name, section, title, caption in reStructuredText, technical, first, path and names of each
-        Titles and captions contain the names in braces. The first one that may be `first` is shown in the summary.
-    contents : {path: HTML, or a picture's data URL and its width in inches}
+    `figures` have name, section, title, caption in reStructuredText, technical, first, path and names of each; titles
+    and captions contain the names in braces. The first one that may be `first` is shown in the summary. `contents` are
+    by path HTML, or a picture's data URL and its width in inches.
     """
     brains: dict[str, set[str | None]] = {}
     for figure in figures:
@@ -78,12 +76,9 @@ def sections(figures: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[dict[
 class Tables:
     """The tables of a study on its pages.
 
-    Attributes
-    ----------
-    quality, metrics, centiles : as for `brain_rows`
-    warnings : columns subject, run, step, level, message
-    runs, validation : as for `scores_table`; None if nothing was simulated
-    intervals : those of the ensemble of the one prediction, if any
+    `quality`, `metrics` and `centiles` are as for `brain_rows`; `warnings` has the columns subject, run, step, level,
+    message. `runs` and `validation` are as for `scores_table`, None if nothing was simulated; `intervals` those of the
+    ensemble of the one prediction, if any.
     """
 
     quality: pd.DataFrame
@@ -111,16 +106,12 @@ def study_page(
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the report of a study.
 
-    Parameters
-    ----------
-    brains : as for `brain_rows`
-    pictures : data URL and width in inches of the small pictures of each brain that has a page, by its id
-    figures : the output of `page_figures`
-    norm : name of the norm's brains
-    prediction : the output of `Study.prediction_facts`; `accuracy`, the content of `norms/predictions.yaml`; and
-        `tests`, the output of `compare.accuracy.prediction_facts`
+    Brains are as for `brain_rows`, figures the output of `page_figures`; `norm` is the name of the norm's brains.
+    `pictures` are data URL and width in inches of the small pictures of each brain that has a page, by its id.
+    `prediction` is the output of `Study.prediction_facts`, with `accuracy`, the content of `norms/predictions.yaml`,
+    and `tests`, the output of `compare.accuracy.prediction_facts`.
     """
-    runs, validation = tables.runs, tables.validation
+    runs, validation, centiles = tables.runs, tables.validation, tables.centiles
     title, sentence, scores = "Measured cortical folding", quality_verdict(tables.quality), ""
     if runs is not None:
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
@@ -133,12 +124,17 @@ def study_page(
     if prediction:
         title = f"Prediction of {prediction['brain']} to {week_label(prediction['week'])}, by the growth of "
         title += f"the atlas {atlas['name']}" if (atlas := prediction["atlas"]) else prediction["population"]
-        numbers = predicted_table(tables.metrics, prediction, tables.centiles, tables.intervals)
+        numbers = predicted_table(tables.metrics, prediction, centiles, tables.intervals)
         accuracy = accuracy_table(prediction["accuracy"])
         has_centiles = any("centile" in str(head) for head in numbers)
         prediction = {**prediction, "numbers": html_table(numbers), "accuracy_table": html_table(accuracy)}
         prediction["individuals"] = norm if has_centiles else ""
-    return _shared(brains, tables, tables.warnings, figures, norm, pictures) | {
+    centiles = centiles[centiles["run"] == MEASURED]
+    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
+    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
+    # an atlas has too few brains for centiles among themselves
+    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
+    return {
         "title": title,
         "verdict": sentence,
         "prediction": prediction,
@@ -146,6 +142,14 @@ def study_page(
         "alone": False,
         "numbers": "",
         "runs": scores,
+        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
+        "pictures": pictures,
+        "norm": norm,
+        "flags": flags,
+        "spread_unknown": SPREAD_UNKNOWN,
+        "warnings": "" if tables.warnings.empty else html_table(group_warnings(tables.warnings)),
+        "weeks": next((item for item in figures if item["first"]), None),
+        "sections": sections([item for item in figures if not item["first"]]),
     }
 
 
@@ -153,43 +157,11 @@ def brain_page(
     brain: Mapping[str, Any], tables: Tables, figures: Sequence[Mapping[str, Any]], *, norm: str
 ) -> dict[str, Any]:
     """Return the variables of the page's template for the page of an observed brain; parameters as for `study_page`."""
-    own = tables.metrics["subject"] == brain["id"]
-    warnings = tables.warnings[tables.warnings["subject"] == brain["id"]]
-    return _shared([brain], tables, warnings, figures, norm, {}) | {
-        "title": f"Measured cortical folding, {brain['id']}",
-        "verdict": "",
-        "prediction": None,
-        "folded": [],
-        "alone": True,
-        "numbers": html_table(brain_table(tables.metrics[own], tables.centiles)),
-        "runs": "",
-    }
-
-
-def _shared(
-    brains: Sequence[Mapping[str, Any]],
-    tables: Tables,
-    warnings: pd.DataFrame,
-    figures: Sequence[Mapping[str, Any]],
-    norm: str,
-    pictures: Mapping[str, tuple[str, float]],
-) -> dict[str, Any]:
-    """Return the variables that pages of studies and of brains share."""
-    centiles = tables.centiles[tables.centiles["run"] == MEASURED]
-    own = centiles[centiles["subject"].isin([brain["id"] for brain in brains])]
-    flags = set(own.loc[own["metric"].isin(metrics_shown(Shown.BRAINS)), "flag"])
-    # an atlas has too few brains for centiles among themselves
-    flags -= {"too few brains"} if SPREAD_UNKNOWN in flags else set()
-    return {
-        "brains": brain_rows(brains, tables.quality, tables.metrics, centiles, pictures),
-        "pictures": pictures,
-        "norm": norm,
-        "flags": flags,
-        "spread_unknown": SPREAD_UNKNOWN,
-        "warnings": "" if warnings.empty else html_table(group_warnings(warnings)),
-        "weeks": next((item for item in figures if item["first"]), None),
-        "sections": sections([item for item in figures if not item["first"]]),
-    }
+    metrics, warnings = (table[table["subject"] == brain["id"]] for table in (tables.metrics, tables.warnings))
+    page = study_page([brain], replace(tables, warnings=warnings, runs=None), figures, norm=norm, pictures={})
+    numbers = html_table(brain_table(metrics, tables.centiles))
+    title = f"Measured cortical folding, {brain['id']}"
+    return page | {"title": title, "verdict": "", "alone": True, "numbers": numbers}
 
 
 def report_page(
@@ -202,18 +174,12 @@ def report_page(
     configuration: str,
     **content: Any,
 ) -> str:
-    """Return the page.
+    """Return the page from its Jinja template; values are escaped.
 
-    Parameters
-    ----------
-    template : Jinja template of the page; values are escaped
-    parts : style, three, notice, controls, viewer
-        The style sheet and the scripts of the 3D view with their licence, inserted unescaped.
-    view : the output of `surfaces_view`
-    provenance : the output of `software`, and files (brain, what, sha256)
-    methods : reStructuredText
-    configuration : text, without paths
-    content : the output of `study_page` or `brain_page`
+    `parts` are the style sheet (`style`) and the scripts of the 3D view with their licence (`three`, `notice`,
+    `controls`, `viewer`), inserted unescaped. `view` is the output of `surfaces_view`, `provenance` that of `software`
+    with files (brain, what, sha256), `methods` reStructuredText, `configuration` text without paths, and `content` the
+    output of `study_page` or `brain_page`.
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     # a script must not contain its own end tag
@@ -252,24 +218,18 @@ def brain_rows(
 ) -> list[dict[str, Any]]:
     """Return what a page says of each brain: its facts, its numbers, and its verdict with the cause or the warnings.
 
-    Numbers are by title of the metric, each with the text below it.
-
-    Parameters
-    ----------
-    brains : id, week, population, source, licence, covariates and whether it is synthetic, as configured
-    quality : columns subject, verdict, cause, warnings
-        The table of quality control.
-    metrics, centiles : the study's; `centile_text` is shown below each number
-    linked : ids of the brains whose source is on a page of their own
+    Numbers are by title of the metric, each with the text below it: `centile_text`. Brains have id, week, population,
+    source, licence, covariates and whether they are synthetic, as configured. `quality`, the table of quality control,
+    has the columns subject, verdict, cause, warnings; `metrics` and `centiles` are the study's. `linked` are the ids of
+    the brains whose source is on a page of their own.
     """
     judged = quality.set_index("subject").fillna("")
-    values, texts = (
-        {(row.subject, row.metric): getattr(row, column) for row in table.itertuples() if row.hemisphere == "whole"}
-        for table, column in (
-            (metrics[metrics["run"] == MEASURED].dropna(subset=["value"]), "value"),
-            (centiles[centiles["run"] == MEASURED].assign(text=centile_text), "text"),
-        )
+    measured, rated = (
+        table[(table["run"] == MEASURED) & (table["hemisphere"] == "whole") & table["value"].notna()]
+        for table in (metrics, centiles)
     )
+    values = dict(zip(zip(measured["subject"], measured["metric"], strict=True), measured["value"], strict=True))
+    texts = dict(zip(zip(rated["subject"], rated["metric"], strict=True), centile_text(rated), strict=True))
     shown = [name for name in metrics_shown(Shown.BRAINS) if name in {metric for _, metric in values}]
     rows = []
     for brain in brains:
@@ -294,11 +254,8 @@ def brain_rows(
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
     """Return a row for each run: how it ended, and its scores at the last week with an observed brain.
 
-    Parameters
-    ----------
-    runs : columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex,
-        order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm
-    validation : the study's table of validation
+    `runs` has the columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex, order,
+    least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
@@ -325,16 +282,12 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
         for group in map(models.get_group, ("run", "atlas", "scaled"))
     )
     means = {name: models.get_group(name)[["distance_mm", "r_shape_index"]].mean() for name in ("run", "atlas")}
-    better = [
-        words
-        for words, is_better in (
-            ("closer", means["atlas"]["distance_mm"] < means["run"]["distance_mm"]),
-            ("more similar in shape index", means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"]),
-        )
-        if is_better
-    ]
-    words = " and ".join(better)
-    simpler = f" On average the atlas' own brain was {words}; it is given beside the prediction." if better else ""
+    is_better = {
+        "closer": means["atlas"]["distance_mm"] < means["run"]["distance_mm"],
+        "more similar in shape index": means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"],
+    }
+    better = " and ".join(words for words, holds in is_better.items() if holds)
+    simpler = f" On average the atlas' own brain was {better}; it is given beside the prediction." if better else ""
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
         f"{prediction['tests']['advantage']} This is a prediction, not a scan. "
@@ -358,11 +311,8 @@ def verdict(
 ) -> str:
     """Return a sentence that compares the best run at the last week with the scaled start, and the worst warning.
 
-    Parameters
-    ----------
-    runs, validation : as for `scores_table`
-    warnings : columns level and message
-    sentence : used if there is no observed brain
+    `runs` and `validation` are as for `scores_table`, `warnings` has the columns level and message. The `sentence` is
+    used if there is no observed brain.
     """
     if validation is not None and len(validation):
         last = validation[validation["week"] == validation["week"].max()]
@@ -380,33 +330,23 @@ def verdict(
 def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     """Return how a run ended, and the limitations of its folds."""
     # the table has the list as JSON
-    reached, end = max(json.loads(run["weeks"])), float(run["end_week"])
+    reached, end, order = max(json.loads(run["weeks"])), float(run["end_week"]), int(run["order"])
     words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")
-    if too_coarse := _resolution(run):
-        words.append(too_coarse)
+    elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
+    needed = f"{ELEMENTS_NEEDED[order]:g} needed): folds may be artefacts"
+    if not elements >= ELEMENTS_NEEDED[order]:  # not a number: no element lies in the cortex
+        words.append(f"cortex not resolved ({elements:.3g} elements through it, {needed}")
+    elif pd.notna(week):
+        down = f"down to {run['least_elements_through_cortex']:.3g} elements through it, {needed} from then on"
+        words.append(f"cortex not resolved from {week_label(round(week, 2))} on ({down}")
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
         words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
-    if (elements := run["elements_through_cortex"]) > 0:
-        error, text = element_error(int(run["order"]), elements)
+    if elements > 0:
+        error, text = element_error(order, elements)
         words += [text] if error > LARGE_ELEMENT_ERROR else []
     return "; ".join(words)
-
-
-def _resolution(run: Mapping[str, Any] | pd.Series) -> str:
-    """Describe where the mesh of a run is too coarse, at the start or later; "" if it is fine enough."""
-    needed = ELEMENTS_NEEDED[int(run["order"])]
-    at_start, week = run["elements_through_cortex"], run["unresolved_from_week"]
-    if not at_start >= needed:  # not a number: no element lies in the cortex
-        return f"cortex not resolved ({at_start:.3g} elements through it, {needed:g} needed): folds may be artefacts"
-    if pd.isna(week):
-        return ""
-    return (
-        f"cortex not resolved from {week_label(round(week, 2))} on "
-        f"(down to {run['least_elements_through_cortex']:.3g} elements through it, {needed:g} needed): "
-        "folds may be artefacts from then on"
-    )
 
 
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Circle, Patch
 
 from ..geometry.triangles import Floats, TriangleMesh, vertex_normals
-from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render
+from .scene import PIXELS_PER_INCH, TISSUE, VIEWS, View, half_extents, is_visible, picture_axes, render, uniform_colours
 from .style import FULL_WIDTH_IN, SINGLE_COLUMN_IN, wrap
 
 # sizes are whole dots of 300 to the inch: pictures then fall on the dots of PNG files of 300 or 600
@@ -42,13 +42,9 @@ _END_NAMES = {"A": "anterior", "P": "posterior", "L": "left", "R": "right"}
 class Panel:
     """One surface of a grid.
 
-    Attributes
-    ----------
-    mesh, colours : the visible part, and its (n, 3) or (m, 3) colours
-    caption : text below
-    light : `TISSUE` or `MAP` of the scene
-    mark : (3,) a point of the surface marked by a ring, dotted if the point is on the far side
-    directions : (n, 3) vectors at the vertices, drawn as lines on the surface (`direction_lines`)
+    `mesh` is the visible part and `colours` its (n, 3) or (m, 3) colours; `light` is `TISSUE` or `MAP` of the scene.
+    `mark` (3,) is a point of the surface marked by a ring, dotted if the point is on the far side; `directions` (n, 3)
+    are vectors at the vertices, drawn as lines on the surface (`direction_lines`). The caption stands below.
     """
 
     mesh: TriangleMesh
@@ -69,6 +65,11 @@ class Row:
     absent: str = ""
 
 
+def plain_panel(mesh: TriangleMesh, colour: str) -> Panel:
+    """Return a surface of one colour."""
+    return Panel(mesh, uniform_colours(mesh, colour))
+
+
 def round_length(limit_mm: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20, 50 … that is at most `limit_mm`."""
     decade = 10.0 ** np.floor(np.log10(limit_mm))
@@ -86,12 +87,7 @@ def panel_grid(
 
     More than eight columns continue in a further block below. The row's label names the view, and the first panel of a
     view has the letters of its ends. Several rows, or the panels of a single row, have the letters a, b, c … for the
-    caption.
-
-    Parameters
-    ----------
-    colour_bar : a colour scale and its label
-    legend : entries of a legend
+    caption. `colour_bar` is a colour scale and its label, `legend` the entries of a legend.
     """
     rows = [replace(row, label=wrap(row.label, _LABEL_LETTERS)) for row in rows]
     lines = max(row.label.count("\n") for row in rows)

@@ -18,19 +18,8 @@ from ..settings.folding import AXES, FoldingParameters
 from ..settings.terms import OBSERVED_BRAIN, ZONE_NAMES
 from ..units import CM2_PER_MM2
 from .labels import column_label, map_title, value_labels
-from .panels import MAX_COLUMNS, Panel, Row, panel_grid
-from .scene import (
-    MAP,
-    UNKNOWN_COLOUR,
-    VIEWS,
-    View,
-    colour_scale,
-    half_extents,
-    paint,
-    render,
-    restricted,
-    uniform_colours,
-)
+from .panels import MAX_COLUMNS, Panel, Row, panel_grid, plain_panel
+from .scene import MAP, UNKNOWN_COLOUR, VIEWS, View, colour_scale, half_extents, paint, render, restricted
 from .style import NEUTRAL_COLOUR, OBSERVED_SURFACE_COLOUR, RIGHT_COLOUR, RUN_COLOURS, SIMULATED_SURFACE_COLOUR, styled
 
 SurfaceMap = tuple[TriangleMesh, Floats]
@@ -64,10 +53,6 @@ def _ordered(*groups: Mapping) -> list:
     """Return the keys of all groups: weeks and intervals sorted, names in their order."""
     keys = list(dict.fromkeys(key for group in groups for key in group))
     return keys if any(isinstance(key, str) for key in keys) else sorted(keys)
-
-
-def _plain(mesh: TriangleMesh, colour: str) -> Panel:
-    return Panel(mesh, uniform_colours(mesh, colour))
 
 
 def _mapped(surface_map: SurfaceMap, scale: ScalarMappable, directions: Floats | None = None) -> Panel:
@@ -115,24 +100,19 @@ def runs_by_week(
 ) -> Figure:
     """Draw the brains of several runs (blue) above observed ones (beige), a column per week, rows by view.
 
-    Parameters
-    ----------
-    runs : {run: {week: surface in RAS+ mm}}
-    observed : {week, or another heading: surface in RAS+ mm}
-        A missing week leaves its panel empty.
-    deviations : {week: (surface, maps)}
-        The map `distance_mm` is shown below.
-    predicted : heading of a predicted brain (blue) in `observed`
+    `runs` are surfaces in RAS+ mm by run and week, `observed` those by week, or by another heading; a missing week
+    leaves its panel empty. `deviations` are surfaces and maps by week, of which `distance_mm` is shown below.
+    `predicted` is the heading of a predicted brain (blue) in `observed`.
     """
     special: dict[Any, str] = {predicted: SIMULATED_SURFACE_COLOUR}
     groups = {
-        name: {week: _plain(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
+        name: {week: plain_panel(mesh, SIMULATED_SURFACE_COLOUR) for week, mesh in meshes.items()}
         for name, meshes in runs.items()
         if meshes
     }
     if observed:
         groups[observed_name] = {
-            key: _plain(mesh, special.get(key, OBSERVED_SURFACE_COLOUR)) for key, mesh in observed.items()
+            key: plain_panel(mesh, special.get(key, OBSERVED_SURFACE_COLOUR)) for key, mesh in observed.items()
         }
     if not deviations:
         return brain_grid(groups, views)
@@ -155,13 +135,9 @@ def displacements(frames: Mapping[float, SurfaceMaps]) -> dict[tuple[float, floa
 def displacement_maps(frames: Mapping[str, Mapping[float, SurfaceMaps]]) -> Figure:
     """Draw the norm of the displacement of runs on the pial surface, a column per interval, on one colour scale.
 
-    One vertex in two hundred is above the scale, so that a single maximum does not determine it. The maximum has a
-    ring, dotted on the far side; the caption of each interval has its size, its position in RAS+ mm, and the mean over
-    the vertices.
-
-    Parameters
-    ----------
-    frames : {run: {week: (surface in RAS+ mm, fields)}}
+    `frames` are by run and week the surface in RAS+ mm and its fields. One vertex in two hundred is above the scale, so
+    that a single maximum does not determine it. The maximum has a ring, dotted on the far side; the caption of each
+    interval has its size, its position in RAS+ mm, and the mean over the vertices.
     """
     moved = {run: displacements(weeks) for run, weeks in frames.items()}
     every = np.concatenate([norms for maps in moved.values() for _, norms in maps.values()])
@@ -205,9 +181,7 @@ def scale_of(quantity: str, values: Floats) -> ScalarMappable:
 def whole_maps(halves: Halves, names: Iterable[str] | None = None) -> SurfaceMaps:
     """Return the hemispheres of a brain as one surface, with the maps that all of them have.
 
-    Parameters
-    ----------
-    names : the maps to return, NaN on a hemisphere that lacks one
+    `names` are the maps to return instead, NaN on a hemisphere that lacks one.
     """
     if names is None:
         names = [name for name in halves[0][1] if all(name in maps for _, maps in halves)]
@@ -245,13 +219,9 @@ def scalar_maps(
 ) -> Figure:
     """Draw a quantity on surfaces: a row per group and view, a column per week or run, one colour scale.
 
-    Parameters
-    ----------
-    maps : {group: {week or run: (surface, values)}}
-        For example {"simulated": {28.0: …}, "observed brain": {28.0: …}}.
-    quantity : a name of `VERTEX_MAPS`
-    directions : {week or run: (n, 3) vectors at the vertices}
-        Drawn as lines of proportional length; the longest tenth have the same length.
+    `maps` are by group and week, or run, such as {"simulated": {28.0: …}, "observed brain": {28.0: …}}, surfaces and
+    values of `quantity`, a name of `VERTEX_MAPS`. `directions`, by week or run, are (n, 3) vectors at the vertices,
+    drawn as lines of proportional length; the longest tenth have the same length.
     """
     every = np.concatenate([values for group in maps.values() for _, values in group.values()])
     scale, shares = scale_of(quantity, every), {}
@@ -275,16 +245,9 @@ def growth_maps(
 ) -> Figure:
     """Draw the growth found by a run towards target shapes, with lines along the largest growth in the surface.
 
-    Maps without directions, as of standard deviations, have no lines.
-
-    Parameters
-    ----------
-    frames
-        {week: (surface in RAS+ mm, fields)}
-    growth
-        The maps of `growth.maps.growth_per_week`, with their intervals in the names.
-    quantity
-        That of area, or that across the surface (`thickness_growth_percent_per_gw`).
+    `frames` are by week the surface in RAS+ mm and its fields; `growth` are the maps of `growth.rates.growth_per_week`,
+    with their intervals in the names. The `quantity` is that of area, or that across the surface
+    (`thickness_growth_percent_per_gw`). Maps without directions, as of standard deviations, have no lines.
     """
     intervals = list(pairwise(sorted(frames)))
     maps = {(a, b): (frames[b][0], growth[name_in_interval(quantity, a, b)]) for a, b in intervals}
@@ -306,14 +269,9 @@ def influence_picture(
 ) -> Figure:
     """Draw the surfaces of the runs of a sweep at one week, and below their shape index on one scale.
 
-    Parameters
-    ----------
-    members : {run: hemispheres with their maps}
-        In the order of the sweep; None for a run that ended before the week.
-    observed
-        The hemispheres of the observed brain of the week with their maps, shown last under `observed_name`.
-    values : {run: {parameter: value}}
-        The varied parameters, for the headings.
+    `members` are by run, in the order of the sweep, the hemispheres with their maps, None for a run that ended before
+    the week. `observed` are those of the observed brain of the week, shown last under `observed_name`. `values` are by
+    run the varied parameters with their values, for the headings.
     """
     headings = dict(zip(values, value_labels(list(values.values())), strict=True))
     brains = {headings[run]: halves for run, halves in members.items()} | (
@@ -322,7 +280,7 @@ def influence_picture(
     maps = {name: _map_of(halves, "shape_index") for name, halves in brains.items() if halves}
     scale, colours = scale_of("shape_index", np.empty(0)), {observed_name: OBSERVED_SURFACE_COLOUR}
     groups = {
-        "": {name: _plain(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
+        "": {name: plain_panel(mesh, colours.get(name, SIMULATED_SURFACE_COLOUR)) for name, (mesh, _) in maps.items()},
         "shape index\n": {name: _mapped(surface_map, scale) for name, surface_map in maps.items()},
     }
     rows = [
@@ -374,10 +332,8 @@ def region_colours(names: Iterable[str]) -> dict[str, tuple[float, float, float]
 def regions_picture(brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints, Mapping[int, str]]]]]) -> Figure:
     """Draw brains coloured by region, a column per brain and a row per view, with the regions' names.
 
-    Parameters
-    ----------
-    brains : {heading of the column: hemispheres, each with the numbers of its vertices' regions and their names}
-        Numbers without a name mean no region.
+    `brains` are by heading of the column the hemispheres, each with the numbers of its vertices' regions and their
+    names. Numbers without a name mean no region.
     """
     colours = region_colours(name for halves in brains.values() for _, (_, table) in halves for name in table.values())
     legend = [Patch(color=colour, label=name) for name, colour in colours.items()]
@@ -404,10 +360,8 @@ def regions_picture(brains: Mapping[str, Sequence[tuple[TriangleMesh, tuple[Ints
 def zones_picture(regions: tuple[TriangleMesh, Mapping[str, NDArray[np.integer]]], params: FoldingParameters) -> Figure:
     """Draw the zones of the brain's boundary from several sides, with their areas.
 
-    Parameters
-    ----------
-    regions : the boundary in RAS+ mm, and tags (m,) of its faces, where `zone` is an index into `ZONE_NAMES`
-    params : `fissure_x_mm` separates the hemispheres in medial views
+    `regions` are the boundary in RAS+ mm and the tags (m,) of its faces, where `zone` is an index into `ZONE_NAMES`;
+    `fissure_x_mm` of the parameters separates the hemispheres in medial views.
     """
     (mesh, tags), fissure_x_mm = regions, params.fissure_x_mm
     zones = tags["zone"]

@@ -21,7 +21,7 @@ from ..quantities import VERTEX_MAPS
 from ..settings.schemes import LabelScheme
 from .scene import VIEWS, colour_scale, half_extents, paint, render, restricted, uniform_colours
 from .sections import PLANES, SCALE_BAR_MM, draw_outline
-from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, new_figure, styled, wrap
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_SURFACE_COLOUR, styled, wrap
 
 VERDICT_HEADINGS = {"fine": ("No warnings.", "#009E73"), "needs review": ("Warnings:", "#E69F00")}
 """Heading above the warnings of a page, and colour of the verdict."""
@@ -48,15 +48,10 @@ _BRIGHTEST = 0.995
 class QualityBrain:
     """The surfaces, thickness and volumes on a brain's page.
 
-    Attributes
-    ----------
-    pial : the whole surface, in RAS+ mm
-    fissure_x_mm : plane that separates the hemispheres in medial views
-    thickness_mm : (n,) at the vertices of the surface, NaN if not measured
-    white : the white surface, in the same coordinates
-    image, tissues
-        The (i, j, k) grey values and groups of labels (`TISSUE_GROUPS`), each with the (4, 4) affine from voxel index
-        to the surface's coordinates.
+    `pial` is the whole surface in RAS+ mm, `white` the white one in the same coordinates, `fissure_x_mm` the plane that
+    separates the hemispheres in medial views, and `thickness_mm` (n,) at the vertices of the surface, NaN where not
+    measured. `image` and `tissues` are the (i, j, k) grey values and groups of labels (`TISSUE_GROUPS`), each with the
+    (4, 4) affine from voxel index to the surface's coordinates.
     """
 
     pial: TriangleMesh
@@ -81,13 +76,11 @@ def quality_page(brain: QualityBrain, row: Mapping[str, Any], warnings: Sequence
     """Draw the page of a brain: three planes, the surface in four views, thickness in four views, and its warnings.
 
     The outlines are drawn on the image, or on the labels if there is no image. The page ends below its last warning.
-
-    Parameters
-    ----------
-    row : the output of `quality_row`
+    `row` is the output of `quality_row`.
     """
     lines = [line for text in warnings for line in wrap(f"• {text}", LINE_LETTERS).split("\n")]
-    figure = new_figure(FULL_WIDTH_IN, HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines))
+    height_in = HEAD_IN + sum(ROWS_IN) + LINE_IN * len(lines)
+    figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     heading, colour = VERDICT_HEADINGS[row["verdict"]]
     left: dict[str, Any] = {"x": 0.015, "ha": "left", "fontsize": 6.5}
     # lines break between facts only
@@ -222,11 +215,9 @@ def quality_row(
 ) -> dict[str, Any]:
     """Return the row of a brain with a surface; its verdict is "needs review" if there are warnings, else "fine".
 
-    Parameters
-    ----------
-    labels : subject, week, population, source, sides and page
-    report, thickness : contents of `surface.json` and `thickness.json`
-    expected_ml : approximate volume of a cerebrum of the week; half of it is expected of a single hemisphere
+    `labels` are subject, week, population, source, sides and page; `report` and `thickness` the contents of
+    `surface.json` and `thickness.json`. `expected_ml` is the approximate volume of a cerebrum of the week; half of it
+    is expected of a single hemisphere.
     """
     area, sides = report["area_cm2"], str(labels["sides"]).split()
     pose = pose_from(report["pose"])
@@ -256,12 +247,9 @@ def quality_row(
 def quality_table(
     rows: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, Any]], order: Sequence[str]
 ) -> pd.DataFrame:
-    """Return the rows of all brains in an order of their ids.
+    """Return the rows of all brains, outputs of `quality_row`, in an order of their ids.
 
-    Parameters
-    ----------
-    rows : outputs of `quality_row`
-    refused : labels and cause of refused brains
+    `refused` are labels and cause of refused brains.
     """
     every = [*rows, *({**row, "verdict": "refused", "warning_count": 0} for row in refused)]
     table = pd.DataFrame(every).set_index("subject", drop=False)

@@ -26,13 +26,9 @@ Image = NDArray[np.uint8]
 class View:
     """A view of a brain in RAS+ mm.
 
-    Attributes
-    ----------
-    name : label of the picture
-    towards : unit vector from the brain to the camera
-    up : unit vector that points up in the picture
-    ends : letters of the picture's left and right ends (A anterior, P posterior, L left, R right)
-    hemisphere : "left" or "right" if only that hemisphere is shown, else ""
+    `towards` is the unit vector from the brain to the camera, `up` the one that points up in the picture; `ends` are
+    the letters of the picture's left and right ends (A anterior, P posterior, L left, R right). `hemisphere` is "left"
+    or "right" if only that one is shown, else "". The name is the label of the picture.
     """
 
     name: str
@@ -146,17 +142,10 @@ def render(
     light: Mapping[str, Any] = TISSUE,
     lines: Floats | None = None,
 ) -> Image:
-    """Return a picture of the surface in parallel projection, its bounding box in the middle.
+    """Return a picture (height, width, 3) of the surface on white, in parallel projection about the middle of its box.
 
-    Parameters
-    ----------
-    colours : (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1
-    half_extents_mm : half the width and half the height of the picture
-    lines : (k, 2, 3) ends of lines, drawn unless the surface hides them
-
-    Returns
-    -------
-    (height, width, 3) picture on white
+    `colours` are (n, 3) of vertices or (m, 3) of faces, red, green and blue in 0 to 1; `half_extents_mm` half the width
+    and half the height of the picture; `lines` (k, 2, 3) ends of lines, drawn unless the surface hides them.
     """
     size = [max(2, round(2 * half * pixels_per_mm)) for half in half_extents_mm]
     surface = pv.PolyData.from_regular_faces(np.array(mesh.vertices), np.array(mesh.faces, dtype=int))

@@ -19,7 +19,6 @@ from .style import (
     MUTED_COLOUR,
     OBSERVED_COLOUR,
     RUN_COLOURS,
-    new_figure,
     panel_figure,
     run_colours,
     run_legend,
@@ -47,12 +46,8 @@ def validation_chart(
     headroom, the gain of the observed brain of the week before; a dotted line is the start carried by registration
     alone.
 
-    Parameters
-    ----------
-    validation
-        Columns run, start_week, week, kind, and gain and headroom (gain_…, gain_low_…, gain_high_…) of each of
-        `COMPARED_MAPS`.
-    ceiling : the same of the start carried by registration
+    `validation` has the columns run, start_week, week, kind, and gain and headroom (gain_…, gain_low_…, gain_high_…) of
+    each of `COMPARED_MAPS`; `ceiling` the same of the start carried by registration.
     """
     colours = run_colours(validation["run"], runs)
     figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
@@ -103,10 +98,7 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw a row for each sulcus that observed brains do not have at the start, with the weeks when it begins.
 
     A cross at the right edge means never. If there are several start brains, their names follow those of the sulci.
-
-    Parameters
-    ----------
-    onset : columns run ("real" for observed brains), subject, region, there_at_start, onset_week
+    `onset` has the columns run ("real" for observed brains), subject, region, there_at_start, onset_week.
     """
     several = len(onset["subject"].unique()) > 1
     table = onset.assign(row=onset["region"] + (" · " + onset["subject"] if several else ""))
@@ -116,10 +108,11 @@ def onset_chart(onset: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     drawn = table[table["row"].isin(places)]
     weeks = drawn["onset_week"].dropna()
     if not len(weeks):
-        figure = new_figure(FULL_WIDTH_IN, 0.4)
+        figure = Figure(figsize=(FULL_WIDTH_IN, 0.4), layout="constrained")
         figure.text(0.0, 0.5, "No sulcus begins after the start.", va="center")
         return figure
-    figure = new_figure(FULL_WIDTH_IN, 1.2 + ROW_IN * max(len(places), 2))
+    height_in = 1.2 + ROW_IN * max(len(places), 2)
+    figure = Figure(figsize=(FULL_WIDTH_IN, height_in), layout="constrained")
     axes = figure.subplots()
     colours = run_colours(onset["run"], runs)
     beyond = np.ceil(weeks.max() + 0.5)
@@ -156,21 +149,11 @@ def nearest_chart(
 
     Panels show the whole brain or both hemispheres; the nearest run has a ring and its value.
 
-    Parameters
-    ----------
-    comparison
-        Columns subject, observed, hemisphere, measure, distance, unit, flag, resolution, and one with the values of the
-        parameter. If the flag or the resolution is not "ok", a distance is not reliable and its mark is open.
-    varied : name of the column with the parameter's values
-    subject, observed : the start brain, and the observed brains that it is compared with
-    week : of the comparison
-    published
-        Rows `nearest` have parameter, week, measure, and the nearest value, drawn as a dashed line.
-
-    Raises
-    ------
-    InputError
-        If there is no distance.
+    `comparison` has the columns subject, observed, hemisphere, measure, distance, unit, flag, resolution, and `varied`
+    with the parameter's values. If the flag or the resolution is not "ok", a distance is not reliable and its mark is
+    open. `subject` is the start brain, `observed` are the brains that it is compared with, at a `week`. The rows
+    `nearest` of `published` have parameter, week, measure, and the nearest value, drawn as a dashed line. InputError if
+    there is no distance.
     """
     rows = comparison[(comparison["subject"] == subject) & comparison["observed"].isin(observed)].dropna(
         subset="distance"
@@ -237,11 +220,8 @@ def _nearest_line(axes: Axes, rows: pd.DataFrame, marker: str, colour: str) -> N
 def calibration_chart(runs: pd.DataFrame, optimum: pd.DataFrame, *, score: Sequence[str]) -> Figure:
     """Draw a panel for each parameter, with the scores of the runs and the optimum of the surrogate.
 
-    Parameters
-    ----------
-    runs : columns of the parameters, round, score (NaN: diverged)
-    optimum : columns parameter, value
-    score : terms of the score
+    `runs` has the columns of the parameters, round, score (NaN: diverged); `optimum` parameter, value. `score` are the
+    terms of the score.
     """
     figure, panels = panel_figure(len(optimum), per_row=len(optimum), panel_in=2.0)
     finished, diverged = runs[runs["score"].notna()], runs[runs["score"].isna()]

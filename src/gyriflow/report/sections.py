@@ -16,16 +16,7 @@ from ..geometry.alignment import align
 from ..geometry.triangles import Floats, Ints, TriangleMesh
 from ..settings.terms import OBSERVED_BRAIN
 from .labels import week_label
-from .style import (
-    FULL_WIDTH_IN,
-    MUTED_COLOUR,
-    OBSERVED_COLOUR,
-    SINGLE_COLUMN_IN,
-    add_letters,
-    new_figure,
-    run_colours,
-    styled,
-)
+from .style import FULL_WIDTH_IN, MUTED_COLOUR, OBSERVED_COLOUR, SINGLE_COLUMN_IN, add_letters, run_colours, styled
 
 PLANES = {"coronal": (1, 0, 2), "axial": (2, 0, 1), "sagittal": (0, 1, 2)}
 """The axis normal to each plane, and those to the right and up in its picture."""
@@ -61,15 +52,12 @@ def model_sections(model: tuple[Ints, Mapping[float, Mapping[str, Floats]]]) -> 
     """Draw coronal sections through the elements of a run at its start and at its end.
 
     Columns are the cortical weight with the elements, the growth zone (0 or 1), the tangential growth in a step, and
-    the normals in the cortex.
-
-    Parameters
-    ----------
-    model : elements (m, 4) or (m, 10), and by week the arrays of `folding.zones.model_fields` at their nodes
+    the normals in the cortex. `model` are the elements (m, 4) or (m, 10), and by week the arrays of
+    `folding.zones.model_fields` at their nodes.
     """
     tets, weeks = model
     largest = max(float(fields["increment"].max()) for fields in weeks.values())
-    figure = new_figure(FULL_WIDTH_IN, 4.2)
+    figure = Figure(figsize=(FULL_WIDTH_IN, 4.2), layout="constrained")
     rows = figure.subplots(2, 4, sharex="row", sharey="row")
     scales = {"weight": 1.0, "growing": 1.0, "increment": largest}
     titles = ("cortical weight", "growth zone", "tangential growth\nin a step", "normals")
@@ -118,13 +106,8 @@ def outlines_chart(
     """Draw the outlines of runs over those of the observed brain, a row per plane, a column per week.
 
     The coronal and axial planes pass through the middle of the observed brain, the sagittal plane through its right
-    hemisphere. All panels have one scale. At most the last five weeks are shown.
-
-    Parameters
-    ----------
-    runs : {run: {week: surface in RAS+ mm}}
-        Each is rigidly aligned with the observed brain of its week.
-    observed : {week: observed surface in RAS+ mm}
+    hemisphere. All panels have one scale. At most the last five weeks are shown. Surfaces in RAS+ mm are by run and
+    week, observed ones by week; those of runs are aligned rigidly with the observed brain of their week.
     """
     weeks, colours = sorted(observed)[-MAX_WEEKS:], run_colours(runs)
     runs = {
@@ -138,7 +121,7 @@ def outlines_chart(
     tall = [(high - low)[up] for *_, up in PLANES.values()]
     inches_per_mm = min((FULL_WIDTH_IN - LEFT_IN) / (len(weeks) * wide), MAX_PANEL_IN / wide)
     width = max(SINGLE_COLUMN_IN, LEFT_IN + inches_per_mm * len(weeks) * wide)
-    figure = new_figure(width, inches_per_mm * sum(tall) + ABOVE_IN)
+    figure = Figure(figsize=(width, inches_per_mm * sum(tall) + ABOVE_IN), layout="constrained")
     panels = figure.subplots(len(tall), len(weeks), squeeze=False, gridspec_kw={"height_ratios": tall})
     for row, (plane, (normal, right, up)) in zip(panels, PLANES.items(), strict=True):
         centre = (low[right] + high[right]) / 2

@@ -65,25 +65,18 @@ styled = mpl.rc_context(MATPLOTLIB_SETTINGS)
 """Decorator: draw a figure in the project's style, without changing global settings."""
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure with constrained layout."""
-    return Figure(figsize=(width_in, height_in), layout="constrained")
-
-
 def panel_figure(
     count: int, *, per_row: int = 3, panel_in: float = 1.9, foot_in: float = 0.7, **grid: Any
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure and its panels, row by row, with letters.
 
-    Parameters
-    ----------
-    per_row : panels of a full row, which is as wide as a page
-    panel_in, foot_in : height of a row and of the legend, in inches
-    grid : further arguments of `Figure.subplots`
+    A full row of `per_row` panels is as wide as a page; `panel_in` and `foot_in` are the heights of a row and of the
+    legend in inches. `grid` are further arguments of `Figure.subplots`.
     """
     columns = min(per_row, count)
     lines = -(-count // columns)
-    figure = new_figure(FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row), foot_in + panel_in * lines)
+    width_in = FULL_WIDTH_IN * min(1.0, max(columns, 2) / per_row)
+    figure = Figure(figsize=(width_in, foot_in + panel_in * lines), layout="constrained")
     panels = list(figure.subplots(lines, columns, squeeze=False, **grid).flat)
     for spare in panels[count:]:
         spare.remove()
@@ -163,13 +156,8 @@ def run_legend(
 ) -> None:
     """Draw a legend below the panels: runs, observed brains if named, subjects, and `extra` entries.
 
-    Runs have lines or `bars`. The legend has as many columns as its longest label allows, and the figure grows by its
-    rows.
-
-    Parameters
-    ----------
-    colours : {run: colour}
-    markers : {subject: marker}
+    Runs have lines or `bars` of their `colours`; `markers` are by subject. The legend has as many columns as its
+    longest label allows, and the figure grows by its rows.
     """
     handles: list[Artist] = [
         Patch(color=colour, label=run) if bars else Line2D([], [], color=colour, marker="o", label=run)

@@ -27,16 +27,8 @@ _TABLE = Environment(autoescape=True).from_string(
 
 COMMON_PARAMETERS = (
     *("thickness_mm", "shear_modulus_cortex_pa", "shear_modulus_core_pa", "material", "poisson_ratio"),
-    *(
-        "growth_of",
-        "growth_rate_per_s",
-        "core_growth_rate_per_s",
-        "stress_memory_gw",
-        "support",
-        "contact.kind",
-        "no_growth.kind",
-    ),
-    *("step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
+    *("growth_of", "growth_rate_per_s", "core_growth_rate_per_s", "stress_memory_gw", "support"),
+    *("contact.kind", "no_growth.kind", "step_s", "tets", "order", "elements_through_cortex", "element_error_percent"),
     *("steps", "newton", "seconds", "peak_memory_MiB"),
 )
 """Parameters and summaries that are listed even if all runs share them."""
@@ -73,17 +65,11 @@ def metrics_table(metrics: pd.DataFrame, *, observed_name: str = OBSERVED_BRAIN)
     """Return the metrics of whole brains: the observed brain, each run, and each run's difference in %.
 
     The week is the last that runs and observed brains share, or the last of all. Quantiles and metrics of the
-    measurement itself are left out.
+    measurement itself are left out. `metrics` has the columns subject, run, week, hemisphere, metric, value, unit;
+    `run` is "real" for observed brains, several of which in a week give their mean. `observed_name` is the heading of
+    their column.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-        `run` is "real" for observed brains; several observed brains of a week give their mean.
-    observed_name : heading of the observed brains' column
-
-    Returns
-    -------
-    DataFrame indexed by metric (with its unit); cells without a value are NaN, without a difference "–"
+    The rows are by metric (with its unit); cells without a value are NaN, without a difference "–".
     """
     rows = runs_by_name(_reported(metrics[metrics["hemisphere"] == "whole"]))
     observed = rows["run"] == MEASURED
@@ -121,10 +107,8 @@ def centile_text(centiles: pd.DataFrame) -> list[str]:
 def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
     """Return the metrics of an observed brain, whole and by hemisphere, and the centiles of the whole brain.
 
-    Parameters
-    ----------
-    metrics : columns hemisphere, metric, value, unit, of this brain
-    centiles : of the study; columns subject, run, hemisphere, metric, value, expected, z, centile, flag
+    `metrics` has the columns hemisphere, metric, value, unit, of this brain; `centiles`, of the study, subject, run,
+    hemisphere, metric, value, expected, z, centile, flag.
     """
     rows = _reported(metrics).assign(name=_named)
     wide = rows.pivot_table("value", "name", "hemisphere", aggfunc="first").reindex(rows["name"].unique())
@@ -141,12 +125,8 @@ def brain_table(metrics: pd.DataFrame, centiles: pd.DataFrame) -> pd.DataFrame:
 def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     """Return the parameters of the runs with their units: a row per parameter, a column per run.
 
-    Parameters that differ between the runs come first, then `COMMON_PARAMETERS`.
-
-    Parameters
-    ----------
-    parameters : {run: {name: value}}
-        Nested names are joined by dots. A curve over weeks is shown by its first and last values.
+    `parameters` are by run and name. Those that differ between the runs come first, then `COMMON_PARAMETERS`. Nested
+    names are joined by dots. A curve over weeks is shown by its first and last values.
     """
     flat = pd.DataFrame({run: pd.Series(_flatten(values), dtype=object) for run, values in parameters.items()})
     texts = flat.map(_text)
@@ -157,19 +137,13 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
 
 
 def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
-    """Return how well the steps of a run resolved the cortex, for the table of runs.
+    """Return how well the steps of a run with elements of an order resolved the cortex, for the table of runs.
 
-    Parameters
-    ----------
-    order : of the elements
-    steps : columns week, elements_through_cortex
-        One row per step; NaN if no element has its centre in the cortex, which counts as 0.
+    `steps` has a row per step with the columns week and elements_through_cortex: NaN if no element has its centre in
+    the cortex, which counts as 0.
 
-    Returns
-    -------
-    dict
-        `order`, `element_error_percent` (`element_error` at the start), `least_elements_through_cortex`, and
-        `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none).
+    Returns `order`, `element_error_percent` (`element_error` at the start), `least_elements_through_cortex`, and
+    `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none).
     """
     through = steps["elements_through_cortex"].fillna(0.0)
     return {
@@ -184,16 +158,10 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
     A job keeps at least one core busy, so its energy is the longer of wall and CPU time times the power of a core.
+    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if Snakemake could not measure; such jobs are
+    counted, and add nothing to the sums.
 
-    Parameters
-    ----------
-    jobs : columns rule, run, wall_s, cpu_s, memory_MiB
-        NaN if Snakemake could not measure; such jobs are counted, and add nothing to the sums.
-
-    Returns
-    -------
-    DataFrame with columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh,
-    co2e_g
+    Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh, co2e_g.
     """
     hours = jobs[["wall_s", "cpu_s"]].astype(float) / 3600
     each = jobs.assign(hours=hours["wall_s"], core_hours=hours.max(axis=1), run=jobs["run"].fillna(""), jobs=1)
@@ -209,9 +177,7 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
 def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:
     """Return the ages by size of an atlas' brains, a row per stated week.
 
-    Parameters
-    ----------
-    ages : columns stated_week, age_by_size, volume_ml and curve_ml
+    `ages` has the columns stated_week, age_by_size, volume_ml and curve_ml.
     """
     return ages.set_index("stated_week").rename(columns=plain).rename_axis("stated week (GW)").round(2)
 
@@ -219,9 +185,7 @@ def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:
 def prediction_table(prediction: pd.DataFrame) -> pd.DataFrame:
     """Return the accuracy of predicted brains and of simpler predictions: a row per start, week and model.
 
-    Parameters
-    ----------
-    prediction : the study's prediction.csv
+    `prediction` is the study's prediction.csv.
     """
     models = prediction["model"].map(lambda name: SIMPLER_PREDICTIONS.get(name, plain(name)))
     table = prediction.assign(model=models.where(prediction["model"] != "run", prediction["run"]))
@@ -238,13 +202,9 @@ def predicted_table(
     """Return the metrics of a predicted brain, its start and the atlas' brain, and the difference from the atlas in %.
 
     Centiles stand below the values if there is a norm of individuals, and the interval of an ensemble next to them.
-
-    Parameters
-    ----------
-    metrics : as for `metrics_table`
-    prediction : the output of `Study.prediction_facts`, and `tests`, the output of `compare.accuracy.prediction_facts`
-    centiles : of the study, as for `brain_table`
-    intervals : the output of `compare.ensemble.interval_table`
+    `metrics` is as for `metrics_table`, `centiles` as for `brain_table`; `prediction` is the output of
+    `Study.prediction_facts` with `tests`, that of `compare.accuracy.prediction_facts`; `intervals` that of
+    `compare.accuracy.interval_table`.
     """
     rows = metrics[(metrics["hemisphere"] == "whole") & metrics["metric"].isin(metrics_shown(Shown.PREDICTION))]
     rows = rows.assign(name=_named).set_index("name")
@@ -305,10 +265,8 @@ def range_text(values: pd.Series, pattern: str = ".2f") -> str:
 def mesh_quality_table(quality: Mapping[str, Mapping[str, Any]], gates: Mapping[str, float]) -> pd.DataFrame:
     """Return the quality of meshes: a row per measure with its limit, a column per brain.
 
-    Parameters
-    ----------
-    quality : {brain: content of its quality.json}
-    gates : the limits in the configuration, by their keys in the section mesh
+    `quality` are the contents of the brains' quality.json by brain, `gates` the limits in the configuration, by their
+    keys in the section mesh.
     """
     columns = {
         brain: {**values, "surface_distance_mm": values["surface_distance_mm"]["hausdorff99"]}

@@ -41,11 +41,7 @@ def surfaces_view(
     displacement since the first week. Observed brains have their own triangles each week. Positions are in steps of
     1/65535 of the box around all surfaces, values of maps in 254 steps of their scale.
 
-    Parameters
-    ----------
-    runs : {run: (week, hemispheres) by week, with the same vertices}
-        InputError if their numbers of vertices differ.
-    observed : (week, hemispheres) of the observed brains by week
+    Week and hemispheres are by week, those of a run with the same vertices: InputError if their numbers differ.
     """
     simulated = {name: _with_displacement([_timed(*frame) for frame in frames]) for name, frames in runs.items()}
     observed_frames = [_timed(*frame) for frame in observed]

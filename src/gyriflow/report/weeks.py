@@ -1,14 +1,15 @@
-"""Charts over the weeks, a panel for each quantity: metrics, norms, intervals, regions, predictions, displacement.
+"""Charts over the weeks, a panel for each quantity: metrics, norms, regions, predictions, displacement, spectra.
 
 As in the other charts, `runs` are all runs of a study, which determine the colours, and `observed_name` is the name of
-observed brains.
+observed brains. Spectra of the runs of a sweep have bars instead.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import cycle
+from itertools import cycle, product, zip_longest
 from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -16,11 +17,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import Transform
 
 from ..errors import InputError
 from ..quantities import METRICS, Shown, metrics_shown
-from ..settings.terms import MEASURED, OBSERVED_BRAIN
-from .labels import SIMPLER_PREDICTIONS, metric_title, plain
+from ..settings.terms import FOLD_BANDS, MEASURED, OBSERVED_BRAIN, PROXIES, SIDES
+from .labels import SIMPLER_PREDICTIONS, metric_title, plain, value_labels
 from .pictures import region_colours
 from .style import (
     MUTED_COLOUR,
@@ -46,18 +48,17 @@ JOINED: Mapping[str, Any] = {"color": MUTED_COLOUR, "linewidth": 0.8, "zorder": 
 """Line through the scans of a subject."""
 MANY_BRAINS = 30
 """Number of reference brains above which their marks are small."""
+_FOLDS = {4: "primary", 5: "secondary", 6: "tertiary"}
+_HATCH = "//////"
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
     """Points of one look, in all panels that have some.
 
-    Attributes
-    ----------
-    rows
-        Columns panel, week, and the `value`. If there is a column `trusted`, marks are open where it is False.
-    style : arguments of `Axes.plot`; of a band, of `Axes.fill_between`
-    value : name of a column, or of those of the lower and the upper edge of a band
+    The rows have the columns panel, week, and the `value`: the name of a column, or those of the lower and the upper
+    edge of a band. If there is a column `trusted`, marks are open where it is False. `style` are the arguments of
+    `Axes.plot`, of a band those of `Axes.fill_between`.
     """
 
     rows: pd.DataFrame
@@ -152,12 +153,9 @@ def metrics_chart(
     The scans of a subject are joined. Subjects have markers if there are at most eight; groups of brains have colours.
     Metrics that the table lacks are left out.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-        `run` is "real" for observed brains; InputError if the table has none of the metrics.
-    subjects : {brain: subject}, if known
-    groups : {brain: its value of a covariate}
+    `metrics` has the columns subject, run, week, hemisphere, metric, value, unit; `run` is "real" for observed brains.
+    InputError if the table has none of the metrics. `subjects` are the subjects of brains, if known, `groups` their
+    values of a covariate, both by brain.
     """
     whole = runs_by_name(metrics[metrics["hemisphere"] == "whole"])
     rows, titles = _shown(whole, Shown.CHART)
@@ -207,17 +205,9 @@ def norms_chart(
     Bands are between the 5th and 95th and the 25th and 75th centile, drawn if the spread of individuals is known. Stars
     are observed brains: black in the reference, else coloured, as are groups. Lines are runs.
 
-    Parameters
-    ----------
-    metrics : columns subject, run, week, hemisphere, metric, value, unit
-    curves : columns hemisphere, metric, week, expected, q05, q25, q75, q95
-    reference
-        Brains that the curves were fitted to.
-    brains
-        Brains with the same hemispheres as the reference. Only they, and simulations from them, are drawn.
-    subjects, groups : as for `metrics_chart`
-
-    InputError if the table has none of the metrics.
+    Metrics, subjects and groups are as for `metrics_chart`; `curves` has the columns hemisphere, metric, week,
+    expected, q05, q25, q75, q95, which were fitted to the `reference` brains. `brains` have the same hemispheres as the
+    reference: only they, and simulations from them, are drawn. InputError if the table has none of the metrics.
     """
     whole = runs_by_name(metrics[(metrics["hemisphere"] == "whole") & metrics["subject"].isin(brains)])
     rows, titles = _shown(whole, Shown.NORMS)
@@ -254,11 +244,8 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
     """Draw a panel per metric over the weeks, a colour per region: both sides together, and the asymmetry of area.
 
     Observed brains are stars, the first three runs lines. Areas are sums of both sides, other values their means.
-
-    Parameters
-    ----------
-    regions : columns subject, run, week, hemisphere, region, metric, value, unit
-    asymmetry : columns subject, run, week, region, metric, asymmetry_index
+    `regions` has the columns subject, run, week, hemisphere, region, metric, value, unit; `asymmetry` subject, run,
+    week, region, metric, asymmetry_index.
     """
     rows, titles = _shown(runs_by_name(regions), Shown.REGIONS)
     colours, lines = region_colours(rows["region"]), dict(zip(run_colours(rows["run"]), LINES, strict=False))
@@ -291,11 +278,8 @@ def regions_chart(regions: pd.DataFrame, asymmetry: pd.DataFrame, *, observed_na
 def prediction_chart(prediction: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw correlation with and distance from the observed brain by weeks after the start: a row of panels per start.
 
-    Runs are solid lines, simpler predictions dashed.
-
-    Parameters
-    ----------
-    prediction : columns run, start, horizon, model (`run` or a simpler prediction), r_shape_index and distance_mm
+    Runs are solid lines, simpler predictions dashed. `prediction` has the columns run, start, horizon, model (`run` or
+    a simpler prediction), r_shape_index and distance_mm.
     """
     columns = {"r_shape_index": "shape index, r with the observed brain", "distance_mm": "distance from it (mm)"}
     colours = run_colours(prediction["run"], runs)
@@ -329,18 +313,20 @@ def displacement_chart(
 ) -> Figure:
     """Draw the maximal and the mean displacement norm of all nodes per week.
 
-    Norms are divided by the weeks between output weeks. Runs are lines, published values grey.
-
-    Parameters
-    ----------
-    displacement : columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm
-    published
-        `displacement` has `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
+    Norms are divided by the weeks between output weeks. Runs are lines, published values grey. `displacement` has the
+    columns run, subject, from_week, to_week, nodes ("all" or "pial"), max_mm, mean_mm; that of `published` has
+    `from_weeks` (intervals of one week) and rows with `source`, `max_mm` and `mean_mm`.
     """
-    named = runs_by_name(displacement)
-    colours, published_rows = run_colours(named["run"], runs), _published_norms(published)
-    markers = dict(zip(published_rows["run"].unique(), cycle(PUBLISHED_MARKERS), strict=False))
-    rows = pd.concat([published_rows, named[named["nodes"] == "all"]])
+    named, moved = (
+        runs_by_name(displacement),
+        published["displacement"] if published else {"from_weeks": [], "rows": []},
+    )
+    colours, weeks = run_colours(named["run"], runs), np.array(moved["from_weeks"], dtype=float)
+    markers = dict(zip(dict.fromkeys(row["source"] for row in moved["rows"]), cycle(PUBLISHED_MARKERS), strict=False))
+    tables = [
+        pd.DataFrame({**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1}) for row in moved["rows"]
+    ]
+    rows = pd.concat([*tables, named[named["nodes"] == "all"]])
     rows["week"], duration = (rows["from_week"] + rows["to_week"]) / 2, rows["to_week"] - rows["from_week"]
     titles = {"max_mm": "maximal displacement, all nodes", "mean_mm": "mean displacement, all nodes"}
     rows = pd.concat(rows.assign(panel=column, value=rows[column] / duration) for column in titles)
@@ -355,14 +341,135 @@ def displacement_chart(
     return figure
 
 
-def _published_norms(published: Mapping[str, Any] | None) -> pd.DataFrame:
-    """Return published norms as a table like that of the study, with their sources as runs."""
-    columns = ["run", "from_week", "to_week", "max_mm", "mean_mm"]
-    if not published:
-        return pd.DataFrame(columns=columns)
-    weeks = np.array(published["displacement"]["from_weeks"], dtype=float)
-    tables = [
-        pd.DataFrame({**row, "run": row["source"], "from_week": weeks, "to_week": weeks + 1})[columns]
-        for row in published["displacement"]["rows"]
-    ]
-    return pd.concat(tables)
+def _band_rows(spectra: pd.DataFrame, bands: Sequence[int], proxy: str) -> pd.DataFrame:
+    """Return the rows of some bands in the spectra of a proxy, with a column `trusted`."""
+    trusted = spectra["complete"] & spectra["denominator_complete"] & spectra["resolved"]
+    return spectra.assign(trusted=trusted)[spectra["band"].isin(bands) & (spectra["proxy"] == proxy)]
+
+
+def _beyond_the_modes(axes: Axes, x: float, transform: Transform, *, rotation: float = 0.0) -> None:
+    words = "beyond the\nmodes computed"
+    axes.text(x, 0.5, words, transform=transform, ha="center", va="center", rotation=rotation)
+
+
+def _spectra_legend(
+    figure: Figure, rows: pd.DataFrame, colours: Mapping[str, Any], name: str, groups: list[Artist], *, bars: bool
+) -> None:
+    """Draw the legend of a chart of bands, with groups and the marks of bands that are cut off or not resolved."""
+    untrusted = set(rows.loc[rows["relative_power"].notna() & ~rows["trusted"], "run"])
+    label = "band cut off or not resolved"
+    extra: list[Artist] = []
+    if untrusted - {MEASURED}:
+        hatched = Patch(facecolor=MUTED_COLOUR, edgecolor="white", hatch=_HATCH, label=label)
+        hollow = star(label, MUTED_COLOUR, marker="o", markersize=5, markerfacecolor="white")
+        extra.append(hatched if bars else hollow)
+    if MEASURED in untrusted:
+        words = "the same, observed brain" if extra else label
+        extra.append(star(words, markersize=8, markerfacecolor="white"))
+    name = name if (rows["run"] == MEASURED).any() else ""
+    run_legend(figure, colours, observed_name=name, bars=bars, extra=[*groups, *extra])
+
+
+def _sides_in(rows: pd.DataFrame) -> list[str]:
+    """Return the hemispheres that occur in a table, left first."""
+    return [side for side in SIDES if (rows["hemisphere"] == side).any()]
+
+
+@styled
+def spectra_weeks_chart(
+    spectra: pd.DataFrame,
+    *,
+    runs: Sequence[str] = (),
+    observed_name: str = OBSERVED_BRAIN,
+    subjects: Mapping[str, str] = NO_SUBJECTS,
+    groups: Mapping[str, str] = NO_SUBJECTS,
+) -> Figure:
+    """Draw the relative power of the fold bands of mean curvature over weeks: a row per hemisphere, a column per band.
+
+    Runs are lines, observed brains black stars; scans of a subject are joined and groups coloured. Markers are open if
+    the band, or one in the denominator of the relative power, is cut off, or if the surface does not resolve it.
+    `spectra` has the columns subject, run, week, hemisphere, proxy, band, relative_power, complete,
+    denominator_complete, resolved.
+    """
+    with_power = set(spectra.loc[spectra["relative_power"].notna(), "band"])
+    bands = [band for band in FOLD_BANDS if band in with_power] or list(FOLD_BANDS)
+    rows = _band_rows(runs_by_name(spectra), bands, PROXIES[0])
+    rows = rows.assign(panel=rows["hemisphere"] + rows["band"].astype(str), value=rows["relative_power"])
+    sides, colours = _sides_in(rows), run_colours(rows["run"], runs)
+    shades, entries = group_shades(groups, colours)
+    layers = run_lines(rows, colours) + observed_marks(rows[rows["run"] == MEASURED], subjects=subjects, shades=shades)
+    cells = {f"{side}{band}": (side, band) for side, band in product(sides, bands)}
+    heads = [f"B{band}, {_FOLDS[band]} folds" for band in bands]
+    titles = dict(zip_longest(cells, heads, fillvalue=""))
+    layout: dict[str, Any] = {"per_row": len(bands), "panel_in": 1.75, "sharex": True, "sharey": "col"}
+    figure, panels = weeks_chart(titles, layers, rows["week"], **layout)
+    for cell, (side, band) in cells.items():
+        axes = panels[cell]
+        if not rows.loc[rows["panel"] == cell, "value"].notna().any():
+            _beyond_the_modes(axes, 0.5, axes.transAxes)
+            axes.set_yticks([])
+        if side != sides[-1]:
+            axes.set_xlabel("")
+        if band == bands[0]:
+            axes.set_ylabel(f"{side} hemisphere\nrelative power")
+        if side == sides[0]:
+            from_zero(axes)
+    _spectra_legend(figure, rows, colours, observed_name, entries, bars=False)
+    return figure
+
+
+@styled
+def influence_spectra(
+    members: Mapping[str, pd.DataFrame | None],
+    observed: Sequence[pd.DataFrame],
+    *,
+    values: Mapping[str, Mapping[str, Any]],
+    week: float,
+    observed_name: str = OBSERVED_BRAIN,
+) -> Figure:
+    """Draw the relative power in B4 to B6 of the runs of a sweep and of the observed brain at one week (in GW).
+
+    A panel per proxy and hemisphere. Runs are bars, from pale to dark in their order; observed brains are stars. They
+    are hatched or open if the band, or one in the denominator of the relative power, is cut off, or if the surface does
+    not resolve it. A band without any power is labelled as beyond the modes.
+
+    `members` are by run tables as for `spectra_weeks_chart`, None for a run that ended before the week; `observed`
+    those of observed brains, whose run is "real". `values` are by run the varied parameters with their values, in the
+    order of the sweep.
+    """
+    labels = dict(zip(values, value_labels(list(values.values())), strict=True))
+    simulated = [table.assign(run=labels[run]) for run, table in members.items() if table is not None]
+    shades = mpl.colormaps["YlGnBu"](np.linspace(0.3, 0.95, max(len(labels), 2)))
+    colours = dict(zip(labels.values(), shades, strict=False))
+    spectra = pd.concat([*simulated, *observed])
+    by_proxy = {proxy: _band_rows(spectra[spectra["week"] == week], FOLD_BANDS, proxy) for proxy in PROXIES}
+    rows = pd.concat(by_proxy.values())
+    sides = _sides_in(rows)
+    figure, panels = panel_figure(len(sides) * len(PROXIES), per_row=len(sides), panel_in=2.3, sharey="row")
+    width = 0.8 / len(colours)
+    for axes, (proxy, hemisphere) in zip(panels, product(PROXIES, sides), strict=True):
+        side = by_proxy[proxy][by_proxy[proxy]["hemisphere"] == hemisphere]
+        for index, (run, colour) in enumerate(colours.items()):
+            run_rows = side[side["run"] == run]
+            position = [FOLD_BANDS.index(band) - 0.4 + (index + 0.5) * width for band in run_rows["band"]]
+            bars = axes.bar(position, run_rows["relative_power"], width=0.92 * width, color=colour)
+            for bar, trusted in zip(bars, run_rows["trusted"], strict=True):
+                if not trusted:
+                    bar.set(hatch=_HATCH, edgecolor="white", linewidth=0)
+        for _, row in side[side["run"] == MEASURED].iterrows():
+            centre, power = FOLD_BANDS.index(row["band"]), row["relative_power"]
+            axes.hlines(power, centre - 0.42, centre + 0.42, color=OBSERVED_COLOUR, linewidth=0.9)
+            face = OBSERVED_COLOUR if row["trusted"] else "white"
+            axes.plot(centre, power, "*", color=OBSERVED_COLOUR, markerfacecolor=face, markersize=8)
+        for place, band in enumerate(FOLD_BANDS):
+            if not side.loc[side["band"] == band, "relative_power"].notna().any():
+                _beyond_the_modes(axes, place, axes.get_xaxis_transform(), rotation=90.0)
+        axes.set_xticks(range(len(FOLD_BANDS)), [f"B{band}\n{_FOLDS[band]}" for band in FOLD_BANDS])
+        axes.set_xlabel("SpAnGy band, and the folds that go with it")
+        axes.set_xlim(-0.5, len(FOLD_BANDS) - 0.5)
+        axes.set_title(f"{hemisphere} hemisphere, {plain(proxy)}")
+        if hemisphere == sides[0]:
+            axes.set_ylabel("relative power")
+            from_zero(axes)
+    _spectra_legend(figure, rows, colours, observed_name, [], bars=True)
+    return figure

@@ -14,8 +14,7 @@ from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.deformations import carry, transform_points
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.triangles import TriangleMesh, flipped, merged, transformed, volume_ml
-from gyriflow.growth.channels import channels
-from gyriflow.growth.registration_quality import register_and_measure, require_good
+from gyriflow.growth.registration import channels, register_and_measure, require_good
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.settings.schemes import FILLED
 

@@ -8,7 +8,7 @@ import pytest
 from scripts import run_script
 from shapes import rigid, sphere
 
-from gyriflow.compare.ensemble import ensemble_maps, interval_table, spread_of_members
+from gyriflow.compare.accuracy import ensemble_maps, interval_table, spread_of_members
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.io.files import read_table, write_table

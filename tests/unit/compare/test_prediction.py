@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from shapes import sphere
 
-from gyriflow.compare.comparison import ObservedBrain
-from gyriflow.compare.prediction import add_curves, comparison_table, model_columns, simple_predictions
+from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table, model_columns, simple_predictions
 from gyriflow.geometry.triangles import TriangleMesh, area, signed_volume
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 

@@ -11,8 +11,7 @@ from gyriflow.geometry.deformations import Deformation
 from gyriflow.geometry.matching import faces_that_cross, nearest_on
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
 from gyriflow.geometry.triangles import TriangleMesh, corners, face_areas
-from gyriflow.growth.fitting import fit_onto_surface
-from gyriflow.growth.series_shapes import follow_series
+from gyriflow.growth.series_shapes import fit_onto_surface, follow_series
 
 SIZE_MM = np.array([20.0, 20.0, 12.0])
 """Of a block below z = 0."""

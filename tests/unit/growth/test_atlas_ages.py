@@ -5,8 +5,7 @@ import pytest
 from facts import Facts
 from shapes import ellipsoid_mesh
 
-from gyriflow.growth.atlas_ages import MIN_AGE_SPACING_GW, ages_by_size
-from gyriflow.growth.atlas_path import resample_by_size
+from gyriflow.growth.atlas_path import MIN_AGE_SPACING_GW, ages_by_size, resample_by_size
 from gyriflow.growth.series_shapes import sizes_of
 
 WEEKS = np.arange(21.0, 33.0)

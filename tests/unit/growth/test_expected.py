@@ -18,8 +18,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, line
 from gyriflow.geometry.triangles import TriangleMesh, signed_volume, vertex_areas
 from gyriflow.growth.atlas_path import AtlasPath, resample_by_size
 from gyriflow.growth.expected import FADING_GW, expected_positions, place_in_atlas, predict_shapes
-from gyriflow.growth.fitting import fit_onto_surface
-from gyriflow.growth.series_shapes import SeriesShapes, follow_series, sizes_of
+from gyriflow.growth.series_shapes import SeriesShapes, fit_onto_surface, follow_series, sizes_of
 from gyriflow.metrics.curvature import curvature
 
 BALL = ellipsoid_mesh(10, (20.0, 20.0, 20.0))

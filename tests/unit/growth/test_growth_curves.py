@@ -6,8 +6,19 @@ from scripts import run_script
 from shapes import sphere
 
 from gyriflow.errors import InputError
-from gyriflow.growth.curves import curve_table, errors, fitted, interval, rate, tabulated, value
-from gyriflow.growth.following import fits_of_series, followed_sizes, run_parameters, sizes_on_curves
+from gyriflow.growth.curves import (
+    curve_table,
+    errors,
+    fits_of_series,
+    fitted,
+    followed_sizes,
+    interval,
+    rate,
+    run_parameters,
+    sizes_on_curves,
+    tabulated,
+    value,
+)
 from gyriflow.growth.rates import growth_rates, rates_of_series
 from gyriflow.io.files import write_json
 from gyriflow.io.surfaces import write_surface

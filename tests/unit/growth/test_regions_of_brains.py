@@ -23,8 +23,7 @@ from gyriflow.growth.carried_regions import (
     renumber,
 )
 from gyriflow.growth.carrying import carry_regions
-from gyriflow.growth.channels import Channels, channels
-from gyriflow.growth.diffeomorphic import register
+from gyriflow.growth.registration import Channels, channels, register
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES, read_yaml
 from gyriflow.metrics.curvature import curvature

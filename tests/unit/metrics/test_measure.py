@@ -6,8 +6,8 @@ from facts import Facts
 from scipy.spatial import Delaunay
 from shapes import ellipsoid, octasphere, sphere
 
+from gyriflow.compare.accuracy import ensemble_maps
 from gyriflow.compare.deviation import deviation_maps
-from gyriflow.compare.ensemble import ensemble_maps
 from gyriflow.errors import InputError, MeshError
 from gyriflow.folding.layers import cortical_weight
 from gyriflow.geometry.tetrahedra import TetrahedralMesh

@@ -59,6 +59,7 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert found["centile"].tolist() == pytest.approx([84.13, 50.0], abs=0.3)
     assert np.isnan(found["brains"]).all()
     assert published_scores(labelled(18.0, {3: 30.0}), NORMS)["flag"].tolist() == ["outside the norm's weeks"]
+    assert all(np.polyval(norm.sd, np.linspace(*norm.weeks, 201)).min() > 0 for norm in NORMS.values())
 
 
 def scores(metrics, reference, **options):

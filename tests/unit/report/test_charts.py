@@ -16,15 +16,16 @@ from gyriflow.report.growth import growth_chart
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
 from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, validation_chart
-from gyriflow.report.spectra import influence_spectra, spectra_weeks_chart
 from gyriflow.report.tables import brain_table
 from gyriflow.report.weeks import (
     displacement_chart,
+    influence_spectra,
     intervals_chart,
     metrics_chart,
     norms_chart,
     prediction_chart,
     regions_chart,
+    spectra_weeks_chart,
 )
 from gyriflow.settings.terms import SPREAD_UNKNOWN
 

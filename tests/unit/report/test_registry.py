@@ -11,7 +11,7 @@ import yaml
 from matplotlib.figure import Figure as Drawing
 from scripts import run_script
 
-from gyriflow.growth.maps import growth_per_week, growth_sd
+from gyriflow.growth.rates import growth_per_week, growth_sd
 from gyriflow.io.files import write_json, write_table
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.report.page import caption_html
