@@ -45,28 +45,23 @@ def test_no_source_makes_code_of_data():
     assert {str(path.relative_to(CHECKOUT)): found for path in SOURCES if (found := dangers(path.read_text()))} == {}
 
 
-@pytest.mark.parametrize(
-    "source",
-    [
-        "import pickle",
-        "from pickle import loads",
-        "eval(text)",
-        "import yaml\nyaml.load(text, Loader=yaml.Loader)",
-        "yaml.load(text, yaml.SafeLoader)",
-        "subprocess.run(text, shell=True)",
-        "subprocess.run(text, shell=wanted)",
-        "np.load(path, allow_pickle=True)",
-        "os.system(text)",
-        "tempfile.mktemp()",
-    ],
-)
-def test_dangers_are_seen(source):
-    assert dangers(source)
+DANGEROUS = """
+import pickle
+from pickle import loads
+eval(text)
+yaml.load(text, Loader=yaml.Loader)
+yaml.load(text, yaml.SafeLoader)
+subprocess.run(text, shell=True)
+subprocess.run(text, shell=wanted)
+np.load(path, allow_pickle=True)
+os.system(text)
+tempfile.mktemp()
+"""
 
 
-@pytest.mark.parametrize("source", ["model.eval()", "re.compile(x)", "np.load(p, allow_pickle=False)", "pickles = 1"])
-def test_what_only_looks_like_one_is_not(source):
-    assert not dangers(source)
+def test_dangers_are_seen_and_what_only_looks_like_one_is_not():
+    assert [line for line in DANGEROUS.strip().splitlines() if not dangers(line)] == []
+    assert dangers("model.eval()\nre.compile(x)\nnp.load(p, allow_pickle=False)\npickles = 1") == []
 
 
 @pytest.mark.fault(57)

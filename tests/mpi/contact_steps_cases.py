@@ -18,12 +18,12 @@ from contact_bodies import (
     two_blocks,
 )
 from mpi4py import MPI
-from verification_cases.mirrored import block, folded, hemisphere, reflected_and_merged, rounded
+from verification_cases.mirrored import block, folded, hemisphere, rounded
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
 from gyriflow.folding.zones import Zones
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, signed_volumes
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.settings.folding import parameters_from
 from gyriflow.settings.terms import FREE
 from gyriflow.units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
@@ -176,15 +176,6 @@ def test_a_closing_sulcus_is_the_same_on_all_ranks_and_on_one():
         assert np.abs(single.positions - state.positions).max() <= 1e-6 * moved
         assert single.rows[-1]["contact_pairs"] == state.rows[-1]["contact_pairs"]
     COMM.barrier()
-
-
-@pytest.mark.one_rank
-@pytest.mark.parametrize("half", [hemisphere(6), rounded(hemisphere(4))])
-def test_the_halves_are_mirror_images_of_whole_elements(half):
-    mesh = reflected_and_merged(half)
-    one, other = np.split(signed_volumes(mesh), 2)
-    assert one.min() > 0
-    np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

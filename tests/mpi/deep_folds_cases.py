@@ -13,10 +13,7 @@ TOLERANCES = [0.04, 0.02, 0.15]
 
 def test_a_deep_fold_presses_on_itself_where_it_crosses_without_contact():
     assert max(fold.crossing for fold in folded(Slab(2, 1, 0.04, contact="none"), AREA_RATIO)) > 0
-    folds = folded(Slab(2, 1, 0.04), AREA_RATIO)
-    assert not any(fold.crossing for fold in folds)
-    assert min(fold.least_volume_ratio for fold in folds) > 0.5
-    growth, depth_mm, pressure_pa = at_ratio(folds, AREA_RATIO)
+    growth, depth_mm, pressure_pa = found_at(Slab(2, 1, 0.04))
     # finer meshes of linear elements have 0.48, 4.78 mm and 1900 Pa
     assert growth == pytest.approx(0.48, rel=0.1)
     assert depth_mm == pytest.approx(4.78, rel=0.05)

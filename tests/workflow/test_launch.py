@@ -107,14 +107,6 @@ def gyriflow(workflow, *arguments):
 
 
 @pytest.mark.fault(27)
-def test_mistakes_in_a_configuration_end_in_2_before_anything_is_planned(workflow):
-    name = workflow.write("bad.yaml", SMALL_STUDY | {"folding": {"end_week": 50, "poisson_ratio": 0.5}})
-    outcome = gyriflow(workflow, "check", name)
-    assert outcome.returncode == 2
-    assert message(outcome) == Facts(2, "folding.end_week:", "folding.poisson_ratio:")
-
-
-@pytest.mark.fault(27)
 def test_an_unknown_stage_is_refused_with_the_nearest_one(workflow):
     outcome = gyriflow(workflow, "run", workflow.write("study.yaml", SMALL_STUDY), "--stage", "metrcs")
     assert outcome.returncode == 2

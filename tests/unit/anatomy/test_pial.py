@@ -88,6 +88,7 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
     require_sound(turned)
     for part in ("whole", "left", "right"):
         assert turned.report["area_cm2"][part] == pytest.approx(phantom.report["area_cm2"][part], rel=0.005)
+    assert Facts("cerebellum and brainstem") in turned.report["warnings"]
     normal = turned.pose.world[:3, :3] @ oblique[:3, 0]
     assert np.degrees(np.arccos(normal[0])) < 1.0
 

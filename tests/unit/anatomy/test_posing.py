@@ -29,7 +29,7 @@ from gyriflow.anatomy.pose import (
 from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import MIRROR, angle_deg, motion
+from gyriflow.geometry.alignment import angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import SCHEMES
@@ -179,14 +179,6 @@ def test_doubtful_shapes_are_taken_as_ras_or_refused(halves, monkeypatch):
     assert pose.warnings[0] == Facts("RAS+", "coordinates")
     with pytest.raises(InputError, check=Facts("left hemisphere", 1.05, 1.07)):
         pose_of_pair(*(transformed(half, drawn(31)) for half in halves))
-
-
-def test_the_mirror_image_of_a_hemisphere_fits_worse(halves):
-    right = halves[1]
-    one, other = hemisphere_by_shape(right), hemisphere_by_shape(transformed(right, MIRROR))
-    assert one.side_ratio > 1.1
-    assert other.side_ratio == pytest.approx(1 / one.side_ratio, rel=0.1)
-    assert angle_deg(one.rotation) < 8.0
 
 
 TURNS = [(180, 0, 0), (0, 180, 0), (0, 0, 180), (90, 0, 0), (0, 0, -90), (0, 90, 0)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from atlas_brains import atlas_halves
-from configurations import LABELLED
+from configurations import LABELLED, labelled, resolved
 from facts import Facts
 from shapes import hemisphere
 
@@ -36,6 +36,13 @@ from gyriflow.settings.stages import MeshSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
+
+STUDY = {
+    "brains": [{"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}],
+    "start": "a",
+    "mesh": {"mesher": "tetgen", "order": 1, "surface_edge_mm": 0.67, "core_edge_mm": 4.0},
+    "folding": {"end_week": 25, "step_s": 86400, "ranks": 1},
+}
 
 
 def problems(folder, **keys):
@@ -182,12 +189,7 @@ def test_a_header_without_a_unit_is_told_once_and_is_no_warning(tmp_path, monkey
 
 
 def coarse(mesh, **folding):
-    brain = {"id": "a", "week": 23, **LABELLED}
-    return list(
-        coarse_cortices(
-            resolve(load({"brains": [brain], "start": "a", "mesh": mesh, "folding": {"end_week": 24} | folding}))
-        )
-    )
+    return list(coarse_cortices(resolved(labelled(23), mesh=mesh, folding={"end_week": 24} | folding)))
 
 
 def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
@@ -207,29 +209,29 @@ def test_linear_elements_that_are_enough_are_told_with_their_error(edge_mm, fact
     assert found == ([Facts(*facts)] if facts else [])
 
 
-def test_a_look_leaves_nothing_behind(tmp_path):
-    config = tmp_path / "a.yaml"
-    config.write_text(
-        "brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\nstart: a\nfolding: {end_week: 24}\n"
-    )
+@pytest.fixture
+def config(tmp_path):
+    """The configuration of one brain."""
+    path = tmp_path / "a.yaml"
+    path.write_text(yaml.safe_dump(STUDY))
+    return path
+
+
+def test_a_look_leaves_nothing_behind(tmp_path, config):
     assert plan(config, tmp_path / "new" / "study", ["surface"])
     ((said, _),) = work_of(config, tmp_path / "new" / "study", 1, ["calibrate"])
     assert not any(character.isdigit() for character in said)
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
-def test_the_exit_code_of_an_earlier_process_with_the_same_number_does_not_count(tmp_path):
-    config = tmp_path / "a.yaml"
-    config.write_text("brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\n")
+def test_the_exit_code_of_an_earlier_process_with_the_same_number_does_not_count(tmp_path, config):
     Path(tempfile.gettempdir(), f"gyriflow-exit-{os.getpid()}").write_text("3")
     assert plan(config, tmp_path / "new", ["surface"])
 
 
 @pytest.mark.fault(75)
 @pytest.mark.parametrize("directory", ["", "/proc/self", "a.yaml/below"])
-def test_a_look_needs_no_folder_to_write_in(tmp_path, directory):
-    config = tmp_path / "a.yaml"
-    config.write_text("brains: [{id: a, week: 23, shape: {semi_axes_mm: [23, 23, 23]}}]\n")
+def test_a_look_needs_no_folder_to_write_in(tmp_path, config, directory):
     (tmp_path / ".snakemake").touch()
     assert plan(config, tmp_path / directory, ["surface"])
 
@@ -249,12 +251,6 @@ def test_a_study_is_checked_from_its_working_directory(tmp_path):
 
 
 PARAMS = "Params have changed since last execution: Union of exclusive params before and now across all output:"
-STUDY = {
-    "brains": [{"id": "a", "week": 21, "shape": {"semi_axes_mm": [20, 20, 20]}}],
-    "start": "a",
-    "mesh": {"mesher": "tetgen", "order": 1, "surface_edge_mm": 0.67, "core_edge_mm": 4.0},
-    "folding": {"end_week": 25, "step_s": 86400, "ranks": 1},
-}
 
 
 @pytest.mark.parametrize(

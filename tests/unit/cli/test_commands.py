@@ -30,11 +30,11 @@ def handed_on(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "gyriflow.yaml").touch()
 
-    def arguments(*given):
+    def arguments(*given, config="gyriflow.yaml"):
         got = []
         monkeypatch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
         assert CliRunner().invoke(main, ["run", *given]).exit_code == 0
-        assert got[:2] == ["--configfile", str(tmp_path / "gyriflow.yaml")]
+        assert got[:2] == ["--configfile", str(tmp_path / config)]
         return got[2:]
 
     return arguments
@@ -53,12 +53,7 @@ def test_any_file_may_be_the_configuration_but_results_are_targets(handed_on, tm
     for path in (result, tmp_path / name):
         path.touch()
     assert handed_on("results/study/metrics.csv")[-1] == "results/study/metrics.csv"
-    got = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(launch, "main", lambda asked: got.extend(asked) or 0)
-        assert CliRunner().invoke(main, ["run", name, "--until", "mesh"]).exit_code == 0
-    assert got[:2] == ["--configfile", str(tmp_path / name)]
-    assert got[-2:] == ["--until", "mesh"]
+    assert handed_on(name, "--until", "mesh", config=name)[-2:] == ["--until", "mesh"]
 
 
 def test_the_cores_of_this_machine_are_no_limit_to_a_cluster(handed_on):
@@ -102,16 +97,16 @@ def test_a_data_set_may_lie_in_a_folder_that_is_called_as_a_command(monkeypatch,
 
 FOUND = "fetal_SB_atlas_GA22_notoperated"
 """The id of the brain that is predicted, by the folder of its labels."""
+LABELS = str(SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz")
 
 
 @pytest.fixture
 def predicted(monkeypatch, tmp_path):
-    """Return what `gyriflow predict` says of the shipped brain of 22 GW, and hand the run's arguments on."""
+    """Return what `gyriflow predict` says, of the shipped brain of 22 GW by default, and note the run's arguments."""
     monkeypatch.setattr(launch, "main", lambda asked: (tmp_path / "asked.txt").write_text(" ".join(asked)) and 0)
-    labels = SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz"
 
-    def said(*given):
-        arguments = ["predict", str(labels), "--directory", str(tmp_path), "--cores", "3", *given]
+    def said(*given, files=(LABELS,)):
+        arguments = ["predict", *files, "--directory", str(tmp_path), "--cores", "3", *given]
         return CliRunner().invoke(main, arguments)
 
     return said
@@ -203,16 +198,10 @@ def surfaces(tmp_path_factory):
 
 
 @pytest.fixture
-def predicted_from(monkeypatch, tmp_path, surfaces):
+def predicted_from(monkeypatch, predicted, surfaces):
     """Return the outcome of `gyriflow predict` for files of that folder, in which it stands."""
-    monkeypatch.setattr(launch, "main", lambda asked: 0)
     monkeypatch.chdir(surfaces)
-
-    def outcome(*given):
-        arguments = ["predict", *given, "--until", "24.8", "--directory", str(tmp_path)]
-        return CliRunner().invoke(main, arguments)
-
-    return outcome
+    return lambda *given: predicted("--until", "24.8", files=given)
 
 
 @pytest.mark.parametrize(
@@ -271,9 +260,8 @@ def test_files_that_are_not_one_brain_to_predict_are_refused(predicted_from, tmp
 
 
 def test_labels_are_predicted_alone(predicted_from):
-    labels = str(SHIPPED / "atlases" / "spina-bifida" / FOUND / "parcellation.nii.gz")
     for more in (["brain.stl"], ["--white", "brain.stl"]):
-        done = predicted_from(labels, *more, "--week", "23")
+        done = predicted_from(LABELS, *more, "--week", "23")
         assert (done.exit_code, done.output) == (2, Facts("parcellation.nii.gz", "brain.stl"))
 
 

@@ -188,24 +188,20 @@ def test_tables_whose_content_is_not_here_are_not_passed_over(tmp_path):
     assert ages(tmp_path) == {"sub-01_ses-1": Facts(tmp_path / SESSIONS)}
 
 
-def test_decimals_that_may_be_days_are_asked_for_once(tmp_path):
+@pytest.mark.parametrize("place", ["table", "names"])
+def test_decimals_that_may_be_days_are_asked_for_once(tmp_path, place):
     texts = ("24.3", "25.1", "26.6")
-    names = [f"sub-0{number}" for number in range(3)]
-    rows = ["participant_id ga", *(" ".join(row) for row in zip(names, texts, strict=True))]
-    make_tree(tmp_path, labels=[f"{name}_dseg.nii.gz" for name in names], tables={TABLE: rows})
+    names = [f"sub-0{number}" if place == "table" else f"week{text}" for number, text in enumerate(texts)]
+    rows = [f"{name} {text}" for name, text in zip(names, texts, strict=True)]
+    tables = {TABLE: ["participant_id ga", *rows]} if place == "table" else {}
+    make_tree(tmp_path, labels=[f"{name}_dseg.nii.gz" for name in names], tables=tables)
     with pytest.raises(InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")):
         ages(tmp_path)
     assert list(ages(tmp_path, notation="decimal").values()) == [24.3, 25.1, 26.6]
     assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
-    (tmp_path / TABLE).write_text("participant_id\tga\nsub-00\t24.5\nsub-01\t25.0\nsub-02\t26.5\n")
-    assert list(ages(tmp_path).values()) == [24.5, 25.0, 26.5]
-
-
-def test_decimals_in_names_that_may_be_days_are_asked_for_too(tmp_path):
-    make_tree(tmp_path, labels=[f"week{age}_dseg.nii.gz" for age in ("24.3", "25.1", "26.6")])
-    with pytest.raises(InputError, check=Facts("24.3", "--decimal-weeks", "--weeks-days")):
-        ages(tmp_path)
-    assert list(ages(tmp_path, notation="days").values()) == [24.43, 25.14, 26.86]
+    if place == "table":
+        (tmp_path / TABLE).write_text("participant_id\tga\nsub-00\t24.5\nsub-01\t25.0\nsub-02\t26.5\n")
+        assert list(ages(tmp_path).values()) == [24.5, 25.0, 26.5]
 
 
 def test_the_age_at_birth_is_said_beside_that_of_the_scan(tmp_path):

@@ -10,9 +10,7 @@ from gyriflow.errors import InputError
 from gyriflow.geometry.matching import nearest_on
 from gyriflow.geometry.triangles import TriangleMesh, flipped, mean_edge_length, signed_volume, transformed
 
-from .bumpy import RADIUS, REAL, SMOOTH, bumpy
-
-SHARP = bumpy(1, height=2.0, sharpness=60.0)
+from .bumpy import RADIUS, REAL, SMOOTH
 
 
 def test_a_prepared_surface_has_the_observed_volume_and_pose_and_even_triangles():
@@ -26,13 +24,11 @@ def test_a_prepared_surface_has_the_observed_volume_and_pose_and_even_triangles(
     assert nearest_on(own.mesh.vertices, REAL)[0].max() < 0.1
 
 
-def test_a_prepared_surface_has_its_curvature_by_the_radius_that_is_asked_for():
+def test_a_prepared_surface_has_its_curvature():
     prepared = prepare_for_comparison(SMOOTH, SMOOTH)
     assert prepared.mean_curvature == pytest.approx(np.full(len(prepared.mesh.vertices), 1 / RADIUS), rel=0.1)
     assert prepared.shape_index == pytest.approx(np.ones(len(prepared.mesh.vertices)), abs=0.15)
     assert prepared.curvature_rms == pytest.approx(1 / RADIUS, rel=0.02)
-    fine, coarse = (prepare_for_comparison(SHARP, SHARP, radius).curvature_rms for radius in (3.0, 6.0))
-    assert coarse < 0.9 * fine
 
 
 def test_surfaces_without_a_volume_are_refused():

@@ -8,7 +8,6 @@ from gyriflow.geometry.triangles import (
     TriangleMesh,
     area,
     edges,
-    euler_number,
     face_components,
     flipped,
     is_closed,
@@ -30,14 +29,6 @@ def box():
 @pytest.fixture(scope="module")
 def ball():
     return shapes.sphere(5.0)
-
-
-def test_measures_of_a_box(box):
-    assert area(box) == pytest.approx(52.0)
-    assert signed_volume(box) == pytest.approx(24.0)
-    assert euler_number(box) == 2
-    assert is_closed(box)
-    assert signed_volume(flipped(box)) == pytest.approx(-24.0)
 
 
 def test_measures_of_a_ball_near_those_of_the_sphere(ball):
@@ -74,5 +65,6 @@ def test_components_are_numbered_by_area(ball, box):
 def test_a_mirroring_motion_keeps_the_surface_outward(box):
     mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
     assert signed_volume(transformed(box, mirror)) == pytest.approx(24.0)
+    assert signed_volume(flipped(box)) == pytest.approx(-24.0)
     shifted = transformed(box, [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
     np.testing.assert_allclose(shifted.vertices.mean(axis=0) - box.vertices.mean(axis=0), [5, 6, 7])

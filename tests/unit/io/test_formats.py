@@ -12,12 +12,13 @@ from shapes import sphere
 
 from gyriflow.cli.recognition import recognise
 from gyriflow.formats import FORMATS, is_volume
+from gyriflow.geometry.triangles import is_closed, signed_volume
 from gyriflow.io.surfaces import SURFACE_READERS, read_surface, write_surface
 from gyriflow.io.volumes import VOLUME_READERS, read_label_volume
 from gyriflow.report.page import hide_paths
 from gyriflow.settings.brains import BrainConfig
 
-BALL = sphere(20.0, 2)
+BALL = sphere(20.0, 2, (30.0, -20.0, 5.0))
 LABELS = np.zeros((4, 5, 6), dtype=np.uint8)
 LABELS[1:3, 1:4, 1:5] = 1
 
@@ -70,7 +71,9 @@ def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
     for path in paths:
         if form.content == "surface":
             surface = read_surface(path)
-            assert np.sort(surface.vertices, axis=None) == pytest.approx(np.sort(BALL.vertices, axis=None), abs=1e-4)
+            assert is_closed(surface)
+            assert signed_volume(surface) == pytest.approx(signed_volume(BALL), rel=1e-5)
+            assert np.sort(surface.vertices, axis=0) == pytest.approx(np.sort(BALL.vertices, axis=0), abs=1e-4)
         else:
             assert (read_label_volume(path).labels == LABELS).all()
         assert is_volume(path) == (form.content == "volume")

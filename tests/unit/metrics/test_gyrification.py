@@ -72,15 +72,6 @@ def test_cap_of_half_a_sphere() -> None:
     np.testing.assert_array_equal(closed.faces[: len(half.faces)], half.faces)
 
 
-def test_cut_is_left_out_of_the_index() -> None:
-    half = half_sphere()
-    hull = convex_hull(half)
-    assert area(hull) == pytest.approx(3 * np.pi * 25.0**2, rel=0.01)
-    assert pieces_over(hull, half).areas.sum() == pytest.approx(2 * np.pi * 25.0**2, rel=0.01)
-    assert index(half, hull) == pytest.approx(1.0, abs=0.02)
-    assert index(half, envelope(half)) == pytest.approx(1.0, abs=0.03)
-
-
 @pytest.mark.parametrize("pit", [1.0, 3.0, 6.0, -1.0, -3.0, -6.0])
 def test_what_spans_a_cut_in_a_pit_or_on_a_neck_is_left_out(pit: float) -> None:
     radius, cut = 25.0, 8.0

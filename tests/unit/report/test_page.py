@@ -279,14 +279,10 @@ def test_a_page_says_what_its_centiles_are_worth():
 
 
 def test_a_brain_has_a_page_of_its_own():
-    warnings = pd.DataFrame(
-        {"subject": ["young", "other"], "run": np.nan, "step": "s", "level": "warning", "message": ["own", "other's"]}
-    )
+    warnings = pd.DataFrame({"subject": ["young"], "run": np.nan, "step": "s", "level": "warning", "message": "own"})
     tables = Tables(**TABLES | {"warnings": warnings})
     text = written(brain_page(BRAINS[0], tables, shown("quality"), norm="the norm"))
-    assert elements(text, "h1") == [Facts("young")]
     assert 'href="../report.html"' in text
-    assert "other&#39;s" not in text
     assert text.index(">own<") < text.index("<h2>quality") < text.index("<th>left</th>")
     # both hemispheres and where the brain stands
     assert re.search(r"pial area \(cm²\)</td>.*90<.*44<.*−10.0 %", text)

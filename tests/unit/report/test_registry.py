@@ -15,7 +15,6 @@ from gyriflow.growth.rates import growth_per_week, growth_sd
 from gyriflow.io.files import write_json, write_table
 from gyriflow.io.frames import read_pial_frames
 from gyriflow.report.page import caption_html
-from gyriflow.report.pictures import displacements
 from gyriflow.shipped import DEMO, SHIPPED
 from gyriflow.study import figures, resolve
 from gyriflow.study.figures import figures_of
@@ -186,14 +185,6 @@ def frames(tmp_path):
             group["growth_direction_per_step"] = np.eye(5, 3)
             group["cell_fields/J"] = np.ones(4)
     return str(path)
-
-
-def test_displacement_is_between_the_weeks_on_the_later_surface(frames):
-    ((interval, (surface, norms)),) = displacements(read_pial_frames(frames)).items()
-    assert interval == (21.0, 22.0)
-    # without the node inside
-    assert sorted(norms) == pytest.approx([0, 2, 2, 2])
-    assert surface.vertices.max() == pytest.approx(12)
 
 
 def test_growth_is_that_of_a_week_up_to_the_later_frame(frames):

@@ -19,15 +19,6 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
 
-def test_defaults_are_the_reference_values():
-    config = load(study())
-    run = config.runs["reference"]
-    assert (run.thickness_mm, run.poisson_ratio, run.growth_rate_per_s, run.step_s) == (1.5, 0.45, 2e-7, 43200)
-    (one,) = resolve(config).run_simulations
-    assert (one.run, one.start.id, one.weeks) == ("reference", "a", (21, 22, 23, 24))
-    assert [brain.source for brain in config.brains] == ["labels", "labels"]
-
-
 @pytest.mark.fault(27)
 def test_all_mistakes_are_named_at_once():
     wrong = study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}, start="a")
@@ -49,7 +40,6 @@ def test_all_mistakes_are_named_at_once():
 @pytest.mark.parametrize(
     ("folding", "key", "facts"),
     [
-        ({"poisson_ratio": 0.5}, "poisson_ratio", [0.5]),
         ({"thickness_mm": 0}, "thickness_mm", [0]),
         ({"thickness_mm": {"weeks": {21: True}}}, "thickness_mm.weeks", [21, True]),
         ({"thickness_mm": {"map": "x.shape.gii"}}, "thickness_mm.map", ["x.shape.gii"]),

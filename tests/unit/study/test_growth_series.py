@@ -1,4 +1,4 @@
-"""Which brains growth is measured on, whose surfaces match by their vertices, and which are references of norms."""
+"""Which brains growth is measured on, whose surfaces match by their vertices, and which are individuals."""
 
 import pytest
 from configurations import LABELLED, both_kinds, labelled, resolved, series_for, series_of, study, touched
@@ -116,40 +116,10 @@ def test_hemispheres_that_are_alone_share_no_growth_curve_with_brains_of_other_s
     assert series_for(found, "left24") == "left hemisphere, surface"
 
 
-BRAINS = [{"id": f"p{week}", "week": week, **LABELLED} for week in (21, 22, 25)]
-
-
-def asked(brains=None, runs=None, **metrics: object) -> dict:
-    return {"brains": brains or BRAINS, "start": "p21", "folding": {"end_week": 22}, "metrics": metrics} | (
-        {"runs": runs} if runs else {}
-    )
-
-
-@pytest.fixture
-def volume(tmp_path) -> str:
-    (tmp_path / "regions.nii.gz").touch()
-    return str(tmp_path / "regions.nii.gz")
-
-
-def test_the_norm_is_of_all_measured_brains_of_one_kind():
-    assert resolve(load(asked())).norm_reference == ["p21", "p22", "p25"]
-    assert resolve(load(asked(norm_reference=["p22"]))).norm_reference == ["p22"]
-
-
-def test_the_norm_is_of_real_brains_where_there_are_any_and_never_of_simple_shapes(tmp_path):
-    (tmp_path / "a.stl").touch()
-    real = [{"id": f"r{week}", "week": week, "pial": str(tmp_path / "a.stl")} for week in (21, 22)]
-    shapes = [{"id": f"s{week}", "week": week, "shape": {"semi_axes_mm": [23, 23, 23]}} for week in (21, 22)]
-    assert resolve(load(asked([*shapes, *real]) | {"start": "s21"})).norm_reference == ["r21", "r22"]
-    assert resolve(load(asked([*BRAINS, *real], norm_reference=["p22", "r21"]))).norm_reference == ["p22", "r21"]
-    assert resolve(load(asked(shapes) | {"start": "s21"})).norm_reference == []
-
-
-def test_averages_are_no_individuals(volume):
+def test_averages_are_no_individuals():
     atlas = {"name": "spina-bifida", "series": "operated", "weeks": [25, 26]}
-    own = {"labels": volume, "scheme": "feta-7"}
-    brains = [{"id": f"s{week}", "week": week, "subject": f"s{week}", **own} for week in (21, 23)]
-    brains += [{"id": f"n{week}", "week": week, **own} for week in (21, 21.4, 23)]
+    brains = [{"id": f"s{week}", "week": week, "subject": f"s{week}", **LABELLED} for week in (21, 23)]
+    brains += [{"id": f"n{week}", "week": week, **LABELLED} for week in (21, 21.4, 23)]
     found = resolve(load({"brains": brains, "atlas": atlas, "metrics": {"norm_reference": ["spina-bifida"]}}))
     assert found.norm_reference == ["spina-bifida-operated-25", "spina-bifida-operated-26"]
     assert not found.are_individuals(found.norm_reference)
@@ -158,10 +128,9 @@ def test_averages_are_no_individuals(volume):
     assert found.are_individuals(["n21", "n21.4", "n23"])
 
 
-def test_charts_are_coloured_by_a_covariate_that_groups_subjects(volume):
-    own = {"labels": volume, "scheme": "feta-7", "week": 21}
+def test_charts_are_coloured_by_a_covariate_that_groups_subjects():
     covariates = [{"site": "x", "mother": str(number), "sex": "FM"[number % 2]} for number in range(3)]
-    brains = [{"id": f"b{n}", "covariates": values, **own} for n, values in enumerate(covariates)]
+    brains = [{"id": f"b{n}", "week": 21, "covariates": values, **LABELLED} for n, values in enumerate(covariates)]
     coloured = {}
     for wanted in (None, "mother"):
         found = resolve(load({"brains": brains, "metrics": {"colour_by": wanted}}))

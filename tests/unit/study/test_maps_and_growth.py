@@ -1,17 +1,15 @@
 """Maps and growth in a configuration: what the steps of the workflow are handed."""
 
 import pytest
-from configurations import LABELLED, both_kinds, problems
+from configurations import both_kinds, labelled, problems
 from facts import Facts
 
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
-BRAINS = [{"id": "a", "week": 21, **LABELLED}, {"id": "b", "week": 22, **LABELLED}, {"id": "c", "week": 22, **LABELLED}]
-
 
 def study(folding, **others):
-    return {"brains": BRAINS, "start": "a", "folding": {"end_week": 24} | folding, **others}
+    return {"brains": labelled(21, 22, 22), "start": "a", "folding": {"end_week": 24} | folding, **others}
 
 
 def test_a_map_goes_by_its_parameters_name_and_its_files_stand_apart(tmp_path):

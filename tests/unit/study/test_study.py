@@ -94,20 +94,26 @@ def test_maps_are_made_for_the_runs_that_have_any(files, labels):
     found = study([labels(21), labels(24)], runs=runs, calibrate=search)
     maps = {run: found.simulations[run, "b21"].maps for run in runs}
     assert maps == {"plain": []} | {run: f"results/runs/{run}/b21/folding/maps.h5" for run in list(runs)[1:]}
-    assert {run: list(found.simulations[run, "b21"].mapped) for run in ("thick", "soft", "shapes")} == {
-        "thick": ["thickness_mm"],
-        "soft": ["shear_modulus_core_pa"],
-        "shapes": [],
-    }
     # runs of the calibration have the maps of its base
     assert found.simulations["calibration-00", "b21"].maps == maps["soft"]
 
 
-def test_measured_sizes_are_waited_for_by_the_runs_that_follow_them(real):
-    runs = {"plain": {}, "given": {"growth": SIZES}, "measured": {"growth": SIZES | {"volume_ml": "measured"}}}
-    found = study(real, runs=runs).run_simulations
-    assert [one.curves for one in found] == [[], [], CURVES["curves"]]
-    assert [one.followed_series for one in found] == [None, None, "volume"]
+@pytest.mark.parametrize(
+    ("growth", "curves", "series", "kind", "follows_registration"),
+    [
+        ({}, [], None, "predicted", False),
+        (SIZES, [], None, "predicted", False),
+        (SIZES | {"volume_ml": "measured"}, CURVES["curves"], "volume", "explained", False),
+        # its sizes come from its shapes
+        ({"model": "shapes"}, [], None, "explained", True),
+    ],
+)
+def test_a_run_waits_for_the_sizes_that_it_follows_and_is_explained_by_measured_growth(
+    real, growth, curves, series, kind, follows_registration
+):
+    (one,) = study(real, runs={"r": {"growth": growth}}).run_simulations
+    assert (one.curves, one.followed_series) == (curves, series)
+    assert (one.kind, one.follows_registration) == (kind, follows_registration)
 
 
 # brains that were refused
@@ -146,7 +152,9 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     assert ids(found.sweeps["thick"].observed["b21"]) == ["twin"]
     assert found.simulations["reference", "b21"].observed == {24: found.brains["twin"]}
     assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
-    assert {tuple(row["template_maps"]) for row in found.exported} == {()}
+    # maps are brought to a template that is there
+    in_both = study(real[:3], metrics={"template": "b23"}), found
+    assert [{len(row["template_maps"]) for row in one.exported} for one in in_both] == [{2}, {0}]
     # nothing is left where no start is
     search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
@@ -238,14 +246,6 @@ def test_synthetic_brains_are_measured_beside_each_other_but_tell_nothing_of_wor
     assert alone.growth_brains == alone.validated == []
 
 
-def test_a_week_is_explained_by_growth_that_knows_it_and_else_predicted(real):
-    runs = {"plain": {}, "given": {"growth": SIZES}, "sizes": {"growth": "sizes"}, "shapes": {"growth": "shapes"}}
-    found = study(real, runs=runs).run_simulations
-    assert [one.kind for one in found] == ["predicted", "predicted", "explained", "explained"]
-    # only there its displacement is that of the registrations
-    assert [one.follows_registration for one in found] == [False, False, False, True]
-
-
 # the brains behind a run's growth
 
 
@@ -257,8 +257,6 @@ def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(rea
     assert chain.correspondences[0] == "results/study/registration/b21/b22.h5"
     assert found.registered_starts == ["b21"]
     assert [one.targets for one in found.run_simulations] == ["results/brains/b21/mesh/targets.self.h5", []]
-    # sizes come from the shapes
-    assert found.simulations["a", "b21"].curves == []
 
 
 @pytest.mark.parametrize(
@@ -466,14 +464,6 @@ def test_a_prediction_is_described_by_its_weeks_its_atlas_and_its_files(of_two):
     assert study(of_two(22), runs=EXPECTED["runs"] | {"plain": {}}).prediction_facts is None
 
 
-def test_what_real_brains_are_compared_with_is_what_was_expected_of_them_at_their_age(of_two):
-    (expected,) = study(of_two(22, 23, 24), **EXPECTED).atlas_predictions
-    assert ids(expected.observed.values()) == ["own23", "own24"]
-    # whose growth is its own explains
-    own = study(of_two(22, 23, atlas=()), runs={"a": {"preset": "measured"}}, folding={"end_week": 23})
-    assert own.atlas_predictions == []
-
-
 # studies and calibration
 
 
@@ -513,14 +503,9 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
 
 
 def test_named_sulci_are_those_of_real_whole_brains(real):
-    sphere = {"id": "sphere", "week": 22, **SPHERE}
-    found = study([*real, sphere])
+    brains = [*real, {"id": "sphere", "week": 22, **SPHERE}]
+    found = study(brains)
     assert [brain.regions_from for brain in found.brains.values()] == ["named"] * 4 + [None]
     assert [one.regions for one in found.measurements.values()] == [{}] * len(found.measurements)
-    everywhere = study([*real, sphere], metrics={"regions": "named_sulci"}).brains.values()
+    everywhere = study(brains, metrics={"regions": "named_sulci"}).brains.values()
     assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
-
-
-def test_maps_are_brought_to_a_template_that_is_there(labels):
-    found = study([labels(21), labels(22)], metrics={"template": "b22"})
-    assert {len(one["template_maps"]) for one in found.exported} == {2}

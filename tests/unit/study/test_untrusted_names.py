@@ -94,15 +94,13 @@ def test_an_atlas_with_plain_names_is_fetched_into_its_folder(tmp_path, monkeypa
 
 
 @pytest.mark.fault(59)
-@pytest.mark.parametrize("name", ["../x", "/tmp/x", ".", "a/b", "-x"])
-def test_an_atlas_has_a_plain_name(tmp_path, name):
-    assert "atlas.yaml: name: " in refusal(with_atlas(tmp_path, name=name), tmp_path)
-
-
-@pytest.mark.fault(59)
-@pytest.mark.parametrize("url", ["file:///etc", "ftp://x", "javascript:x", "--output=x"])
-def test_an_atlas_is_on_the_web(tmp_path, url):
-    assert "atlas.yaml: url: " in refusal(with_atlas(tmp_path, url=url), tmp_path)
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("name", name) for name in ("../x", "/tmp/x", ".", "a/b", "-x")]
+    + [("url", url) for url in ("file:///etc", "ftp://x", "javascript:x", "--output=x")],
+)
+def test_an_atlas_has_a_plain_name_and_is_on_the_web(tmp_path, key, value):
+    assert f"atlas.yaml: {key}: " in refusal(with_atlas(tmp_path, **{key: value}), tmp_path)
 
 
 @pytest.mark.fault(58)

@@ -96,6 +96,10 @@ def test_the_norm_is_of_the_population_and_the_hemispheres_of_the_first_start():
     assert resolved(brains, start="half").norm_reference == ["half"]
     named = {"metrics": {"norm_reference": ["ill21", "half", "well22"]}}
     assert resolved(brains, start="well22", **named).norm_reference == ["ill21", "well22"]
+    # whatever their files are, and never of simple shapes
+    unknown = [sphere("ball", 21), *labelled(21, 22), {"id": "surface", "week": 23, "pial": __file__}]
+    assert resolved(unknown, start="ball").norm_reference == ["a", "b", "surface"]
+    assert resolved(unknown[:1], start="ball").norm_reference == []
 
 
 @pytest.mark.parametrize(("subjects", "drawn"), [(9, False), (10, True)])
