@@ -25,8 +25,7 @@ from scipy.sparse.linalg import cg
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding, advance
 from gyriflow.folding.step_fields import von_mises
-from gyriflow.folding.stress import packed, unpacked
-from gyriflow.folding.stretches import log_stretch
+from gyriflow.folding.stretches import log_stretch, packed, unpacked
 from gyriflow.folding.targets import TargetGrowth, shapes_of_run
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.geometry.alignment import rigid_fit
