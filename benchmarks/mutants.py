@@ -181,7 +181,7 @@ BY_TESTS = {
         ("src/gyriflow/io/vtk_files.py", 'content, "<i4"', 'content, ">i4"'),
     ],
     # simulations, jobs and exit codes
-    "folding/test_stress.py": [("src/gyriflow/folding/stress.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
+    "folding/test_stress.py": [("src/gyriflow/folding/stretches.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
     "cli/test_scan_ages.py": [
         ("src/gyriflow/study/participants.py", "is_only_scan &= len({*sessions, session} - {None}) < 2", "pass"),
     ],

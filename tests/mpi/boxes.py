@@ -77,10 +77,10 @@ class EvenGrowth(StepGrowth):
         return np.tile(np.eye(3) / (1 + self.by), (len(elements.cells), len(elements.points.weights), 1, 1))
 
 
-def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, degree=None, comm=COMM):
+def problem_on(mesh, zones, mu=1000.0, dg=0.0, dr=0.0, normals=None, comm=COMM):
     """Return a problem with layers that are uniform, or nodal functions of the position in m."""
     domain = Domain(comm, mesh)
-    problem = NonlinearProblem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M, quadrature_degree=degree)
+    problem = NonlinearProblem(domain, zones, MATERIAL, penalty_pa_per_m=PENALTY_PA_PER_M)
     x = domain.local(domain.positions)
 
     def nodal(value):

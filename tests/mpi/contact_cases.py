@@ -105,11 +105,11 @@ def test_a_surface_that_crosses_itself_is_refused():
 def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
     mesh = two_blocks(gap=0.5)
     _, contact = problem_with_contact(mesh, in_a_tube(mesh), None)
-    before = contact.barrier.distance_mm
+    before = contact.distance_mm
     assert before == pytest.approx(0.2 * 1.4, rel=0.15)
     contact.domain.place(1.5 * contact.domain.positions)
     contact.begin_step()
-    assert contact.barrier.distance_mm == pytest.approx(1.5 * before)
+    assert contact.distance_mm == pytest.approx(1.5 * before)
 
 
 def test_no_pair_is_missed_where_the_distance_has_grown():

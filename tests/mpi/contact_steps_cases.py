@@ -22,6 +22,7 @@ from verification_cases.mirrored import block, folded, hemisphere, rounded
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding
+from gyriflow.folding.step_fields import step_fields
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from gyriflow.settings.folding import parameters_from
@@ -88,7 +89,7 @@ def test_blocks_near_each_other_that_do_not_grow_do_not_move(support):
     if support == "box":
         mesh = two_blocks(gap=0.1)
         folding = Folding(COMM, mesh, in_a_tube(mesh), folding.parameters)
-    assert folding.contact.barrier.distance_mm < 0.1
+    assert folding.contact.distance_mm < 0.1
     after = folding.step(state, state.step_s)
     assert (after.positions == state.positions).all()
     assert after.rows[-1]["newton"] == 0
@@ -148,8 +149,8 @@ def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_t
     rates = []
     for step_s in (86400.0, 43200.0, 21600.0):
         folding, state = pressed(step_s)
-        fields = folding.fields.elements(["stress", "strain"], folding.solved)
-        fields |= folding.fields.contact_pressure(["contact_pressure"], folding.solved)
+        at_vertices, of_elements = step_fields(folding, ["stress", "strain", "contact_pressure"])
+        fields = of_elements | at_vertices
         at = two_blocks(upper=(4, 3, 3)).vertices
         inside = np.isclose(np.abs(at[:, 2]), GAP_MM / 2) & (np.abs(at[:, :2]).max(axis=1) < SIDE_MM / 2 - 1e-6)
         contact = fields["contact_pressure_pa_per_gw"][inside].mean()
@@ -215,7 +216,7 @@ def test_few_vertices_at_a_hundredth_of_a_mm_are_pressed_apart_and_do_not_set_th
 ):
     folding, state = vertices_pulled_near(gap, count)
     # that of the edges, or a quarter of the gap of the rest
-    assert folding.contact.barrier.distance_mm == pytest.approx(distance_mm, rel=0.1)
+    assert folding.contact.distance_mm == pytest.approx(distance_mm, rel=0.1)
     after = folding.step(state, state.step_s)
     assert after.rows[-1]["min_distance_mm"] > 0.5 * distance_mm
     assert after.rows[-1]["min_J"] > 0.9
@@ -235,6 +236,6 @@ def test_where_few_vertices_start_at_a_hundredth_of_a_mm_nothing_crosses_as_it_g
 
 def test_a_small_gap_of_all_sets_the_contact_distance_and_nothing_moves():
     folding, state = vertices_pulled_near(0.03, 2)
-    assert folding.contact.barrier.distance_mm == pytest.approx(0.01, rel=0.01)
+    assert folding.contact.distance_mm == pytest.approx(0.01, rel=0.01)
     after = folding.step(state, state.step_s)
     assert (after.positions == state.positions).all()

@@ -24,7 +24,7 @@ from gyriflow.folding.checkpoint import State
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.problem import NonlinearProblem
 from gyriflow.folding.simulation import Folding
-from gyriflow.folding.stress import packed, unpacked
+from gyriflow.folding.stretches import packed, unpacked
 from gyriflow.geometry.tetrahedra import signed_volumes, volumes_between
 from gyriflow.mechanics.materials import MATERIALS
 from gyriflow.settings.folding import parameters_from

@@ -298,7 +298,7 @@ def following(growth):
     mesh = ellipsoid_mesh(8, (20.0, 24.0, 18.0))
     weeks = {"start_week": 21.0, "end_week": 23.0, "output_weeks": [21.0, 23.0], "fissure_x_mm": 0.0, "step_s": DAY_S}
     weeks |= {"support": "free", "no_growth": {"kind": "none"}, "contact": {"kind": "none"}, "thickness_mm": 4.0}
-    start = GrowthInputs.of(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(mesh.vertices)
+    start = GrowthInputs(mesh, zones_of_run(mesh, parameters_from(weeks)), {}).size(mesh.vertices)
     sizes = {"area_cm2": start.area_mm2 * CM2_PER_MM2, "volume_ml": start.volume_mm3 * ML_PER_MM3}
     curves = {
         name: {21.0: size, 23.0: size * math.exp(2 * rate)}

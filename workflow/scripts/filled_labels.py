@@ -1,7 +1,6 @@
 """Fill the surfaces of a brain without labels to a label volume for its registration."""
 
-from gyriflow.anatomy.filled import TYPICAL_THICKNESS_MM, TYPICAL_VOXEL_MM, filled_labels
-from gyriflow.anatomy.thickness import posed_whites
+from gyriflow.anatomy.thickness import TYPICAL_THICKNESS_MM, TYPICAL_VOXEL_MM, filled_labels, posed_whites
 from gyriflow.io.files import read_json
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.volumes import LabelVolume, write_label_volume

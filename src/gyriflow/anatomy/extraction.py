@@ -168,7 +168,7 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
             # an earlier change may have touched this patch
             patch = patch & (mask[box] != fills)
             changed = np.where(patch, fills, mask[box])
-            if remaining == 0 or not patch.any() or _euler_gain(mask[box], changed) <= 0:
+            if remaining == 0 or not patch.any() or _euler_number(changed) <= _euler_number(mask[box]):
                 continue
             if removed := _change(mask, box, _minimal_change(mask[box], changed, field[box]), closed_by):
                 remaining -= removed
@@ -245,7 +245,7 @@ def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) 
         before, after = mask[wide], mask[wide].copy()
         after[inner] = changed
         after = ndimage.binary_fill_holes(after, closed_by)
-        gain = _euler_gain(before, after)
+        gain = _euler_number(after) - _euler_number(before)
         # the frame connects everything that reaches the border of the box
         framed = [ndimage.label(np.pad(state, 1, constant_values=True), INSIDE)[1] for state in (before, after)]
         if gain <= 0 or framed[0] < framed[1]:
@@ -275,10 +275,6 @@ def _pairs(mask: Mask, axis: int) -> Mask:
 
 def _euler_number(mask: Mask) -> int:
     return int(_euler_cells(mask).sum(dtype=np.int64))
-
-
-def _euler_gain(before: Mask, after: Mask) -> int:
-    return _euler_number(after) - _euler_number(before)
 
 
 def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import ndimage
 from scipy.optimize import minimize
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull, cKDTree
 from scipy.spatial.transform import Rotation
 from skimage.segmentation import watershed
@@ -387,18 +387,17 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
         if low <= 1 - MIN_SHARE_ON_SIDE and high >= MIN_SHARE_ON_SIDE:
             middles = np.bincount(surface, weights=areas * heights) / sizes
             return np.asarray(middles < 0)[surface]
-    a, b = igl.facet_adjacency_matrix(mesh.faces).nonzero()
+    adjacent = igl.facet_adjacency_matrix(mesh.faces)
+    a, b = adjacent.nonzero()
     within = side[a] == side[b]
-    piece = connected_components(_links(a[within], b[within], len(side)), directed=False)[1]
+    piece = triangles.connected(np.stack([a[within], b[within]], axis=1), len(side))
     area = np.bincount(piece, weights=areas)
     largest = [
         piece[side == part][area[piece[side == part]].argmax()] for part in (True, False) if (side == part).any()
     ]
     # strays go to the nearest of the largest pieces, so that each of these stays in one piece
     main = np.flatnonzero(np.isin(piece, largest))
-    _, _, start = dijkstra(
-        _links(a, b, len(side)), indices=main, return_predecessors=True, unweighted=True, min_only=True
-    )
+    _, _, start = dijkstra(adjacent, indices=main, return_predecessors=True, unweighted=True, min_only=True)
     assigned = side[np.where(start < 0, np.arange(len(side)), start)]
     share = float(areas[assigned != side].sum() / areas.sum())
     if share > MAX_BULGE_SHARE:
@@ -406,10 +405,6 @@ def left_faces(mesh: TriangleMesh, heights: Floats) -> Mask:
         expected = f"at most {100 * MAX_BULGE_SHARE:.0f} %"
         raise InputError("the surface cannot be split at the fissure", found=found, expected=expected)
     return assigned
-
-
-def _links(first: Ints, second: Ints, size: int) -> sparse.csr_matrix:
-    return sparse.csr_matrix((np.ones(len(first)), (first, second)), shape=(size, size))
 
 
 def largest_pieces(mesh: TriangleMesh, sides: Mapping[Side, Mask], to_file: Floats) -> tuple[Mask, list[str]]:

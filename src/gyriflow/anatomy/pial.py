@@ -20,9 +20,16 @@ from . import extraction, fissure, plausible, repair
 from . import pose as posing
 from .extraction import LEVEL, Floats, Mask
 from .fissure import MidPlane
-from .hindbrain import pose_of_labels
-from .labels import MIN_CORTEX_OUTSIDE, REPORTED_LOSS, Cerebrum, Labels, read_cerebrum, require_sides
-from .layout import layout_of, scheme_contradictions
+from .labels import (
+    MIN_CORTEX_OUTSIDE,
+    REPORTED_LOSS,
+    Cerebrum,
+    Labels,
+    layout_of,
+    read_cerebrum,
+    require_sides,
+    scheme_contradictions,
+)
 from .repair import RepairedSurface
 from .sulci import open_fused_sulci
 from .thickness import MIN_VOXELS, border, voxels_through_cortex
@@ -135,7 +142,7 @@ def _read_volume(
     cerebrum = read_cerebrum(labels, affine, scheme, 0.0 if side else MIN_CORTEX_OUTSIDE)
     brain.report |= {"scheme": scheme.name, **cerebrum.report}
     brain.warn(cerebrum.warnings)
-    pose = None if side else pose_of_labels(labels, affine, scheme)
+    pose = None if side else posing.pose_of_labels(labels, affine, scheme)
     labelled = np.intersect1d(cerebrum.tissue, scheme.cortex or scheme.cerebrum)
     sides = [name for name, numbers in (("left", scheme.left), ("right", scheme.right)) if {*labelled} & {*numbers}]
     if side and set(sides) - {side}:
@@ -310,7 +317,13 @@ def from_hemispheres(
         is_cap=np.concatenate([part.is_cap for part in parts]),
     )
     plane = fissure.mid_plane(surface.mesh, named=named)
-    plausible.require_common_pose(plane.asymmetry_mm, max_asymmetry * length)
+    if plane.asymmetry_mm > max_asymmetry * length:
+        raise InputError(
+            "the hemispheres are not posed as one brain",
+            found=f"{plane.asymmetry_mm:.1f} mm between the surface and its mirror image",
+            expected=f"at most {max_asymmetry * length:.1f} mm",
+            remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
+        )
     is_left = np.arange(len(surface.mesh.faces)) < len(parts[0].mesh.faces)
     return _two_pieces(surface, is_left, plane, pose, brain, named=named)
 

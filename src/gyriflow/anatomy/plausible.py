@@ -183,17 +183,6 @@ def facing_warnings(left: TriangleMesh, right: TriangleMesh, to_right: Floats) -
     return [f"the medial walls do not face each other: they are shifted by {shift:.1f} mm. Are both in one space?"]
 
 
-def require_common_pose(asymmetry_mm: float, max_mm: float) -> None:
-    """Raise InputError if two hemispheres are further from their mirror image than `max_mm`, on average."""
-    if asymmetry_mm > max_mm:
-        raise InputError(
-            "the hemispheres are not posed as one brain",
-            found=f"{asymmetry_mm:.1f} mm between the surface and its mirror image",
-            expected=f"at most {max_mm:.1f} mm",
-            remedy="Give both of one subject in the same coordinates; if they are, set surface.asymmetric to true.",
-        )
-
-
 def thickness_jumps(series: Iterable[tuple[str, float, float]]) -> list[str]:
     """Return warnings of brains (name, week, mean mm or NaN) next in age with very different thickness."""
     measured = sorted((brain for brain in series if brain[2] > 0), key=lambda brain: brain[1])

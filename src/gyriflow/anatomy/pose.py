@@ -1,18 +1,22 @@
-"""Estimate the pose of a surface from its shape. Left hemispheres are mirrored here and treated as right ones."""
+"""Estimate the pose of a surface from its shape, and of a label volume from hindbrain and labelled sides, or its shape.
 
-from collections.abc import Sequence
+Left hemispheres are mirrored here and treated as right ones.
+"""
+
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.alignment import MIRROR, RigidFit, angle_deg, motion
+from ..geometry.alignment import CUBE_ROTATIONS, MIRROR, RigidFit, angle_deg, motion
 from ..geometry.poses import CONVENTIONS, Pose, turned
-from ..geometry.triangles import Floats, TriangleMesh, transformed
+from ..geometry.triangles import Floats, TriangleMesh, transformed, unit
+from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
 from . import template
-from .hindbrain import MIN_TURN_DEG, pose_from_rotation
 from .template import PointCloud
 
 # a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
@@ -32,16 +36,36 @@ DECLARED_TURN_DEG = 30.0
 WALL_DISTANCE_MM = 0.5
 # decimals of reported values: rounding a rotation moves no point of a brain by a micrometre
 DIGITS = 6
+# from the cerebrum's centre to those of cerebellum and brainstem, RAS+: means over weeks 21 to 34 of the example atlas
+EXPECTED = {"cerebellum": np.array([0.0, -0.58, -0.81]), "brainstem": np.array([0.0, -0.30, -0.95])}
+# minimum of these distances, in cube roots of the cerebrum's volume; 0.37 or more in weeks 21 to 36
+MIN_HINDBRAIN_DISTANCE = 0.25
+# labelled sides weigh as much as the hindbrain
+TO_RIGHT = np.array([1.0, 0.0, 0.0])
+# smaller rotations are left as in the file: atlases and scans differ by as much
+MIN_TURN_DEG = 60.0
+# rotations between this and MIN_TURN_DEG are left with a warning
+DOUBTFUL_TURN_DEG = 15.0
+PITCH_KEPT = "its mid-plane is set upright, its pitch is kept; check the file's axes"
+# without labelled sides a rotated brain cannot be distinguished from a mirrored one
+MIRROR_WARNING = (
+    "if an axis of its array is reversed instead, or two are exchanged, left and right are wrong now: check them"
+)
+# two directions closer than this (radians) do not determine the rotation about them
+MIN_SPREAD = 0.06
+# a rotation this close to quarter turns is taken for quarter turns, as caused by wrong axis codes
+QUARTERS_DEG = 15.0
 
 
 @dataclass(frozen=True, eq=False)
-class Hemisphere:
-    """A right hemisphere, or a mirrored left one, with the pose estimated from its shape.
+class PosedShape:
+    """A right hemisphere, a mirrored left one, or a brain, by its `kind`, with the pose estimated from its shape.
 
     `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
     is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape.
     """
 
+    kind: Literal["hemisphere", "brain"]
     shape: PointCloud
     rotation: Floats
     wall_mm: float
@@ -54,16 +78,17 @@ class Hemisphere:
         return self.confidence >= MIN_CONFIDENCE and self.residual <= MAX_RESIDUAL
 
 
-def hemisphere_by_shape(mesh: TriangleMesh) -> Hemisphere:
+def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     """Estimate the pose of a right hemisphere (or a mirrored left one) from its shape, even if it is not clear."""
     shape = template.shape_of(mesh)
-    fit, confidence = template.register_from_all_sides(shape, template.hemispheres())
-    mirrored, _ = template.register_from_all_sides(shape.mirrored(), template.hemispheres())
+    templates = template.template_shapes("hemisphere")
+    fit, confidence = template.register_from_all_sides(shape, templates)
+    mirrored, _ = template.register_from_all_sides(shape.mirrored(), templates)
     normal, offset = template.medial_wall(shape, -fit.rotation[0])
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
-    return Hemisphere(shape, rotation, wall_mm, fit.residual, confidence, side_ratio)
+    return PosedShape("hemisphere", shape, rotation, wall_mm, fit.residual, confidence, side_ratio)
 
 
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
@@ -77,10 +102,7 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     _require_sides(shapes)
     if not all(hemisphere.is_clear for hemisphere in shapes):
-        poses = [
-            _pose_as_ras(hemisphere, template.hemispheres(), f"{side} hemisphere")
-            for hemisphere, side in zip(shapes, SIDES, strict=True)
-        ]
+        poses = [_pose_as_ras(shape, f"{side} {shape.kind}") for shape, side in zip(shapes, SIDES, strict=True)]
         return poses[0]
     mirrored_left, own_right = shapes
     fit = template.register(mirrored_left.shape, [own_right.shape], own_right.rotation.T @ mirrored_left.rotation)
@@ -124,11 +146,11 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
     )
 
 
-def _mean_side_ratio(shapes: list[Hemisphere]) -> float:
+def _mean_side_ratio(shapes: list[PosedShape]) -> float:
     return float(np.exp(np.mean(np.log([shape.side_ratio for shape in shapes]))))
 
 
-def _require_sides(shapes: list[Hemisphere]) -> None:
+def _require_sides(shapes: list[PosedShape]) -> None:
     ratios = [shape.side_ratio for shape in shapes]
     found = f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from the other side's template"
     if min(ratios) < 1 / MIN_SIDE_RATIO and max(ratios) > MIN_SIDE_RATIO:
@@ -142,15 +164,15 @@ def _require_sides(shapes: list[Hemisphere]) -> None:
         )
 
 
-def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: str) -> Pose:
+def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
     """Return the file's pose for a shape that fits several; InputError if it fits clearly worse near RAS+."""
-    fit = template.register(hemisphere.shape, targets, np.eye(3))
-    fits_ras = fit.residual < MIN_CONFIDENCE * hemisphere.residual and fit.residual <= MAX_RESIDUAL
+    fit = template.register(shape.shape, template.template_shapes(shape.kind), np.eye(3))
+    fits_ras = fit.residual < MIN_CONFIDENCE * shape.residual and fit.residual <= MAX_RESIDUAL
     if not fits_ras or angle_deg(fit.rotation) >= CONVENTION_DEG:
-        next_best = f"the next best pose has {hemisphere.confidence:.2f} times as much"
+        next_best = f"the next best pose has {shape.confidence:.2f} times as much"
         raise InputError(
-            f"the pose of the {what} cannot be determined from its shape",
-            found=f"a residual of {hemisphere.residual:.3f}; {next_best}",
+            f"the pose of the {name} cannot be determined from its shape",
+            found=f"a residual of {shape.residual:.3f}; {next_best}",
             expected=f"at most {MAX_RESIDUAL}, and at least {MIN_CONFIDENCE} times; or a pose near RAS",
             remedy="Is it the closed pial surface of a cerebrum? If so, pose it and set coordinates: ras or lps.",
         )
@@ -158,7 +180,7 @@ def _pose_as_ras(hemisphere: Hemisphere, targets: Sequence[PointCloud], what: st
     return Pose(by="default", warnings=(doubt,))
 
 
-def _motions(left: Hemisphere, right: Hemisphere, fit: RigidFit) -> tuple[Floats, Floats]:
+def _motions(left: PosedShape, right: PosedShape, fit: RigidFit) -> tuple[Floats, Floats]:
     # offset between the centres of volume of both posed hemispheres, the left one mirrored
     offset = right.rotation @ fit.shift * right.shape.size_mm
     posed = []
@@ -168,14 +190,14 @@ def _motions(left: Hemisphere, right: Hemisphere, fit: RigidFit) -> tuple[Floats
     return MIRROR @ posed[0] @ MIRROR, posed[1]
 
 
-def _difference(to_left: Floats, to_right: Floats, left: Hemisphere) -> tuple[float, Floats]:
+def _difference(to_left: Floats, to_right: Floats, left: PosedShape) -> tuple[float, Floats]:
     """Return the angle between two motions, and their shift (3,) in mm at the left hemisphere's centre."""
     difference = to_right - to_left
     shift = difference[:3, :3] @ MIRROR[:3, :3] @ left.shape.centre + difference[:3, 3]
     return angle_deg(to_right[:3, :3].T @ to_left[:3, :3]), shift
 
 
-def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere, declared: bool) -> bool:
+def _share_coordinates(to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape, declared: bool) -> bool:
     angle, shift_mm = _difference(to_left, to_right, left)
     if declared and angle < DECLARED_TURN_DEG:
         return True
@@ -183,7 +205,7 @@ def _share_coordinates(to_left: Floats, to_right: Floats, left: Hemisphere, righ
     return bool(angle < COMMON_DEG and shift[0] < COMMON_DISTANCE and np.hypot(*shift[1:]) < COMMON_OFFSET)
 
 
-def _mean_motion(to_left: Floats, to_right: Floats, left: Hemisphere, right: Hemisphere) -> Floats:
+def _mean_motion(to_left: Floats, to_right: Floats, left: PosedShape, right: PosedShape) -> Floats:
     centre = 0.5 * (MIRROR[:3, :3] @ left.shape.centre + right.shape.centre)
     rotation = Rotation.from_matrix([to_left[:3, :3], to_right[:3, :3]]).mean().as_matrix()
     moved = 0.5 * sum(side[:3, :3] @ centre + side[:3, 3] for side in (to_left, to_right))
@@ -221,9 +243,9 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
 def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto"; InputError if this is unclear."""
     shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
-    fit, confidence = template.register_from_all_sides(shape, template.brains())
-    brain = Hemisphere(shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
-    return _choose_pose(brain, brain.rotation, coordinates, "brain", template.brains())
+    fit, confidence = template.register_from_all_sides(shape, template.template_shapes("brain"))
+    brain = PosedShape("brain", shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
+    return _choose_pose(brain, brain.rotation, coordinates)
 
 
 def pose_of_volume_by_shape(mesh: TriangleMesh, has_sides: bool) -> Pose:
@@ -256,37 +278,30 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
             found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
         )
-    pose = _choose_pose(hemisphere, rotation, coordinates, "hemisphere", template.hemispheres(), of_volume=of_volume)
+    pose = _choose_pose(hemisphere, rotation, coordinates, of_volume=of_volume)
     if side_ratio < MIN_SIDE_RATIO:
         doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
         pose = replace(pose, warnings=(doubt, *pose.warnings))
     return replace(pose, evidence={"confidence": hemisphere.confidence, "side_ratio": side_ratio})
 
 
-def _choose_pose(
-    shape: Hemisphere,
-    rotation: Floats,
-    coordinates: str,
-    what: str,
-    targets: Sequence[PointCloud],
-    of_volume: bool = False,
-) -> Pose:
+def _choose_pose(shape: PosedShape, rotation: Floats, coordinates: str, *, of_volume: bool = False) -> Pose:
     """Return the pose in named coordinates, or that of the shape; `rotation` (3, 3) leads to RAS+."""
     angles = {name: angle_deg(rotation @ axes[:3, :3].T) for name, axes in CONVENTIONS.items()}
     if coordinates != "auto":
         is_doubtful = shape.is_clear and angles[coordinates] > MIN_TURN_DEG
-        doubts = [_contradiction(coordinates, f"{what} is", angles[coordinates])] if is_doubtful else []
+        doubts = [_contradiction(coordinates, f"{shape.kind} is", angles[coordinates])] if is_doubtful else []
         return turned(CONVENTIONS[coordinates][:3, :3], "configuration", coordinates, *doubts)
     if not shape.is_clear:
-        return _pose_as_ras(shape, targets, what)
+        return _pose_as_ras(shape, shape.kind)
     nearest = min(angles, key=lambda name: angles[name])
     if angles[nearest] >= CONVENTION_DEG:
         return turned(
-            rotation, "shape", "ras", f"the {what} was rotated by {angles['ras']:.0f}° according to its shape"
+            rotation, "shape", "ras", f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its shape"
         )
     axes = CONVENTIONS[nearest][:3, :3]
     notes = [] if nearest == "ras" else [f"the coordinates are {nearest.upper()} according to the shape"]
-    if what == "brain":
+    if shape.kind == "brain":
         return turned(axes, "shape", nearest, *notes)
     # the smallest rotation that sets the medial wall upright
     upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
@@ -296,3 +311,96 @@ def _choose_pose(
 def _contradiction(coordinates: str, what: str, angle: float) -> str:
     check = "check them, or set coordinates: auto"
     return f"according to the shape the {what} rotated by {angle:.0f}° from the coordinates {coordinates}: {check}"
+
+
+def pose_of_labels(labels: NDArray[np.integer], affine: Floats, scheme: LabelScheme) -> Pose | None:
+    """Estimate the pose from cerebellum, brainstem and labelled sides; return None if too few of them are labelled.
+
+    InputError if labels of left and right are mirrored, so that no rotation can correct them.
+    """
+    names = "cerebrum", "cerebellum", "brainstem", "left", "right"
+    places = {name: np.argwhere(np.isin(labels, getattr(scheme, name))) for name in names}
+    centres = {name: affine[:3, :3] @ voxels.mean(axis=0) for name, voxels in places.items() if len(voxels)}
+    hindbrain = {name: centres[name] - centres["cerebrum"] for name in EXPECTED if name in centres}
+    size = np.cbrt(np.isin(labels, scheme.cerebrum).sum() * abs(np.linalg.det(affine[:3, :3])))
+    for name, offset in hindbrain.items():
+        if (share := np.linalg.norm(offset) / size) < MIN_HINDBRAIN_DISTANCE:
+            raise InputError(
+                f"with the scheme {scheme.name!r} the {name} lies inside the cerebrum",
+                found=f"distance of the centres: {share:.2f} times the cerebrum's size (cube root of its volume)",
+                expected=f"{MIN_HINDBRAIN_DISTANCE} or more",
+            )
+    sides = unit(centres["right"] - centres["left"]) if {"left", "right"} <= set(centres) else None
+    rotation = _rotation_from_hindbrain(hindbrain)
+    if sides is not None and hindbrain:
+        rotation = _rotation_from_sides(hindbrain, sides, rotation)
+    if rotation is None:
+        return None
+    by = " and ".join([*hindbrain, *(["the labelled sides"] if sides is not None else [])])
+    return pose_from_rotation(rotation, by, sides is not None)
+
+
+def pose_from_rotation(rotation: Floats, evidence: str, has_sides: bool) -> Pose:
+    """Return the pose of a volume that an estimated (3, 3) rotation about its origin would bring to RAS+.
+
+    Rotations of 60° and more are applied, as quarter turns if these are close. Smaller ones only give a warning, from
+    15° on. `evidence` names what the estimate rests on; `has_sides` is whether left and right are labelled.
+    """
+    quarters = _nearest_quarters(rotation)
+    if angle_deg(rotation @ quarters.T) < QUARTERS_DEG:
+        rotation = quarters
+    angle = angle_deg(rotation)
+    if angle >= MIN_TURN_DEG:
+        warning = f"the brain was rotated by {angle:.0f}° according to {evidence}: its affine has other axes"
+        warning = warning if has_sides else f"{warning}; {MIRROR_WARNING}"
+        return turned(rotation, evidence.removeprefix("the "), "ras", warning)
+    doubt = f"according to {evidence} the brain is rotated by about {angle:.0f}°: {PITCH_KEPT}"
+    return Pose(warnings=(doubt,) if angle > DOUBTFUL_TURN_DEG else ())
+
+
+def _rotation_from_hindbrain(hindbrain: dict[str, Floats]) -> Floats | None:
+    if len(hindbrain) < 2:
+        return None
+    theirs, ours = (
+        (np.cross(*pair), unit(pair[0] + pair[1]))
+        for pair in ([unit(v) for v in hindbrain.values()], [*EXPECTED.values()])
+    )
+    # the cross product points to the right. If both lie in the same direction, the rotation about it is unknown
+    if np.linalg.norm(theirs[0]) < MIN_SPREAD:
+        return None
+    return _rotation_onto([(unit(theirs[0]), unit(ours[0])), (theirs[1], ours[1])])
+
+
+def _rotation_from_sides(hindbrain: dict[str, Floats], sides: Floats, rotation: Floats | None) -> Floats:
+    """Estimate the (3, 3) rotation to RAS+ from labelled sides and hindbrain; InputError if they are mirrored."""
+    below = [(unit(offset), EXPECTED[name]) for name, offset in hindbrain.items()]
+    turn, mirrored = (_rotation_onto([(to_right, TO_RIGHT), *below]) for to_right in (sides, -sides))
+    if _is_mirrored(turn, mirrored) if rotation is None else (rotation @ sides)[0] < 0:
+        raise InputError(
+            "labels of the left hemisphere lie on the right",
+            found=f"the sides are the wrong way round with {' and '.join(hindbrain)} below and behind",
+            expected="left at the smaller x (RAS+)",
+            remedy="The volume's affine mirrors the brain, or the scheme's sides are swapped.",
+        )
+    return turn
+
+
+def _rotation_onto(pairs: list[tuple[Floats, Floats]]) -> Floats:
+    ours, theirs = zip(*pairs, strict=True)
+    return np.asarray(Rotation.align_vectors(theirs, ours)[0].as_matrix())
+
+
+def _is_mirrored(turn: Floats, mirrored: Floats) -> bool:
+    """Return whether exchanged sides explain a volume better than a rotation.
+
+    Mirrored sides and one more direction fit an oblique half turn, and exchanged an upright brain; wrong axis codes
+    give quarter turns, most often from LPS.
+    """
+    if angle_deg(turn) < MIN_TURN_DEG:
+        return False
+    off_lps, off_quarters = (angle_deg(turn @ axes.T) for axes in (CONVENTIONS["lps"][:3, :3], _nearest_quarters(turn)))
+    return angle_deg(mirrored) < min(MIN_TURN_DEG, off_lps, max(DOUBTFUL_TURN_DEG, off_quarters))
+
+
+def _nearest_quarters(rotation: Floats) -> Floats:
+    return np.asarray(min(CUBE_ROTATIONS, key=lambda turn: angle_deg(rotation @ turn.T)).round())

@@ -77,20 +77,13 @@ def shape_of(mesh: TriangleMesh, *, max_depth: float = np.inf) -> PointCloud:
 
 
 @cache
-def hemispheres() -> tuple[PointCloud, ...]:
-    """Return the right hemispheres of the template."""
-    return tuple(map(shape_of, _surfaces()))
-
-
-@cache
-def brains() -> tuple[PointCloud, ...]:
-    """Return the template's brains, of two hemispheres each."""
-    return tuple(shape_of(merged(transformed(right, MIRROR), right), max_depth=MAX_DEPTH) for right in _surfaces())
-
-
-def _surfaces() -> list[TriangleMesh]:
+def template_shapes(kind: str) -> tuple[PointCloud, ...]:
+    """Return the right hemispheres of the template for the `kind` "hemisphere", its whole brains for "brain"."""
     folder = SHIPPED / "atlases" / "spina-bifida"
-    return [read_surface(folder / f"right.week{week}.surf.gii") for week in WEEKS]
+    surfaces = [read_surface(folder / f"right.week{week}.surf.gii") for week in WEEKS]
+    if kind == "hemisphere":
+        return tuple(map(shape_of, surfaces))
+    return tuple(shape_of(merged(transformed(right, MIRROR), right), max_depth=MAX_DEPTH) for right in surfaces)
 
 
 def register(

@@ -14,8 +14,7 @@ from tempfile import TemporaryDirectory
 from textwrap import fill
 from typing import NamedTuple
 
-from ..anatomy.labels import MIN_CORTEX_OUTSIDE, read_cerebrum
-from ..anatomy.layout import layout_of, scheme_contradictions
+from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError
 from ..io.downloads import require_checksums

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..anatomy.labels import cerebrum_mask
-from ..anatomy.layout import layout_of, scheme_contradictions
+from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
 from ..errors import InputError
 from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
 from ..io.files import files_in, reading

@@ -22,7 +22,7 @@ from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..settings.varying import Maps, value_at
 from ..step import record_exit_code
 from .checks import refuse_impossible, stiffness_warning, zone_report
-from .output import ZONES, log_event, print_line, warn, write_events
+from .output import log_event, print_line, warn, write_events
 from .points import IntegrationPoints
 from .predicted_memory import predicted_memory_mib
 from .run import run
@@ -64,7 +64,7 @@ def require_space(out: Path, mesh: TetrahedralMesh, parameters: FoldingParameter
     # positions in double precision, fields in single
     per_element = 16 * len(set(ELEMENT_FIELDS) & set(parameters.fields))
     frame = (24 + 12 * len(parameters.fields)) * len(mesh.vertices) + per_element * len(mesh.tets)
-    points = len(IntegrationPoints.exact_to_degree(mesh.order).weights)
+    points = len(IntegrationPoints.for_order(mesh.order).weights)
     values = 6 if parameters.keeps_stretch else 0
     stretch = 8 * values * points * len(mesh.tets)
     # positions and two displacements
@@ -104,7 +104,7 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
             warn(locking)
         refuse_impossible(mesh, zones)
         require_space(arguments.out, mesh, parameters)
-        write_json(arguments.out / ZONES, report)
+        write_json(arguments.out / "zones.json", report)
     comm.barrier()
     run(comm, mesh, zones, parameters, maps, arguments.out, may_diverge=arguments.may_diverge)
 

@@ -144,9 +144,7 @@ def _checksum(arrays: dict[str, Floats], scalars: str) -> str:
 def write_checkpoint(path: Path, key: str, state: State) -> None:
     """Write the state of the run `key`; StorageError where the disk is full or the folder cannot be written."""
     values = dict(vars(state))
-    arrays = {name: values.pop(name) for name in ARRAYS if values[name] is not None}
-    for name in ARRAYS:
-        values.pop(name, None)
+    arrays = {name: array for name in ARRAYS if (array := values.pop(name)) is not None}
     scalars = json.dumps({**values, "key": key}, sort_keys=True)
     with new_hdf5(path) as file:
         for name, array in arrays.items():

@@ -13,15 +13,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, edges, mean_length
+from ..geometry.triangles import Floats, TriangleMesh, connected, edges, mean_length
 from ..units import M_PER_MM
 from .contact_search import ContactSearch, NearPairs
 from .contact_surface import ContactSurface
-from .domain import Domain
-from .surface_parts import bisect_points
+from .domain import Domain, bisect_points
 
 DISTANCE_PER_EDGE = 0.2
 """Contact distance d̂ as a multiple of the current surface's mean edge length: well below what the mesh resolves. It
@@ -54,32 +52,6 @@ BARRIER = ipctk.TwoStageBarrier()
 N_PER_PA_MM2, N_PER_M_PER_PA_MM, J_PER_PA_MM3 = 1e-6, 1e-3, 1e-9
 
 
-class Barrier:
-    """The potential of a rank's near pairs: contact distance d̂ in mm, stiffness κ in Pa."""
-
-    def __init__(self, distance_mm: float, stiffness_pa: float) -> None:
-        self.distance_mm, self.stiffness_pa = distance_mm, stiffness_pa
-        self._potential = ipctk.BarrierPotential(BARRIER, distance_mm, stiffness_pa, use_physical_barrier=True)
-
-    def energy(self, near: NearPairs) -> float:
-        """Return the energy in J."""
-        return float(self._potential(near.pairs, near.mesh, near.part_positions)) * J_PER_PA_MM3
-
-    def forces(self, near: NearPairs) -> Floats:
-        """Return the (p, 3) derivative of the energy in N."""
-        if not len(near.pairs):
-            return np.zeros_like(near.part_positions)
-        gradient = self._potential.gradient(near.pairs, near.mesh, near.part_positions)
-        return np.asarray(gradient.reshape(-1, 3) * N_PER_PA_MM2)
-
-    def stiffness(self, near: NearPairs, *, convex: bool) -> sparse.csc_matrix | None:
-        """Return the (3p, 3p) second derivative in N/m, None without pairs; `convex` clamps negative eigenvalues."""
-        if not len(near.pairs):
-            return None
-        projection = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
-        return self._potential.hessian(near.pairs, near.mesh, near.part_positions, projection) * N_PER_M_PER_PA_MM
-
-
 class SelfContact:
     """The barrier between all parts of the pial surface, a contribution to the energy of a step.
 
@@ -89,6 +61,8 @@ class SelfContact:
     below the small gap at the start of the run, neighbours aside: a body that does not grow must not move, except where
     neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory.
     MeshError where the surface crosses itself at the start.
+
+    Attributes: contact distance d̂, `distance_mm`, and stiffness κ of the barrier, `stiffness_pa`, in the current step.
     """
 
     def __init__(
@@ -155,7 +129,8 @@ class SelfContact:
             # the first residual of the step needs them again
             self._near = self._search.near(self._rest)
             factor = stiffening(self.domain.comm.allreduce(self._near.gap_mm, op=MPI.MIN) / distance_mm)
-        self.barrier = Barrier(distance_mm, factor * self._initial_pa)
+        self.distance_mm, self.stiffness_pa = distance_mm, factor * self._initial_pa
+        self._potential = ipctk.BarrierPotential(BARRIER, distance_mm, self.stiffness_pa, use_physical_barrier=True)
 
     def near_pairs(self, u: Floats) -> NearPairs:
         """Return this rank's pairs. Those of the last displacement are cached."""
@@ -174,18 +149,25 @@ class SelfContact:
         sides = [part_of_vertex[pair] for pair in near.vertices_of_pairs()]
         own_links = {(int(pair.min()), int(pair.max())) for pair in sides}
         links = np.array(sorted(set().union(*self.domain.comm.allgather(own_links)))).reshape(-1, 2)
-        count = int(part.max()) + 1
-        graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
-        return connected_components(graph, directed=False)[1][part].astype(np.int64)
+        return connected(links, int(part.max()) + 1)[part].astype(np.int64)
 
     def energy(self, u: Floats) -> float:
         """Return the barrier's energy in J."""
-        return self.domain.comm.allreduce(self.barrier.energy(self.near_pairs(u)))
+        near = self.near_pairs(u)
+        local = float(self._potential(near.pairs, near.mesh, near.part_positions))
+        return self.domain.comm.allreduce(local * J_PER_PA_MM3)
 
     def forces(self, u: Floats) -> Floats:
         """Return the (n, 3) derivative of the energy in N at the surface's nodes."""
         near = self.near_pairs(u)
-        return self.surface.nodal_sum(near.part, self.barrier.forces(near))
+        return self.surface.nodal_sum(near.part, self._forces_of(near))
+
+    def _forces_of(self, near: NearPairs) -> Floats:
+        """Return the (p, 3) derivative of the energy of a rank's pairs in N."""
+        if not len(near.pairs):
+            return np.zeros_like(near.part_positions)
+        gradient = self._potential.gradient(near.pairs, near.mesh, near.part_positions)
+        return np.asarray(gradient.reshape(-1, 3) * N_PER_PA_MM2)
 
     def add_forces(self, u: Floats, out: Floats) -> None:
         """Add the forces in N to the owned components (3 · n_owned,) of a vector."""
@@ -196,7 +178,11 @@ class SelfContact:
         near = self.near_pairs(u)
         if not self.domain.comm.allreduce(len(near.pairs)):
             return None
-        return self.surface.matrix_sum(near.part, self.barrier.stiffness(near, convex=convex))
+        own = None
+        if len(near.pairs):
+            projection = ipctk.PSDProjectionMethod.CLAMP if convex else ipctk.PSDProjectionMethod.NONE
+            own = self._potential.hessian(near.pairs, near.mesh, near.part_positions, projection) * N_PER_M_PER_PA_MM
+        return self.surface.matrix_sum(near.part, own)
 
     def max_step(self, u: Floats, direction: Floats) -> float:
         """Return the largest fraction, up to 1, of a direction (k, 3) in m that can be added to u without collision."""
@@ -218,7 +204,7 @@ class SelfContact:
         """Return the (n,) contact pressure in Pa at all vertices of the mesh, force per area, 0 off the surface."""
         near = self.near_pairs(u)
         forces, areas = np.zeros_like(self._rest), np.zeros(len(self._rest))
-        forces[near.part.vertices] = self.barrier.forces(near)
+        forces[near.part.vertices] = self._forces_of(near)
         # only the owner of a vertex is sure to have all faces around it
         owned = near.part.owned
         areas[near.part.vertices[owned]] = np.array(near.mesh.vertex_areas)[owned] * M_PER_MM**2

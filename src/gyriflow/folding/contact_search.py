@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats
-from .surface_parts import SurfacePart, part_of_surface
+from .contact_surface import SurfacePart, part_of_surface
 
 CANDIDATE_MARGIN_MM = 0.05
 """Displacement of the surface after which candidates for pairs are searched for again."""

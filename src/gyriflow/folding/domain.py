@@ -46,6 +46,27 @@ def gather(comm: MPI.Comm, values: Floats, order: NDArray[np.int64]) -> Floats:
     return result
 
 
+def bisect_points(positions: Floats, count: int) -> NDArray[np.int64]:
+    """Divide (n, 3) points into `count` boxes with nearly equal numbers of points; return the box (n,) of each point.
+
+    A box is split across its longest side, in proportion to the counts on both sides, and so on (recursive coordinate
+    bisection, Berger and Bokhari 1987).
+    """
+    box = np.zeros(len(positions), dtype=np.int64)
+    stack: list[tuple[NDArray[np.int64], int, int]] = [(np.arange(len(positions)), 0, count)]
+    while stack:
+        inside, first, number = stack.pop()
+        if number == 1 or not len(inside):
+            box[inside] = first
+            continue
+        axis = np.ptp(positions[inside], axis=0).argmax()
+        inside = inside[np.argsort(positions[inside, axis], kind="stable")]
+        low = number // 2
+        cut = len(inside) * low // number
+        stack += [(inside[:cut], first, low), (inside[cut:], first + low, number - low)]
+    return box
+
+
 class Domain:
     """A tetrahedral mesh distributed over the ranks of a communicator, in metres.
 
@@ -119,6 +140,13 @@ class Domain:
     def local(self, values: NDArray) -> NDArray:
         """Return the values of the local nodes from those of all vertices."""
         return values[self.vertex_of_node]
+
+    def owned_rows(self, vertices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the owned nodes (o,) that are among ascending vertices, and their places (o,) among these."""
+        owned = self.vertex_of_node[: self.n_owned]
+        place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
+        local = np.flatnonzero(vertices[place] == owned)
+        return local, place[local]
 
     def place(self, positions: Floats) -> None:
         """Move the mesh to (n, 3) positions in m."""

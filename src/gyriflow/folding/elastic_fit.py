@@ -30,13 +30,11 @@ from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
 from ..units import M_PER_MM, MM_PER_M
 from .contact import SelfContact
-from .diagnosis import worst_places
 from .domain import Domain
 from .linear_solver import NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, residual_floor
 from .problem import NonlinearProblem
-from .stress import packed, unpacked
-from .stretches import deformation_gradients, log_stretch
+from .stretches import deformation_gradients, log_stretch, packed, unpacked
 from .tissue import Elements
 from .zones import Zones
 
@@ -85,11 +83,8 @@ class Springs:
     """
 
     def __init__(self, domain: Domain, vertices: Ints) -> None:
-        self._domain = domain
-        owned = domain.vertex_of_node[: domain.n_owned]
-        place = np.searchsorted(vertices, owned).clip(max=len(vertices) - 1)
-        self._local = np.flatnonzero(vertices[place] == owned)
-        self._rows, self._vertices = place[self._local], vertices
+        self._domain, self._vertices = domain, vertices
+        self._local, self._rows = domain.owned_rows(vertices)
 
     def draw_to(self, goals_mm: Floats, areas_mm2: Floats, lengths_mm: Floats) -> None:
         """Set the (b, 3) goals in mm, for a step from the present positions, and (b,) areas and lengths of springs."""
@@ -340,7 +335,7 @@ class ElasticFit:
             if not halvings:
                 raise SolverError(
                     "a shape cannot be reached without turning elements inside out or folds into each other",
-                    found=f"{error}; {worst_places(self._solver)}",
+                    found=f"{error}; {self._solver.worst_places()}",
                     remedy="Look at the labels or surfaces of this week and the one before at that place.",
                 ) from None
             half = None if strain is None else strain / 2

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,18 +37,18 @@ class Size:
 class GrowthInputs:
     """Inputs of growth that are constant through a run.
 
-    The mesh's elements, the (p, 4) linear tetrahedra between their vertices, and the run's zones and maps at these.
+    The mesh at its start, with the run's zones and maps; `total` adds up a count of elements over the ranks.
     """
 
-    tets: NDArray[np.int64]
-    pieces: NDArray[np.int64]
+    mesh: TetrahedralMesh
     zones: Zones
     maps: Maps
+    total: Callable[[int], int] = int
 
-    @classmethod
-    def of(cls, mesh: TetrahedralMesh, zones: Zones, maps: Maps) -> "GrowthInputs":
-        """Return the inputs for a mesh."""
-        return cls(mesh.tets, linear_pieces(mesh), zones, maps)
+    @cached_property
+    def pieces(self) -> NDArray[np.int64]:
+        """The (p, 4) linear tetrahedra between the mesh's vertices."""
+        return linear_pieces(self.mesh)
 
     def size(self, positions_mm: Floats) -> Size:
         """Return the size of the brain, for (n, 3) positions of all vertices."""

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..geometry.triangles import Floats
-from ..mechanics.energy_code import energy_code
-from ..mechanics.materials import Material
+from ..mechanics.materials import Material, energy_code
 from .compilation import compiled
 from .domain import Domain
 

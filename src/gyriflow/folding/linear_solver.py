@@ -14,10 +14,9 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..errors import SolverError
 from ..geometry.triangles import Floats
-from .domain import Domain
+from .domain import Domain, bisect_points
 from .problem import NonlinearProblem
 from .products import PartMotions, multiply_blocks
-from .surface_parts import bisect_points
 from .tangent import Residual, Tangent, part_arms, rigid_motions
 
 RUNGS = ("cg", "cg, tangent shifted")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..geometry.tetrahedra import TetrahedralMesh, signed_volumes
 from ..geometry.triangles import Floats
-from ..units import M_PER_MM
+from ..units import M_PER_MM, MM_PER_M
 from .linear_solver import PLAIN, Direction, LinearSolver, NotConvergedError
 from .problem import NonlinearProblem
 from .tangent import Residual, Tangent
@@ -212,3 +212,18 @@ class NewtonSolver:
         if before is not None and abs(slope) <= ENERGY_ROUND_OFF * abs(before):
             return Iterate(iterate.residual, before, exhausted=True)
         raise NotConvergedError("the line search found no step that lowers the energy")
+
+    def worst_places(self) -> str:
+        """Return where a failed solve was worst: the most compressed element and the largest residual, in mm."""
+        problem, domain = self.problem, self.problem.domain
+        last = self.last or problem.residual(problem.rest())
+        before = domain.local(domain.positions)
+        ratios = problem.volume_ratios(last.displacement) if self.inverted is None else self.inverted
+        forces = -np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
+        centres = before[domain.corners].mean(axis=1) * MM_PER_M
+        ratio, tet, centre = domain.locate_minimum(ratios.min(axis=1), domain.tet_of_cell, centres)
+        force, vertex, position = domain.locate_minimum(forces, domain.vertex_of_node, before * MM_PER_M)
+        return (
+            f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
+            f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(position, 1).tolist()} mm"
+        )

@@ -2,8 +2,6 @@
 
 import json
 import logging
-import resource
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -16,18 +14,12 @@ from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps, value_at
-from ..units import week_tag
 from .growth import GrowthInputs, increments_at
 from .layers import PialSearch, cortical_weight, shear_modulus
-from .stress import packed, unpacked
-from .stretches import log_stretch
+from .stretches import log_stretch, packed, unpacked
 from .zones import Zones
 
 log = logging.getLogger(__name__)
-FRAMES = "frames.h5"
-STEPS = "steps.csv"
-SUMMARY = "summary.json"
-ZONES = "zones.json"
 GROWTH_SMOOTHING_MM = 0.4
 """Length over which the map of growth towards shapes is smoothed; growth itself is not."""
 
@@ -41,17 +33,12 @@ def print_line(text: str, event: str = "", **facts: float | str | None) -> None:
 
 def log_event(event: str, **facts: float | str | None) -> None:
     """Write an event with its facts to the file of `write_events`, if there is one."""
-    log.info(event, extra={"facts": facts})
+    log.info(json.dumps({"event": event, **facts}))
 
 
 def warn(text: str) -> None:
     """Print a warning and log it as an event."""
     print_line(f"warning: {text}", "warning", message=text)
-
-
-class _Events(logging.Formatter):
-    def format(self, record: logging.LogRecord) -> str:
-        return json.dumps({"event": record.msg, **vars(record)["facts"]})
 
 
 def write_events(path: Path) -> None:
@@ -61,24 +48,8 @@ def write_events(path: Path) -> None:
         handler = logging.FileHandler(path, mode="w")
     except OSError as error:
         raise StorageError("cannot be written", path=path, found=error.strerror) from None
-    handler.setFormatter(_Events())
     log.setLevel(logging.INFO)
     log.addHandler(handler)
-
-
-def progress_line(row: dict, end_week: float, seconds_left: float) -> str:
-    """Format the progress line of a step: week, iterations, displacement, time."""
-    minutes, seconds = divmod(round(seconds_left), 60)
-    return (
-        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
-        f"krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  "
-        f"{row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
-    )
-
-
-def frame_path(folder: Path, week: float) -> Path:
-    """Return the file of a single frame, which exists until the run has ended."""
-    return folder / f"frame-{week_tag(week)}.h5"
 
 
 def layer_fields(
@@ -146,9 +117,3 @@ def growth_components(log_growth: Floats, normals: Floats) -> dict[str, Floats]:
         "radial_growth_per_step": (tensors * radial).sum(axis=(1, 2)),
         "growth_direction_per_step": axes[:, :, 2] * (values[:, 2:] - values[:, 1:2]),
     }
-
-
-def peak_memory_mib() -> float:
-    """Return the peak memory of this process in MiB."""
-    unit = 1024 if sys.platform != "darwin" else 1024**2
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

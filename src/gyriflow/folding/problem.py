@@ -48,28 +48,19 @@ class NonlinearProblem:
     Displacements `u` (k, 3) are those of the local nodes with ghosts, in m, from the mesh as it is placed. All else
     that differs between steps is set by `set_step`.
 
-    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0. `quadrature_degree` is
-    that of the polynomials that are integrated exactly; None takes what the elements' order needs.
+    Planes at the fissure press back with `penalty_pa_per_m` per depth, or not at all with 0.
 
     Attributes: further `contributions` to the energy, whether the body is `free` of supports, and the q integration
     `points` of each element.
     """
 
-    def __init__(
-        self,
-        domain: Domain,
-        zones: Zones,
-        material: Material,
-        *,
-        penalty_pa_per_m: float = 0.0,
-        quadrature_degree: int | None = None,
-    ) -> None:
+    def __init__(self, domain: Domain, zones: Zones, material: Material, *, penalty_pa_per_m: float = 0.0) -> None:
         self.domain = domain
         self.contributions: list[Contribution] = []
         # the coefficient of compiled forms; each evaluation sets it
         self._u = dolfinx.fem.Function(domain.space)
         self._forces = dolfinx.la.vector(domain.space.dofmap.index_map, 3)
-        self.points = IntegrationPoints.exact_to_degree(domain.order, quadrature_degree)
+        self.points = IntegrationPoints.for_order(domain.order)
         # reference coordinates, and parts of the regular element's volume
         self._rule = self.points.barycentric[:, 1:].copy(), self.points.weights / 6
         self._weight, self._H = self._field_at_points(()), self._field_at_points((3, 3))
@@ -81,7 +72,7 @@ class NonlinearProblem:
         self._tensors = {"deformation": F, "elastic": Fe, "stress": material.cauchy_stress(Fe, *moduli)}
         self._expressions: dict[str, dolfinx.fem.Expression] = {}
         self._linear: LinearElements | None = None
-        if domain.order == 1 and len(self.points.weights) == 1:
+        if domain.order == 1:
             # written by hand, instead of the form compiler's code
             self._linear, energy = LinearElements(domain, material), 0
         else:

@@ -1,7 +1,9 @@
 """A whole run: from the start or a checkpoint to the last output week, with frames, step table and summary."""
 
 import math
+import resource
 import shutil
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,26 +21,16 @@ from ..io.files import write_json, write_table
 from ..io.frames import join_frames, read_positions, write_frame
 from ..settings.folding import FoldingParameters
 from ..settings.varying import Maps
-from ..units import MM_PER_M, SECONDS_PER_GW
+from ..units import MM_PER_M, SECONDS_PER_GW, week_tag
 from .checkpoint import State, read_checkpoint, run_key, write_checkpoint
-from .output import (
-    FRAMES,
-    GROWTH_SMOOTHING_MM,
-    STEPS,
-    SUMMARY,
-    frame_path,
-    layer_fields,
-    log_growth_at_vertices,
-    peak_memory_mib,
-    print_line,
-    progress_line,
-    warn,
-)
+from .output import GROWTH_SMOOTHING_MM, layer_fields, log_growth_at_vertices, print_line, warn
 from .simulation import Folding, advance
 from .steering import missed_curves
+from .step_fields import step_fields
 from .targets import missed_targets, shrinkage_note
 from .zones import Zones
 
+FRAMES, STEPS, SUMMARY = "frames.h5", "steps.csv", "summary.json"
 MAX_FLAT_SHARE = 0.001
 """Share of flat elements at the end of a run above which their note is a warning."""
 
@@ -89,7 +81,10 @@ def run(
             "cpu_seconds": processor,
             "peak_memory_MiB": memory,
             "weeks": weeks,
-            "radius_ratio_01": [low_radius_ratio(mesh, read_positions(out / FRAMES, week)) for week in weeks],
+            "radius_ratio_01": [
+                float(np.quantile(radius_ratios(TetrahedralMesh(read_positions(out / FRAMES, week), mesh.tets)), 0.01))
+                for week in weeks
+            ],
             "reached_week": reached,
             "diverged": diverged,
             "resumed_after_step": resumed_after,
@@ -132,14 +127,14 @@ def simulate(folding: Folding, state: State, folder: Path, key: str, *, may_dive
                     for warning in filter(None, (missed_curves(state.rows[-1]), *missed_targets(since))):
                         warn(warning)
                 write_checkpoint(folder / "state.h5", key, state)
-                report_step(state, p, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
+                report_step(state, p.end_week, (time.monotonic() - resumed) / (len(state.rows) - resumed_after))
     return state, None
 
 
 def save_frame(folding: Folding, state: State, week: float, folder: Path) -> State:
     """Write the frame of a week and return the state to continue with; collective over the ranks."""
     names, solved, p = folding.parameters.fields, folding.solved, folding.parameters
-    pressure, elements = folding.fields.contact_pressure(names, solved), folding.fields.elements(names, solved)
+    pressure, elements = step_fields(folding, names)
     # a mean over the steps since the last frame; before the first step, the growth of that step
     growth = folding.grown(state, solved.growth) if state.growth is None else state.growth
     steps = state.growth_s / p.step_s or 1.0
@@ -157,12 +152,17 @@ def save_frame(folding: Folding, state: State, week: float, folder: Path) -> Sta
     return replace(state, growth=None, growth_s=0.0)
 
 
-def report_step(state: State, parameters: FoldingParameters, seconds_per_step: float) -> None:
-    """Print the progress line of the last step."""
-    row, end_week = state.rows[-1], parameters.end_week
+def report_step(state: State, end_week: float, seconds_per_step: float) -> None:
+    """Print the progress line of the last step: week, iterations, displacement, time."""
+    row = state.rows[-1]
     left_s = seconds_per_step * (end_week - row["week"]) * SECONDS_PER_GW / state.step_s
-    facts = {"week": row["week"], "end_week": end_week, "step": row["step"], "left_s": left_s}
-    print_line(progress_line(row, end_week, left_s), "step", **facts)
+    minutes, seconds = divmod(round(left_s), 60)
+    line = (
+        f"GW {row['week']:6.3f}/{end_week:g}  step {row['step']:4d}  newton {row['newton']}  "
+        f"krylov {row['krylov']:3d}  max|u| {row['max_u_mm']:.3f} mm  min J {row['min_J']:.3f}  "
+        f"{row['seconds']:.2f} s  left {minutes}:{seconds:02d}"
+    )
+    print_line(line, "step", week=row["week"], end_week=end_week, step=row["step"], left_s=left_s)
 
 
 def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
@@ -174,11 +174,6 @@ def steps_summary(rows: Sequence[dict]) -> dict[str, float]:
         "seconds_per_step": float(np.median([row["seconds"] for row in rows])) if rows else math.nan,
         "min_J": min((row["min_J"] for row in rows), default=math.nan),
     }
-
-
-def low_radius_ratio(mesh: TetrahedralMesh, positions: Floats) -> float:
-    """Return the first centile of the elements' radius ratios, for vertices at (n, 3) positions."""
-    return float(np.quantile(radius_ratios(TetrahedralMesh(positions, mesh.tets)), 0.01))
 
 
 def quality_note(mesh: TetrahedralMesh, positions: Floats, week: float) -> tuple[str, bool]:
@@ -214,6 +209,11 @@ def load_state(folder: Path, key: str, parameters: FoldingParameters) -> tuple[S
     return replace(state, rows=within), message
 
 
+def frame_path(folder: Path, week: float) -> Path:
+    """Return the file of a single frame, which exists until the run has ended."""
+    return folder / f"frame-{week_tag(week)}.h5"
+
+
 def seconds_to(week: float, parameters: FoldingParameters) -> float:
     """Return the time in s from the start of a run to a week."""
     return (week - parameters.start_week) * SECONDS_PER_GW
@@ -235,3 +235,9 @@ def shortened_step_note(parameters: FoldingParameters) -> str:
         if abs(math.remainder((b - a) * SECONDS_PER_GW, step)) > 1e-6 * step:
             return f"step_s {step:g} does not divide the time from GW {a:g} to {b:g}: the last step there is shortened"
     return ""
+
+
+def peak_memory_mib() -> float:
+    """Return the peak memory of this process in MiB."""
+    unit = 1024 if sys.platform != "darwin" else 1024**2
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

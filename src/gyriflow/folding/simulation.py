@@ -1,22 +1,25 @@
 """Time stepping: in each step growth, layers and a Newton solve; steps whose solve fails are halved."""
 
+import math
 import time
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
+from ..geometry.jacobians import EDGES
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
+from ..settings.terms import ELEMENTS_NEEDED
 from ..settings.varying import Maps, value_at, value_range
 from ..settings.weeks import WEEK_RANGE
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
 from .checkpoint import State
 from .contact import STIFFNESS_PER_MODULUS, SelfContact
-from .diagnosis import contact_row, elements_through, resolution_warning, unconverged_warning, worst_places
 from .domain import Domain
 from .growth import GrowthInputs, StepGrowth, StepStart
 from .growth_models import growth_model
@@ -25,8 +28,7 @@ from .linear_solver import RUNGS, NotConvergedError
 from .newton import NewtonSettings, NewtonSolver, Solution, residual_floor
 from .output import print_line, warn
 from .problem import NonlinearProblem
-from .step_fields import SolvedStep, StepFields
-from .stress import left_stretch, packed, relaxed, unpacked
+from .stretches import left_stretch, packed, relaxed, unpacked
 from .tissue import Elements, Tissue
 from .zones import Zones
 
@@ -36,12 +38,20 @@ MAX_STEP_VOLUME_RATIO = 2.0
 """Largest volume of an element after one step of growth by rates, over that before: more is not resolved in time."""
 
 
+@dataclass(frozen=True, eq=False)
+class SolvedStep:
+    """A step: its displacement (k, 3) of the local nodes in m, its length, and how tissue grew."""
+
+    displacement: Floats
+    step_s: float
+    growth: StepGrowth
+
+
 class Folding:
     """A brain that folds: the solver's objects, made once, and its steps.
 
     `mesh` is the start brain in RAS+ mm, whole on every rank; maps are at its vertices. `start` are its positions in m.
-    `solved` is the last accepted step (at first, one without displacement); `fields` computes its fields until the next
-    step begins.
+    `solved` is the last accepted step; at first, one without displacement.
     """
 
     def __init__(
@@ -72,10 +82,9 @@ class Folding:
             self.problem.contributions.append(self.contact)
         newton = NewtonSettings(p.solver.newton_tolerance)
         self.solver = NewtonSolver(self.problem, newton, residual_floor(mesh, stiffest))
-        self.inputs = GrowthInputs.of(mesh, zones, self.maps)
-        self.model = growth_model(p, self.inputs, mesh.vertices, comm.allreduce)
+        self.inputs = GrowthInputs(mesh, zones, self.maps, comm.allreduce)
+        self.model = growth_model(p, self.inputs)
         self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
-        self.fields = StepFields(self.problem, self.contact, zones, p)
         self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
         self._pial = np.unique(zones.cortex_facets)
 
@@ -102,7 +111,7 @@ class Folding:
             "week": self.parameters.start_week + (state.time_s + step_s) / SECONDS_PER_GW,
             "dt_s": step_s,
             **self._solution_row(solution, displacement),
-            **contact_row(self.contact, self.zones, u, positions),
+            **self._contact_row(u, positions),
             **growth.row(size),
             "elements_through_cortex": elements_through(
                 self.domain, tissue.depth, float(np.mean(thickness)) * M_PER_MM
@@ -129,9 +138,13 @@ class Folding:
             self.contact.begin_step()
             if self.problem.free:
                 part = self.contact.join_touching(part)
+        stretch = None
+        if state.stretch is not None:
+            before, step_gw = unpacked(state.stretch[domain.tet_of_cell]), step_s / SECONDS_PER_GW
+            stretch = relaxed(before, step_gw, p.stress_memory_gw, keeps_volume=p.relaxation == "shape")
         growth = self.model(start)
         mu = tissue.at_points(shear_modulus(p, tissue.weight, tissue.maps, week))
-        self.problem.set_step(mu, growth.inverse(tissue), self._stretch(state, step_s), part)
+        self.problem.set_step(mu, growth.inverse(tissue), stretch, part)
         return tissue, growth
 
     def grown(self, state: State, growth: StepGrowth) -> Floats | None:
@@ -141,13 +154,6 @@ class Folding:
             return None
         grown = self.domain.gather_cells(mean)
         return grown if state.growth is None else grown @ state.growth
-
-    def _stretch(self, state: State, step_s: float) -> Floats | None:
-        if state.stretch is None:
-            return None
-        before = unpacked(state.stretch[self.domain.tet_of_cell])
-        p = self.parameters
-        return relaxed(before, step_s / SECONDS_PER_GW, p.stress_memory_gw, keeps_volume=p.relaxation == "shape")
 
     def _solution_row(self, solution: Solution, displacement: Floats) -> dict[str, float]:
         u, length = solution.displacement, np.linalg.norm(displacement, axis=1) * MM_PER_M
@@ -164,6 +170,18 @@ class Folding:
             "mean_u_mm": float(length.mean()),
             "max_u_pial_mm": float(length[self._pial].max()),
             "mean_u_pial_mm": float(length[self._pial].mean()),
+        }
+
+    def _contact_row(self, u: Floats, positions: Floats) -> dict[str, float]:
+        if self.contact is None:
+            return {"plane_penetration_mm": self.zones.penetration_mm(positions * MM_PER_M)}
+        distance = self.contact.smallest_distance_mm(u)
+        return {
+            "contact_distance_mm": self.contact.distance_mm,
+            "contact_stiffness_pa": self.contact.stiffness_pa,
+            "contact_pairs": self.contact.pair_count(u),
+            # only pairs within the contact distance are searched for
+            "min_distance_mm": distance if distance < math.inf else math.nan,
         }
 
 
@@ -187,7 +205,7 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             if half < smallest * (1 - 1e-9):
                 raise SolverError(
                     f"the step at GW {p.start_week + state.time_s / SECONDS_PER_GW:.3f} fails even with {step_s:g} s",
-                    found=f"{error}; {worst_places(folding.solver)}",
+                    found=f"{error}; {folding.solver.worst_places()}",
                     remedy="The last good state is kept: the same command with an earlier folding.end_week or more "
                     "folding.solver.max_halvings resumes from it. A finer mesh or less growth may help.",
                 ) from None
@@ -202,3 +220,41 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
             after = replace(after, step_s=min(2 * after.step_s, p.step_s), successes=0)
         return after
+
+
+def elements_through(domain: Domain, distance: Floats, thickness: float) -> float:
+    """Return a cortical thickness over the mean edge length of the elements in the cortex; NaN if there are none.
+
+    `distance` (k,) is from the local nodes to the pial surface, in m like the thickness.
+    """
+    inside = domain.corners[distance[domain.corners].mean(axis=1) <= thickness]
+    nodes = domain.local(domain.positions)
+    lengths = sum(float(np.linalg.norm(nodes[inside[:, i]] - nodes[inside[:, j]], axis=1).sum()) for i, j in EDGES)
+    total, count = domain.comm.allreduce(np.array([lengths, len(EDGES) * len(inside)]))
+    return float(thickness * count / total) if count else math.nan
+
+
+def resolution_warning(rows: Sequence[dict], order: int) -> str:
+    """Return a warning at the first step with too few elements through the cortex, else an empty text."""
+    # NaN: no element has its centre in the cortex
+    through = [
+        0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]
+    ]
+    current, before = through[-1], through[0] if len(through) > 1 else math.inf
+    if not current < ELEMENTS_NEEDED[order] <= before:
+        return ""
+    start = f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
+    return (
+        f"{start} fewer than {ELEMENTS_NEEDED[order]:g} elements lie through the cortex, so folds may be mesh noise: "
+        "reduce mesh.surface_edge_mm to resolve the growing cortex longer"
+    )
+
+
+def unconverged_warning(row: dict) -> str:
+    """Return a warning if a step ended above the tolerance, else an empty text."""
+    if row["converged"]:
+        return ""
+    return (
+        f"step {row['step']} ends at {row['residual']:.1e} of its initial residual, above "
+        "folding.solver.newton_tolerance: round-off prevents further progress"
+    )

@@ -34,9 +34,9 @@ def start_regions(
     require_maps(parameters, maps, len(mesh.vertices))
     zones = zones_of_run(mesh, parameters)
     refuse_impossible(mesh, zones)
-    inputs = GrowthInputs.of(mesh, zones, maps)
-    growth = growth_model(parameters, inputs, mesh.vertices)(StepStart(mesh.vertices, 0.0, parameters.step_s))
-    points = IntegrationPoints.exact_to_degree(mesh.order)
+    inputs = GrowthInputs(mesh, zones, maps)
+    growth = growth_model(parameters, inputs)(StepStart(mesh.vertices, 0.0, parameters.step_s))
+    points = IntegrationPoints.for_order(mesh.order)
     grown = growth.mean_deformation(Elements(mesh.tets, np.arange(len(mesh.vertices)), points))
     logs = None if grown is None else log_growth_at_vertices(mesh.vertices, inputs, grown)
     fields = layer_fields(

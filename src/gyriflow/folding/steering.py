@@ -15,7 +15,7 @@ from ..geometry.triangles import TriangleMesh, area_vectors
 from ..settings.folding import FoldingParameters
 from ..settings.varying import value_at
 from ..units import CM2_PER_MM2, ML_PER_MM3
-from .growth import Floats, GrowthByRates, GrowthInputs, Size, StepGrowth, StepStart, increments
+from .growth import Floats, GrowthByRates, GrowthInputs, Size, StepStart, increments
 from .layers import WEIGHT_REACH, PialSearch, cortical_weight
 
 JOINING_GW = 1.0
@@ -57,31 +57,19 @@ class SteeredStep(GrowthByRates):
         }
 
 
-@dataclass(frozen=True, eq=False)
-class SteeredGrowth:
-    """The model of growth by sizes; `at_start` is the size at the start of the run."""
-
-    parameters: FoldingParameters
-    inputs: GrowthInputs
-    at_start: Size
-
-    def growth(self, start: StepStart) -> StepGrowth:
-        """Return the growth of a step."""
-        p, week = self.parameters, start.week(self.parameters, 1.0)
-        before, target = self.inputs.size(start.positions_mm), self.target(week)
-        gain, radial = free_growth(p, start.positions_mm, self.inputs, week)
-        required = before.rates_to(target, start.step_s) - radial - (start.correction or (0.0, 0.0))
-        *rates, limited = steered_rates(required, gain, (0.0, MAX_RATE_PER_S))
-        p = p.model_copy(update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]})
-        return SteeredStep(p, start, before, target, gain @ rates + radial, bool(limited))
-
-    def target(self, week: float) -> Size:
-        """Return the size to reach at a week."""
-        start, at_start, growth = self.parameters.start_week, self.at_start, self.parameters.growth
-        return Size(
-            blended(growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, start, week) / CM2_PER_MM2,
-            blended(growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, start, week) / ML_PER_MM3,
-        )
+def steered_growth(p: FoldingParameters, inputs: GrowthInputs, at_start: Size, start: StepStart) -> SteeredStep:
+    """Return the growth by sizes of a step of a run with a size `at_start`."""
+    week = start.week(p, 1.0)
+    before = inputs.size(start.positions_mm)
+    target = Size(
+        blended(p.growth.area_cm2, at_start.area_mm2 * CM2_PER_MM2, p.start_week, week) / CM2_PER_MM2,
+        blended(p.growth.volume_ml, at_start.volume_mm3 * ML_PER_MM3, p.start_week, week) / ML_PER_MM3,
+    )
+    gain, radial = free_growth(p, start.positions_mm, inputs, week)
+    required = before.rates_to(target, start.step_s) - radial - (start.correction or (0.0, 0.0))
+    *rates, limited = steered_rates(required, gain, (0.0, MAX_RATE_PER_S))
+    p = p.model_copy(update={"growth_rate_per_s": rates[0], "core_growth_rate_per_s": rates[1]})
+    return SteeredStep(p, start, before, target, gain @ rates + radial, bool(limited))
 
 
 def steered_rates(required: Floats, gain: Floats, bounds: tuple[float, float]) -> tuple[float, float, bool]:

@@ -3,93 +3,65 @@
 Arrays of tensors are (c, 3, 3), of scalars (c,).
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection
 
 import numpy as np
 
 from ..geometry.triangles import Floats
-from ..settings.folding import FoldingParameters
 from ..settings.terms import ELEMENT_FIELDS
 from ..units import SECONDS_PER_GW
-from .contact import SelfContact
-from .growth import StepGrowth
 from .layers import PialSearch
-from .problem import NonlinearProblem
+from .simulation import Folding
 from .stretches import deformation_gradients
-from .zones import Zones
 
 
-@dataclass(frozen=True, eq=False)
-class SolvedStep:
-    """A step: its displacement (k, 3) of the local nodes in m, its length, and how tissue grew."""
+def step_fields(folding: Folding, names: Collection[str]) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return fields of the last solved step, by names of the parameter `fields`; names of arrays contain units.
 
-    displacement: Floats
-    step_s: float
-    growth: StepGrowth
-
-
-class StepFields:
-    """The fields of a solved step, by names of the parameter `fields`. Names of arrays contain units.
-
-    Fields are computed with the problem of the step, whose mesh stays at the start of the step until the next one
-    begins. Without stress memory, stress, strain and contact pressure of a step are proportional to its length, so they
-    are given per week; but a pressure and an elastic change of volume that tissue keeps are not divided by time. Growth
-    towards shapes leaves no stress and elastic strain but next to contact, where they depend on the mesh: there are
-    none.
+    The first ones are at all vertices (n,): contact pressure. The second ones are those of elements (m,), averaged over
+    points. Both are equal on every rank. The problem's mesh is still at the start of the step. Without stress memory,
+    stress, strain and contact pressure of a step are proportional to its length, so they are given per week; but a
+    pressure and an elastic change of volume that tissue keeps are given as they are. Growth towards shapes leaves no
+    stress and elastic strain but next to contact, where they depend on the mesh: there are none.
     """
+    p, problem, domain, u = folding.parameters, folding.problem, folding.domain, folding.solved.displacement
+    kept = {"pressure_pa", "elastic_volume_strain"} if p.keeps_volume_only else set()
 
-    def __init__(
-        self, problem: NonlinearProblem, contact: SelfContact | None, zones: Zones, parameters: FoldingParameters
-    ) -> None:
-        self.problem, self.contact, domain = problem, contact, problem.domain
-        self._is_elastic = parameters.growth.definition.measured != "shapes"
-        self._remembers = parameters.stress_memory_gw > 0
-        self._kept = {"pressure_pa", "elastic_volume_strain"} if parameters.keeps_volume_only else set()
-        self._start = domain.local(domain.positions)
-        if "strain" in parameters.fields:
-            centres = self._start[domain.corners].mean(axis=1)
-            self._start_normals = PialSearch(domain.positions, zones.cortex_facets).nearest_normals(centres)
-
-    def elements(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
-        """Return those of the named fields that elements have, (m,), averaged over points, equal on every rank."""
-        problem, u, domain = self.problem, step.displacement, self.problem.domain
-        fields: dict[str, Floats] = {}
-        names = {*names} & {*ELEMENT_FIELDS} - (set() if self._is_elastic else {"stress"})
-        if not names:
+    def as_rates(fields: dict[str, Floats]) -> dict[str, Floats]:
+        if p.stress_memory_gw > 0:
             return fields
-        slopes = problem.points.gradients
-        after = domain.local(domain.positions) + u
-        total = deformation_gradients(self._start, after, domain.cells, slopes).reshape(-1, 3, 3)
-        if "stress" in names:
-            stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
-            fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
-        if "strain" in names and self._is_elastic:
-            Fe = problem.evaluate("elastic", u).reshape(-1, 3, 3)
-            fields |= {"elastic_strain": hencky_equivalent(Fe), "elastic_volume_strain": np.log(np.linalg.det(Fe))}
-        fields = self._per_gw(fields, step.step_s)
-        if "strain" in names:
-            normals = np.repeat(self._start_normals, len(slopes), axis=0)
-            fields |= {"total_strain": green_lagrange_maximum(total), "area_stretch": areal_stretch(total, normals)}
-        if "volume_ratio" in names:
-            fields["volume_ratio_step"] = np.linalg.det(problem.evaluate("deformation", u).reshape(-1, 3, 3))
-            fields["volume_ratio"] = np.linalg.det(total)
-        means = [values.reshape(-1, len(slopes)) @ problem.points.weights for values in fields.values()]
-        gathered = domain.gather_cells(np.stack(means, axis=1))
-        return dict(zip(fields, gathered.T, strict=True))
+        steps_per_gw = SECONDS_PER_GW / folding.solved.step_s
+        rates = {f"{name}_per_gw": values * steps_per_gw for name, values in fields.items() if name not in kept}
+        return {name: values for name, values in fields.items() if name in kept} | rates
 
-    def contact_pressure(self, names: Iterable[str], step: SolvedStep) -> dict[str, Floats]:
-        """Return the contact pressure (n,) at all vertices, if it is one of the named fields."""
-        if self.contact is None or "contact_pressure" not in names:
-            return {}
-        return self._per_gw({"contact_pressure_pa": self.contact.pressure(step.displacement)}, step.step_s)
-
-    def _per_gw(self, fields: dict[str, Floats], step_s: float) -> dict[str, Floats]:
-        if self._remembers:
-            return fields
-        kept = {name: values for name, values in fields.items() if name in self._kept}
-        rates = {name: values for name, values in fields.items() if name not in self._kept}
-        return kept | {f"{name}_per_gw": values * (SECONDS_PER_GW / step_s) for name, values in rates.items()}
+    at_vertices: dict[str, Floats] = {}
+    if folding.contact is not None and "contact_pressure" in names:
+        at_vertices = as_rates({"contact_pressure_pa": folding.contact.pressure(u)})
+    is_elastic = p.growth.definition.measured != "shapes"
+    element_names = {*names} & {*ELEMENT_FIELDS} - (set() if is_elastic else {"stress"})
+    if not element_names:
+        return at_vertices, {}
+    fields: dict[str, Floats] = {}
+    start, slopes = domain.local(folding.start), problem.points.gradients
+    after = domain.local(domain.positions) + u
+    total = deformation_gradients(start, after, domain.cells, slopes).reshape(-1, 3, 3)
+    if "stress" in element_names:
+        stress = problem.evaluate("stress", u).reshape(-1, 3, 3)
+        fields |= {"von_mises_pa": von_mises(stress), "pressure_pa": pressure(stress)}
+    if "strain" in element_names and is_elastic:
+        Fe = problem.evaluate("elastic", u).reshape(-1, 3, 3)
+        fields |= {"elastic_strain": hencky_equivalent(Fe), "elastic_volume_strain": np.log(np.linalg.det(Fe))}
+    fields = as_rates(fields)
+    if "strain" in element_names:
+        search = PialSearch(folding.start, folding.zones.cortex_facets)
+        normals = np.repeat(search.nearest_normals(start[domain.corners].mean(axis=1)), len(slopes), axis=0)
+        fields |= {"total_strain": green_lagrange_maximum(total), "area_stretch": areal_stretch(total, normals)}
+    if "volume_ratio" in element_names:
+        fields["volume_ratio_step"] = np.linalg.det(problem.evaluate("deformation", u).reshape(-1, 3, 3))
+        fields["volume_ratio"] = np.linalg.det(total)
+    means = [values.reshape(-1, len(slopes)) @ problem.points.weights for values in fields.values()]
+    gathered = domain.gather_cells(np.stack(means, axis=1))
+    return at_vertices, dict(zip(fields, gathered.T, strict=True))
 
 
 def pressure(stress: Floats) -> Floats:

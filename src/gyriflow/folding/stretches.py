@@ -1,4 +1,4 @@
-"""Deformation gradients of elements, and their stretches."""
+"""Deformation gradients of elements, their stretches, and symmetric tensors stored as six values."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,21 @@ from ..geometry.triangles import Floats
 
 MIN_SQUARED_STRETCH = 1e-6
 """Squared principal stretches below this count as this: those of flat elements."""
+UPPER = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+"""Rows and columns of the six values of a symmetric tensor."""
+
+
+def packed(tensors: Floats) -> Floats:
+    """Return the (..., 6) values xx, yy, zz, xy, xz, yz of (..., 3, 3) symmetric tensors."""
+    return tensors[..., UPPER[0], UPPER[1]]
+
+
+def unpacked(values: Floats) -> Floats:
+    """Return the (..., 3, 3) symmetric tensors of (..., 6) values."""
+    tensors = np.empty((*values.shape[:-1], 3, 3))
+    tensors[..., UPPER[0], UPPER[1]] = values
+    tensors[..., UPPER[1], UPPER[0]] = values
+    return tensors
 
 
 def deformation_gradients(before: Floats, after: Floats, cells: NDArray[np.integer], slopes: Floats) -> Floats:
@@ -46,3 +61,23 @@ def log_stretch(F: Floats, *, left: bool = False, limit: float = np.inf) -> Floa
     squares, axes = np.linalg.eigh(F @ turned if left else turned @ F)
     logs = np.clip(0.5 * np.log(np.maximum(squares, MIN_SQUARED_STRETCH)), -limit, limit)
     return np.asarray((axes * logs[..., None, :]) @ axes.swapaxes(-1, -2))
+
+
+def left_stretch(Fe: Floats, power: float = 1.0) -> Floats:
+    """Return V^power (..., 3, 3) of Fe = V·R; an isotropic material does not depend on the rotation R."""
+    squares, axes = np.linalg.eigh(Fe @ Fe.swapaxes(-1, -2))
+    return (axes * squares[..., None, :] ** (power / 2)) @ axes.swapaxes(-1, -2)
+
+
+def relaxed(V: Floats, step_gw: float, memory_gw: float, *, keeps_volume: bool = False) -> Floats:
+    """Return stretches (..., 3, 3) after a time: the Hencky strain ln V decays as exp(−t/τ), with τ = `memory_gw`.
+
+    With `keeps_volume` only the deviator of ln V decays.
+    """
+    if np.isinf(memory_gw):
+        return V
+    left = float(np.exp(-step_gw / memory_gw)) if memory_gw else 0.0
+    stretches = left_stretch(V, left)
+    if keeps_volume:
+        stretches = stretches * (np.linalg.det(V) ** ((1 - left) / 3))[..., None, None]
+    return stretches

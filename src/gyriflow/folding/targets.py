@@ -17,7 +17,7 @@ from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import smooth_integrals, vertex_sizes
 from ..geometry.paths import Path, path_through
-from ..geometry.tetrahedra import TetrahedralMesh, has_volume, volumes_between
+from ..geometry.tetrahedra import has_volume, volumes_between
 from ..settings.folding import AXES, FoldingParameters
 from ..settings.varying import Maps
 from ..units import M_PER_MM, SECONDS_PER_GW
@@ -77,50 +77,19 @@ class TargetGrowth(StepGrowth):
         return super().row(after) | {"to_path_mm": self.misfit_mm} | counts
 
 
-@dataclass(frozen=True, eq=False)
-class GrowthToTargets:
-    """The model of growth along a path through shapes of the whole mesh at later weeks.
+def path_of_run(p: FoldingParameters, inputs: GrowthInputs) -> Path:
+    """Return the path of a run from its start mesh through the targets, in any pose, that its maps contain.
 
-    The run's maps contain the shapes, in any pose; `path` leads through them, from the start. `total` adds up a count
-    of elements over the ranks.
+    InputError if the targets end before the run does.
     """
-
-    parameters: FoldingParameters
-    inputs: GrowthInputs
-    path: Path
-    total: Callable[[int], int]
-
-    @classmethod
-    def of(
-        cls, p: FoldingParameters, inputs: GrowthInputs, positions_mm: Floats, total: Callable[[int], int]
-    ) -> "GrowthToTargets":
-        """Return the model of a run from (n, 3) positions; its maps contain the targets that its parameters name."""
-        if (last := max(p.targets)) < p.end_week - WEEK_TOL_GW:
-            raise InputError(
-                "the target shapes of the run end before it does",
-                found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
-                remedy="End the run earlier, or add brains of later weeks.",
-            )
-        weeks, shapes = shapes_of_run(p, inputs.maps, positions_mm)
-        mesh = TetrahedralMesh(positions_mm, inputs.tets)
-        return cls(p, inputs, path_through(weeks, shapes, mesh, p.step_s / SECONDS_PER_GW, p.stops), total)
-
-    def growth(self, start: StepStart) -> StepGrowth:
-        """Return the growth of a step: that of the path, and of the part of the misfit that feedback makes up for."""
-        p, positions, pieces = self.parameters, start.positions_mm, self.inputs.pieces
-        week, end = (min(start.week(p, part), float(self.path.weeks[-1])) for part in (0.0, 1.0))
-        sizes = vertex_sizes(positions, pieces)
-        motion = rigid_fit(self.path(week), positions, sizes)
-        now, later = (transform_points(self.path(at), motion) for at in (week, end))
-        misfit = now - positions
-        misfit_mm = float(np.sqrt(np.average((misfit**2).sum(axis=1), weights=sizes)))
-        goal = later - misfit
-        if misfit_mm > FEEDBACK_FROM_MM:
-            back = (1 - np.exp((week - end) / FEEDBACK_GW)) * misfit
-            goal += smooth_integrals(positions, pieces, sizes[:, None] * back, FEEDBACK_SMOOTHING_MM)
-        ratios = volumes_between(goal, self.inputs.tets) / volumes_between(positions, self.inputs.tets)
-        shrinking = (ratios > 0) & (ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S)
-        return TargetGrowth(p, start, goal, misfit_mm, int(shrinking.sum()), self.total)
+    if (last := max(p.targets)) < p.end_week - WEEK_TOL_GW:
+        raise InputError(
+            "the target shapes of the run end before it does",
+            found=f"shapes up to {last:g} GW and a run to {p.end_week:g} GW",
+            remedy="End the run earlier, or add brains of later weeks.",
+        )
+    weeks, shapes = shapes_of_run(p, inputs.maps, inputs.mesh.vertices)
+    return path_through(weeks, shapes, inputs.mesh, p.step_s / SECONDS_PER_GW, p.stops)
 
 
 def shapes_of_run(p: FoldingParameters, maps: Maps, positions_mm: Floats) -> tuple[list[float], list[Floats]]:
@@ -128,6 +97,24 @@ def shapes_of_run(p: FoldingParameters, maps: Maps, positions_mm: Floats) -> tup
     weeks = sorted(week for week in p.targets if week > p.start_week + WEEK_TOL_GW)
     targets = [np.stack([maps[f"{p.targets[week]}_{axis}"] for axis in AXES], axis=1) for week in weeks]
     return [p.start_week, *weeks], [positions_mm, *targets]
+
+
+def growth_on_path(p: FoldingParameters, inputs: GrowthInputs, path: Path, start: StepStart) -> TargetGrowth:
+    """Return the growth of a step: that of the path, and of the part of the misfit that feedback makes up for."""
+    tets, positions, pieces = inputs.mesh.tets, start.positions_mm, inputs.pieces
+    week, end = (min(start.week(p, part), float(path.weeks[-1])) for part in (0.0, 1.0))
+    sizes = vertex_sizes(positions, pieces)
+    motion = rigid_fit(path(week), positions, sizes)
+    now, later = (transform_points(path(at), motion) for at in (week, end))
+    misfit = now - positions
+    misfit_mm = float(np.sqrt(np.average((misfit**2).sum(axis=1), weights=sizes)))
+    goal = later - misfit
+    if misfit_mm > FEEDBACK_FROM_MM:
+        back = (1 - np.exp((week - end) / FEEDBACK_GW)) * misfit
+        goal += smooth_integrals(positions, pieces, sizes[:, None] * back, FEEDBACK_SMOOTHING_MM)
+    ratios = volumes_between(goal, tets) / volumes_between(positions, tets)
+    shrinking = (ratios > 0) & (ratios < 1 - MAX_SHRINKAGE_PER_DAY * start.step_s / DAY_S)
+    return TargetGrowth(p, start, goal, misfit_mm, int(shrinking.sum()), inputs.total)
 
 
 def missed_targets(rows: Sequence[dict[str, Any]]) -> list[str]:

@@ -80,12 +80,6 @@ class Tissue:
         points = self.elements.points
         return values[..., self.elements.cells] @ points.interpolation.T if points.order == 1 else values
 
-    def interpolate(self, values: Floats, chunk: slice) -> Floats:
-        """Return (..., c, q) values at the points of some elements, linear between those (..., n) at all vertices."""
-        elements, points = self.elements, self.elements.points
-        linear = points.interpolation if points.order == 1 else points.piecewise_linear
-        return np.asarray(values[..., elements.vertices[elements.cells[chunk]]] @ linear.T)
-
     def normals(self, needed: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Floats]:
         """Return the mask (c,) of elements that need a normal at a node or point, and their unit normals (e, q, 3).
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from .jacobians import CORNER_PARTS, EDGES, chunks, coefficients, determinants, lower_bounds, shape_values
-from .triangles import Floats, Ints, TriangleMesh, frozen
+from .triangles import Floats, Ints, TriangleMesh, connected, frozen
 
 # the six tetrahedra of a cube around its diagonal (Kuhn), corners numbered 4x + 2y + z
 KUHN = ((0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7))
@@ -115,8 +114,7 @@ def radius_ratios(mesh: TetrahedralMesh) -> Floats:
 def connected_parts(mesh: TetrahedralMesh) -> Ints:
     """Return the (n,) number of the connected part of the mesh that each vertex belongs to."""
     pairs = np.stack(np.broadcast_arrays(mesh.tets[:, :1], mesh.tets[:, 1:]), axis=-1).reshape(-1, 2)
-    graph = sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(mesh.vertices),) * 2)
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return connected(pairs, len(mesh.vertices)).astype(np.int64)
 
 
 def grid(ticks: Sequence[Floats]) -> TetrahedralMesh:

@@ -142,7 +142,7 @@ def euler_number(mesh: TriangleMesh) -> int:
 
 def face_components(mesh: TriangleMesh) -> Ints:
     """Return the (m,) number of the connected component of each face, the largest area first (0)."""
-    label = _connected(mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(mesh.vertices))
+    label = connected(mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(mesh.vertices))
     _, component = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
     order = np.argsort(-np.bincount(component, weights=face_areas(mesh)), kind="stable")
     return np.argsort(order)[component]
@@ -178,21 +178,22 @@ def split_sheets(mesh: TriangleMesh) -> TriangleMesh:
         else:
             ambiguous.append(sides)
     # where faces overlap, faces of the same sheet elsewhere are paired
-    sheet = _connected(np.concatenate(pairs) // 3, len(faces))
+    sheet = connected(np.concatenate(pairs) // 3, len(faces))
     for sides in ambiguous:
         matched = scipy.optimize.linear_sum_assignment(sheet[sides[0] // 3][:, None] != sheet[sides[1] // 3])
         pairs.append(np.stack([side[index] for side, index in zip(sides, matched, strict=True)], axis=1))
     edge, partner = np.concatenate(pairs).T
     is_opposite = start[edge] != start[partner]
     joined = np.where(is_opposite, [following[partner], partner], [partner, following[partner]])
-    corner = _connected(np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size)
+    corner = connected(np.concatenate([[edge, following[edge]], joined]).reshape(2, -1).T, faces.size)
     _, first = np.unique(corner, return_index=True)
     if len(first) == len(np.unique(faces)):
         return mesh
     return TriangleMesh(mesh.vertices[faces.ravel()[first]], corner.reshape(-1, 3))
 
 
-def _connected(pairs: Ints, count: int) -> Ints:
+def connected(pairs: NDArray[np.integer], count: int) -> Ints:
+    """Return the (count,) number of the connected component of each of `count` nodes, from (k, 2) links."""
     graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 

@@ -10,15 +10,12 @@ import numpy as np
 
 from ..geometry import tetrahedra
 from ..geometry.jacobians import coefficients
-from ..geometry.matching import faces_that_cross, nearest_on
+from ..geometry.matching import MIN_NORMAL_COSINE, faces_that_cross, nearest_on
 from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats, Mask, TriangleMesh, edges, face_normals, vertex_normals
 from .quality import jacobian_ratios
 
 log = logging.getLogger(__name__)
-MIN_NORMAL_COSINE = 0.5
-"""Least cosine between the normals of the mesh at a node and of the surface where the node is to go: the wall of a
-sulcus may be nearer to a node than the place it comes from."""
 FARTHEST = 0.25
 """Largest move of a node, in lengths of the shortest outer edge that ends there."""
 HALVINGS = 6
@@ -67,6 +64,7 @@ def _project(mesh: TetrahedralMesh, surface: TriangleMesh) -> tuple[Floats, Mask
     length = np.linalg.norm(np.diff(boundary.vertices[ends], axis=1)[:, 0], axis=1)
     shortest = np.full(len(outer), np.inf)
     np.minimum.at(shortest, ends.ravel(), np.repeat(length, 2))
+    # the wall of a sulcus may be nearer to a node than the place it comes from
     agrees = np.einsum("ij,ij->i", vertex_normals(boundary), face_normals(surface)[face]) >= MIN_NORMAL_COSINE
     near = agrees & (distance <= FARTHEST * shortest)
     target, way = mesh.vertices.copy(), np.zeros(len(mesh.vertices), dtype=bool)

@@ -7,8 +7,8 @@ from facts import Facts
 from scipy.linalg import polar
 from shapes import cerebrum_surface, ellipsoid, inner, moved, octasphere, phantom, rigid, sphere
 
-from gyriflow.anatomy.filled import filled_labels
 from gyriflow.anatomy.fissure import split
+from gyriflow.anatomy.thickness import filled_labels
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import angle_deg
 from gyriflow.geometry.deformations import carry, transform_points

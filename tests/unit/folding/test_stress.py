@@ -21,8 +21,7 @@ from gyriflow.folding.step_fields import (
     principal_stretches,
     von_mises,
 )
-from gyriflow.folding.stress import left_stretch, relaxed
-from gyriflow.folding.stretches import deformation_gradients
+from gyriflow.folding.stretches import deformation_gradients, left_stretch, relaxed
 from gyriflow.folding.zones import Zones
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic
 from gyriflow.mechanics.materials import MATERIALS, Material, NeoHookean
