@@ -2,13 +2,14 @@
 #
 # The number of runs is fixed; their parameters are not: those of a round are in a table, which its runs read. Finished
 # runs are not repeated, so an interrupted calibration continues.
+from gyriflow.settings.terms import SPECTRAL_SCORES
+
 CALIBRATED = study.calibration
-
-
+IS_SPECTRAL = CALIBRATED and not set(CONFIG.calibrate.score).isdisjoint(SPECTRAL_SCORES)
 # spectra of the observed brains, if they are scored
 OBSERVED_SPECTRA = [
     f"{real.measurement.folder}/spectra.csv"
-    for brains in (CALIBRATED.observed.values() if CALIBRATED and CONFIG.calibrate.is_spectral else [])
+    for brains in (CALIBRATED.observed.values() if IS_SPECTRAL else [])
     for real in brains
 ]
 

@@ -6,7 +6,7 @@ from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
-from gyriflow.study.registry import target_files, by_rule, files_in, halves_of, observed_name
+from gyriflow.study.registry import target_files, by_rule, files_in, observed_name
 from gyriflow.study.paths import *
 from gyriflow.running.launch import KEEP_GOING_VAR, DRY_RUN_VAR, MEASURE_ONLY_VAR, hold_lock, refused_brains
 from gyriflow.running.provenance import input_contents, check_results_belong_to

@@ -1,8 +1,7 @@
 # Ensembles: intervals and spread of a run from its members, runs with uncertain inputs varied.
 def ensemble_of(wildcards):
-    """Return a simulation and its members."""
-    run = simulation_of(wildcards)
-    return run, study.members(run)
+    """Return the members of a simulation's ensemble."""
+    return study.members(simulation_of(wildcards))
 
 
 def reached(simulations, weeks):
@@ -22,14 +21,14 @@ def metrics_of(rows):
 rule ensemble:
     input:
         run=lambda w: metrics_of(simulation_of(w).measurements),
-        members=lambda w: metrics_of(reached(ensemble_of(w)[1], simulation_of(w).weeks)),
+        members=lambda w: metrics_of(reached(ensemble_of(w), simulation_of(w).weeks)),
         observed=lambda w: metrics_of(
             brains[0].measurement for brains in simulation_of(w).observed_brains.values()
         ),
         # the tested errors of predictions
         accuracy=lambda w: PREDICTION_TESTS if simulation_of(w).is_atlas_prediction else [],
         # all members at once, not one after the other as `reaches` asks for them
-        summaries=lambda w: [member.file(FOLDING["summary"]) for member in ensemble_of(w)[1]],
+        summaries=lambda w: [member.file(FOLDING["summary"]) for member in ensemble_of(w)],
     output:
         ENSEMBLE,
     script:
@@ -38,8 +37,7 @@ rule ensemble:
 
 def rows_of_ensemble(wildcards):
     """Return the measurements of a run and of its members at a week."""
-    run, members = ensemble_of(wildcards)
-    return reached([run, *members], [float(wildcards.week)])
+    return reached([simulation_of(wildcards), *ensemble_of(wildcards)], [float(wildcards.week)])
 
 
 rule ensemble_maps:
@@ -57,7 +55,7 @@ rule growth_sd:
         run=GROWTH_MAPS,
         members=lambda w: [
             member.file(GROWTH_MAPS)
-            for member in ensemble_of(w)[1]
+            for member in ensemble_of(w)
             if reaches(member.run, w.brain, member.weeks[-1])
         ],
     output:

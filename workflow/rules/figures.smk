@@ -2,12 +2,6 @@
 DRAW = Path(workflow.basedir, "workflow", "scripts", "draw.py")
 
 
-def inputs_of(figure):
-    """Return the inputs of a figure, without runs of sweeps that diverged before their week."""
-    ended = (run for run, brain, week in figure.may_end if not reaches(run, brain, week))
-    return figure.inputs_without(ended)
-
-
 for name, jobs in by_rule(FIGURES).items():
     kinds = [figure.kind for figure in jobs[0]]
 
@@ -18,7 +12,9 @@ for name, jobs in by_rule(FIGURES).items():
         name:
             name
         input:
-            lambda wildcards, drawn=drawn: files_in(list(map(inputs_of, drawn(wildcards)))),
+            lambda wildcards, drawn=drawn: files_in(
+                [figure.reached_inputs(reaches) for figure in drawn(wildcards)]
+            ),
         output:
             [file for kind in kinds for file in kind.outputs],
         wildcard_constraints:
@@ -29,7 +25,7 @@ for name, jobs in by_rule(FIGURES).items():
             figures=lambda wildcards, drawn=drawn: [
                 {
                     "draw": figure.kind.draw,
-                    "inputs": inputs_of(figure),
+                    "inputs": figure.reached_inputs(reaches),
                     "options": figure.options,
                     "files": figure.files,
                 }

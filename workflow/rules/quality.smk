@@ -3,11 +3,8 @@ def quality_columns(name):
     """Return the columns of the quality table that come from the configuration, also of a refused brain."""
     given = CONFIG.brain(name)
     known = {key: getattr(given, key) for key in ("week", "population", "source")}
-    return (
-        {"subject": name}
-        | known
-        | {"sides": " ".join(given.sides), "page": f"{BRAIN}/figures/quality.png".format(brain=name)}
-    )
+    page = f"{BRAIN}/figures/quality.png".format(brain=name)
+    return {"subject": name, **known, "sides": " ".join(given.sides), "page": page}
 
 
 rule brain_figures:

@@ -88,11 +88,11 @@ VIEWED = [
 ]
 SURFACES = {
     "runs": {
-        name: [[row.week, halves_of(row)] for row in simulation.measurements]
+        name: [[row.week, row.halves] for row in simulation.measurements]
         for name, simulation in zip(run_names(study.pairs), study.run_simulations)
     },
     "observed": [
-        [brain.week, halves_of(brain.measurement)] for brain in sorted(VIEWED, key=lambda brain: brain.week)
+        [brain.week, brain.measurement.halves] for brain in sorted(VIEWED, key=lambda brain: brain.week)
     ],
 }
 

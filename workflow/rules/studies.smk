@@ -10,10 +10,9 @@ def files_of_member(wildcards):
         return {}
     simulated, real = simulation_of(wildcards).at(compared.week), compared.observed[wildcards.brain]
     rows = [simulated, *(brain.measurement for brain in real)]
+    tables = ("metrics", "spectra", "coefficients")
     return {
-        "metrics": [f"{row.folder}/metrics.csv" for row in rows],
-        "spectra": [f"{row.folder}/spectra.csv" for row in rows],
-        "coefficients": [f"{row.folder}/coefficients.csv" for row in rows],
+        **{name: [f"{row.folder}/{name}.csv" for row in rows] for name in tables},
         "simulated": list(simulated.parts.values()),
         "measured": [path for row in rows[1:] for path in row.parts.values()],
     }

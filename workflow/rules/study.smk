@@ -58,18 +58,14 @@ rule run_tables:
         "../scripts/run_tables.py"
 
 
-EXPORTED = study.exported
-EXPORTED_FILES = (
-    *("surfaces", "maps", "regions", "report", "white", "white_maps"),
-    *("template_maps", "volume"),
-)
+EXPORTED_FILES = ("surfaces", "maps", "regions", "report", "white", "white_maps", "template_maps", "volume")
 
 
 # a separate target
 rule export:
     input:
-        files_in([[brain[kind] for kind in EXPORTED_FILES] for brain in EXPORTED]),
-        [brain["volume"]["labels"].path for brain in EXPORTED if brain["volume"]],
+        files_in([[getattr(brain, kind) for kind in EXPORTED_FILES] for brain in study.exported]),
+        [brain.volume["labels"].path for brain in study.exported if brain.volume],
         long=rules.metrics_tables.output.metrics_long,
     output:
         # a file, since Snakemake writes its own file into an output folder
@@ -77,7 +73,7 @@ rule export:
     log:
         f"{STUDY}/logs/export.log",
     params:
-        brains=EXPORTED,
+        brains=study.exported,
     script:
         "../scripts/export.py"
 

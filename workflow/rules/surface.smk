@@ -18,22 +18,14 @@ def surface_settings(*names):
     return CONFIG.surface.model_dump(include=set(names))
 
 
-def given_surface(wildcards):
-    """Return the files that a brain's pial surface is made from."""
+def pial_source(wildcards):
+    """Return the files that a brain's pial surface is made from, and the surface settings for such data."""
     brain = brain_of(wildcards)
     if brain.source == "shape":
-        return [SHAPE.format(brain=brain.id)]
-    return [brain.labels.path] if brain.labels else brain.config.files
-
-
-def pial_settings(wildcards):
-    """Return the surface settings for the data of a brain."""
-    brain = brain_of(wildcards)
-    if brain.source == "shape":
-        return {}
-    if not brain.labels:
-        return surface_settings("edge_length_mm", "max_hole_mm")
-    return surface_settings("edge_length_mm", "open_sulci")
+        return [SHAPE.format(brain=brain.id)], {}
+    if brain.labels:
+        return [brain.labels.path], surface_settings("edge_length_mm", "open_sulci")
+    return brain.config.files, surface_settings("edge_length_mm", "max_hole_mm")
 
 
 # a simple shape instead of a brain
@@ -50,7 +42,7 @@ rule shape:
 
 rule pial:
     input:
-        given=given_surface,
+        given=lambda w: pial_source(w)[0],
         white=lambda w: list(brain_of(w).config.white_files.values()),
     output:
         **pial_of(*SIDES),
@@ -69,7 +61,7 @@ rule pial:
         # also parameters, since swapped input files do not trigger a rerun
         white=lambda w: brain_of(w).config.white_files,
         checksums=lambda w: brain_of(w).checksums,
-        settings=pial_settings,
+        settings=lambda w: pial_source(w)[1],
         limits=lambda w: LIMITS if brain_of(w).source == "hemispheres" else {},
     script:
         "../scripts/pial.py"

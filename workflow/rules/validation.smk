@@ -30,6 +30,7 @@ def compared_files(wildcards):
 
 # of both rules that compare a run
 COMPARED = {
+    "run": lambda w: w.run,
     "start_week": lambda w: brain_of(w).week,
     "weeks": lambda w: list(simulation_of(w).observed),
     "observed": lambda w: [brain.id for brain in simulation_of(w).observed.values()],
@@ -49,7 +50,6 @@ rule validation:
     params:
         **COMPARED,
         series=lambda w: simulation_of(w).series,
-        run=lambda w: w.run,
     script:
         "../scripts/validation.py"
 
@@ -61,13 +61,13 @@ rule prediction:
         atlas=lambda w: [brain.pial for brain in study.chains[w.brain, "atlas"].later],
         targets=TARGETS.format(brain="{brain}", origin="atlas"),
     output:
-        PREDICTION,
+        table=PREDICTION,
     params:
         **COMPARED,
-        atlas_weeks=lambda w: study.chains[w.brain, "atlas"].later_weeks,
+        atlas_weeks=lambda w: study.chains[w.brain, "atlas"].weeks[1:],
         of_atlas=lambda w: simulation_of(w).is_atlas_prediction,
     script:
-        "../scripts/prediction.py"
+        "../scripts/validation.py"
 
 
 rule atlas_brain:
@@ -92,9 +92,9 @@ def deviating(wildcards):
 
 def deviation_labels(wildcards):
     """Return the first columns of the deviation table."""
-    run, start, week = wildcards.run, wildcards.brain, float(wildcards.week)
-    real = study.simulations[run, start].observed[week]
-    names = {"run": run, "start": start, "week": week}
+    week = float(wildcards.week)
+    real = simulation_of(wildcards).observed[week]
+    names = {"run": wildcards.run, "start": wildcards.brain, "week": week}
     return names | {"real": real.id, "subject": real.subject}
 
 
@@ -120,7 +120,7 @@ rule deviation:
 
 def ceiling_weeks(brain):
     """Return the validated weeks to which a start brain's mesh is carried."""
-    return [week for week in study.chains[brain, "self"].later_weeks if (brain, week) in study.references]
+    return [week for week in study.chains[brain, "self"].weeks[1:] if (brain, week) in study.references]
 
 
 # the start brain's mesh carried to later weeks by registration alone
@@ -145,19 +145,17 @@ rule registration_ceiling:
         kind="explained",
         curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
     script:
-        "../scripts/registration_ceiling.py"
+        "../scripts/validation.py"
 
 
 def onset_surfaces(wildcards):
     """Return the hemispheres of a run and of the observed brains after its start, and the regions of the last brain."""
-    simulation, real = simulation_of(wildcards), study.chains[wildcards.brain, "self"].brains
-    run_files = {
-        f"run_{side}": [row.parts[side] for row in simulation.measurements] for side in simulation.start.sides
+    real = study.chains[wildcards.brain, "self"].brains
+    rows = {"run": simulation_of(wildcards).measurements, "real": [brain.measurement for brain in real]}
+    files = {
+        f"{name}_{side}": [row.parts[side] for row in rows[name]] for name in rows for side in real[0].sides
     }
-    real_files = {
-        f"real_{side}": [brain.measurement.parts[side] for brain in real] for side in simulation.start.sides
-    }
-    return {**run_files, **real_files, **real[-1].regions}
+    return {**files, **real[-1].regions}
 
 
 # onset weeks of sulci in a simulated brain and in the observed brains after its start
@@ -210,7 +208,10 @@ rule validation_tables:
             {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}
         ),
         # whether the growth of a run was measured by the same registrations
-        carried=[(simulation.run, simulation.follows_registration) for simulation in study.validated_registered],
+        carried=[
+            (simulation.run, simulation.shapes is not None and not simulation.is_atlas_prediction)
+            for simulation in study.validated_registered
+        ],
     script:
         "../scripts/validation_tables.py"
 

@@ -1,16 +1,14 @@
 """Write the runs of a calibration with their scores, and the optimum."""
 
-import pandas as pd
-
 from gyriflow.compare.calibration import find_optimum, fit_surrogate
-from gyriflow.io.files import read_table, write_table
+from gyriflow.io.files import read_tables, write_table
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.repeatability import score_noise
 from gyriflow.step import step
 
 params, output = snakemake.params, snakemake.output
 with step(snakemake.log[0]):
-    runs = pd.concat(map(read_table, snakemake.input.scores), ignore_index=True)
+    runs = read_tables(snakemake.input.scores)
     write_table(output.runs, runs)
     optimum = find_optimum(fit_surrogate(runs, params.bounds, params.seed))
     noise = score_noise(params.weights, read_yaml(snakemake.input.noise))

@@ -1,14 +1,21 @@
-"""Validate a run: compare its simulated brains with the observed ones, week by week."""
+"""Compare a run, or the start brain's mesh as registration alone carries it, with the observed brains week by week."""
 
-from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table
+import numpy as np
+
+from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table, simple_predictions
 from gyriflow.compare.shapes import PreparedSurface
+from gyriflow.geometry.tetrahedra import boundary_surface
+from gyriflow.geometry.triangles import TriangleMesh, transformed
+from gyriflow.growth.carrying import carry_mesh
 from gyriflow.growth.curves import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.surfaces import read_surface, read_vertex_maps
+from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
+from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
+from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
 
-files, params = snakemake.input, snakemake.params
+files, params, output = snakemake.input, snakemake.params, snakemake.output
 
 
 def prepared(name, number):
@@ -16,15 +23,43 @@ def prepared(name, number):
     return PreparedSurface(read_surface(files[name][number]), **read_vertex_maps(files[f"{name}_maps"][number]))
 
 
+def carried_surfaces():
+    """Yield the boundary of the start brain's mesh in each week, and write the carried mesh."""
+    mesh, pose = read_tetrahedral_mesh(files.mesh), read_pose(files.report)
+    positions = carry_mesh(mesh, [read_correspondence(path) for path in files.correspondences], pose)
+    write_weekly_shapes(output.carried, WeeklyShapes(np.array(params.carried_weeks), positions))
+    carried, (boundary, used) = read_weekly_shapes(output.carried), boundary_surface(mesh)
+    for week in params.weeks:
+        points = carried.positions[carried.index(week)][used]
+        yield transformed(TriangleMesh(points, boundary.faces), pose.world)
+
+
+def simple_models():
+    """Yield for each week the predictions without mechanics, the same for all runs from a start brain."""
+    targets = read_weekly_shapes(files.targets)
+    start, used = boundary_surface(read_tetrahedral_mesh(files.mesh))
+    atlas = dict(zip(params.atlas_weeks, map(read_surface, files.atlas), strict=True))
+    for week in params.weeks:
+        at = targets.index(week)
+        target = TriangleMesh(targets.positions[at][used], start.faces)
+        registered = {name: TriangleMesh(points[at], start.faces) for name, points in targets.surfaces.items()}
+        yield simple_predictions(start, target, registered, atlas.get(week))
+
+
 with step(snakemake.log[0]):
-    simulated, observed = {}, {}
+    surfaces = map(read_surface, files.simulated) if files.get("simulated") else carried_surfaces()
+    models = {week: {"run": surface} for week, surface in zip(params.weeks, surfaces, strict=True)}
+    # these are written with the run that grows as the atlas
+    if params.get("of_atlas"):
+        models = {week: models[week] | simple for week, simple in zip(models, simple_models(), strict=True)}
+    observed = {}
     for number, week in enumerate(params.weeks):
-        simulated[week] = {"run": read_surface(files.simulated[number])}
         baselines = {name: prepared(name, number) for name in ("start", "adjacent")}
         surface = read_surface(files.whole[number])
         observed[week] = ObservedBrain(params.observed[number], surface, prepared("observed", number), baselines)
-    growth, curves = read_yaml(files.params)["growth"], read_table(files.curves) if files.curves else None
-    sizes = sizes_on_curves(growth, curves, params.series, params.weeks)
     labels = {name: params[name] for name in ("run", "kind", "start_week")} | {"start": snakemake.wildcards.brain}
-    table = comparison_table(labels, simulated, observed, radius_mm=params.curvature_radius_mm)
-    write_table(snakemake.output.table, add_curves(table, sizes))
+    table = comparison_table(labels, models, observed, radius_mm=params.curvature_radius_mm)
+    if files.get("params"):
+        growth, curves = read_yaml(files.params)["growth"], read_table(files.curves) if files.curves else None
+        table = add_curves(table, sizes_on_curves(growth, curves, params.series, params.weeks))
+    write_table(output.table, table)

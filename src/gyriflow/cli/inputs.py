@@ -23,7 +23,7 @@ from ..io.surfaces import (
     load_gifti,
     read_hemispheres,
     read_surface,
-    read_surface_map,
+    read_surface_maps,
     read_vertex_labels,
     structure_of,
     surface_space_structure,
@@ -185,10 +185,6 @@ def _check_regions(regions: GivenRegions, brain: BrainConfig | None) -> None:
 
 def _check_map(name: str, value: Any) -> None:
     paths, surfaces = files_of(value.map), files_of(value.surface)
-    if surfaces:
-        sides = SIDES if len(paths) == 2 else (None,)
-        values = [read_surface_map(*files)[1] for files in zip(paths, surfaces, sides, strict=True)]
-    else:
-        values = [read_volume_map(path)[0].ravel() for path in paths]
+    values = read_surface_maps(paths, surfaces)[1] if surfaces else read_volume_map(paths[0])[0].ravel()
     if name == "thickness_mm":
-        require_plausible_thickness(np.concatenate(values), mean_of_curve(value), ", ".join(paths))
+        require_plausible_thickness(values, mean_of_curve(value), ", ".join(paths))

@@ -4,9 +4,8 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -76,8 +75,7 @@ BidsNames = Mapping[str, tuple[str, str | None]]
 """Subject and session of each measured brain, None where the study needs no sessions."""
 
 
-@dataclass(frozen=True)
-class ExportedBrain:
+class ExportedBrain(NamedTuple):
     """A brain at a week and its files by side; regions may be empty.
 
     The run is "real" for observed brains; simulated ones have brain, subject and covariates of their start.
@@ -85,6 +83,7 @@ class ExportedBrain:
     whose grid is used, and `surface` and `thickness` of the whole brain.
     """
 
+    # a tuple: Snakemake sees no change in parameters of other classes
     brain: str
     run: str
     week: float
@@ -94,11 +93,11 @@ class ExportedBrain:
     regions: Mapping[Side, str]
     report: str
     covariates: Mapping[str, str]
-    white: Mapping[Side, str] = field(default_factory=dict)
-    white_maps: Mapping[Side, str] = field(default_factory=dict)
+    white: Mapping[Side, str] = {}
+    white_maps: Mapping[Side, str] = {}
     template: str | None = None
-    template_maps: Mapping[Side, str] = field(default_factory=dict)
-    volume: Mapping[str, Any] = field(default_factory=dict)
+    template_maps: Mapping[Side, str] = {}
+    volume: Mapping[str, Any] = {}
 
 
 def export_bids(

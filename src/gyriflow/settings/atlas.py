@@ -6,7 +6,7 @@ from pathlib import Path
 from string import Formatter
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, field_validator
 
 from ..shipped import ATLASES, shipped_atlases
 from .base import KeyProblem, Settings, did_you_mean, located, refused
@@ -40,10 +40,11 @@ def _names_weeks(pattern: str) -> bool:
     )
 
 
-def _require_weeks_once(weeks: Iterable[Any]) -> None:
+def _require_weeks_once[Weeks: Iterable[Any]](weeks: Weeks) -> Weeks:
     listed = [str(week) for week in weeks]
     if not listed or len(set(listed)) < len(listed):
         raise ValueError("should name one week or more, each once")
+    return weeks
 
 
 class AtlasLicence(Settings):
@@ -167,12 +168,13 @@ class AtlasSettings(Settings):
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+    short_key = ("name", str)
 
     name: str
     """An atlas that comes with gyriflow, the name of a folder in `atlases`; or the `atlas.yaml` of your own."""
     series: str | tuple[str, ...] | None = None
     """Series to use; `null`: all."""
-    weeks: tuple[AnyWeek, ...] | None = None
+    weeks: Annotated[tuple[AnyWeek, ...], AfterValidator(_require_weeks_once)] | None = None
     """Weeks to use, as in the file names; `null`: all. [GW]"""
     images: bool = False
     """Whether T2-weighted volumes are shown with the surfaces' outlines."""
@@ -182,24 +184,12 @@ class AtlasSettings(Settings):
     accept_licence: bool = False
     """Whether you accept the licence, where the `atlas.yaml` asks for it."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _name_alone(cls, value: Any) -> Any:
-        return {"name": value} if isinstance(value, str) else value
-
     @field_validator("name")
     @classmethod
     def _known_name(cls, name: str) -> str:
         if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
             raise refused(f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is an atlas.yaml")
         return name
-
-    @field_validator("weeks")
-    @classmethod
-    def _some_weeks_once(cls, weeks: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        if weeks is not None:
-            _require_weeks_once(weeks)
-        return weeks
 
     @property
     def description(self) -> Path:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Self, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -72,8 +72,9 @@ def refused(text: str) -> PydanticCustomError:
 
 
 class Settings(BaseModel):
-    """Frozen settings, validated as a whole."""
+    """Frozen settings, validated as a whole. The value of the `short_key` alone, of its type, stands for a section."""
 
+    short_key: ClassVar[tuple[str, type] | None] = None
     model_config = ConfigDict(
         extra="forbid",
         frozen=True,
@@ -100,6 +101,8 @@ class Settings(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _report_all_problems(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if cls.short_key and isinstance(raw, cls.short_key[1]):
+            raw = {cls.short_key[0]: raw}
         settings = handler({} if raw is None else raw)
         if problems := dict.fromkeys(settings.problems()):
             errors = [InitErrorDetails(type=refused(each.text), loc=each.key, input=None) for each in problems]

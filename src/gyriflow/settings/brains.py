@@ -1,9 +1,9 @@
 """Settings of brains: the data that their pial surfaces are made from, regions given on them, and tables of brains."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from ..formats import is_volume
 from .base import InputFile, KeyProblem, Settings
@@ -139,11 +139,6 @@ class BrainConfig(Settings):
         return self.label_volume is not None
 
     @property
-    def has_vertices(self) -> bool:
-        # other brains may have corresponding vertices
-        return not self.has_labels and self.source in ("hemispheres", "hemisphere", "pial")
-
-    @property
     def files(self) -> list[str]:
         sides = [] if self.hemispheres is None else [self.hemispheres.left, self.hemispheres.right]
         single = None if self.hemisphere is None else self.hemisphere.file
@@ -247,6 +242,7 @@ class ParticipantsSettings(Settings):
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string"]})
+    short_key = ("file", str)
 
     file: str
     """File with tabs, semicolons or commas between columns; paths in it are relative to it."""
@@ -256,8 +252,3 @@ class ParticipantsSettings(Settings):
     """Columns to add to the table, with one value for all rows. In it `{subject}`, `{session}` and `{id}`,
     such as `sub-01_ses-1`, are the row's: `{labels: '{subject}/{session}/anat/{id}_dseg.nii.gz', scheme:
     feta-7}`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _file_alone(cls, value: Any) -> Any:
-        return {"file": value} if isinstance(value, str) else value

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from .base import Settings
 
@@ -42,6 +41,7 @@ class Ensemble(Settings):
     """
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "integer", "null"]})
+    short_key = ("members", int)
 
     members: int = Field(8, ge=3, le=64)
     """Number of members."""
@@ -49,11 +49,6 @@ class Ensemble(Settings):
     """Standard deviation of the error of the start brain's age. [GW]"""
     seed: int = Field(0, ge=0)
     """Seed of the variations."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _number_alone(cls, raw: Any) -> Any:
-        return {"members": raw} if isinstance(raw, int) else raw
 
     @property
     def variations(self) -> list[Variation]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from .base import FirstIf, KeyProblem, Settings
 from .weeks import AnyWeek
@@ -94,6 +94,7 @@ class Growth(Settings):
     """The model that the brain grows by; its name alone will do, as in `growth: shapes`."""
 
     model_config = ConfigDict(json_schema_extra={"type": ["object", "string", "null"]})
+    short_key = ("model", str)
 
     model: ModelName = "rates"
     """`rates`: those of the keys that end with `growth_rate_per_s`; `sizes`: in each step the rates of cortex and
@@ -109,11 +110,6 @@ class Growth(Settings):
     """With `sizes`, volume inside the pial surface, likewise. [mL]"""
     thickness_mm: SizeCurve | None = None
     """With `sizes` and `shapes`, mean cortical thickness, likewise; `null`: the run's `thickness_mm`. [mm]"""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _model_alone(cls, raw: Any) -> Any:
-        return {"model": raw} if isinstance(raw, str) else raw
 
     @property
     def definition(self) -> GrowthModel:

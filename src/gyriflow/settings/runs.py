@@ -11,7 +11,7 @@ from .brains import BrainConfig
 from .ensemble import Variation
 from .folding import VARYING, FoldingSettings
 from .growth import SIZES
-from .terms import MAX_NAME_LENGTH, SCORES, SPECTRAL_SCORES, Score
+from .terms import MAX_NAME_LENGTH, SCORES, Score
 from .weeks import EndWeek
 
 ALL = "all"
@@ -261,11 +261,6 @@ class CalibrationSettings(ComparisonSettings):
                 )
         if not self.score:
             yield KeyProblem(f"found nothing; expected one or more of {', '.join(SCORES)}", ("score",))
-
-    @property
-    def is_spectral(self) -> bool:
-        """Whether a score compares spectra."""
-        return not set(self.score).isdisjoint(SPECTRAL_SCORES)
 
     @property
     def runs(self) -> dict[str, int]:

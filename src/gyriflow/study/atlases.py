@@ -61,8 +61,8 @@ class UsedAtlas:
 
     def _files_of(self, name: str) -> Iterator[AtlasFile]:
         series = self.atlas.series[name]
-        root = (self.atlas.url or "").rstrip("/")
-        for week in self._weeks_of(name):
+        root, weeks = (self.atlas.url or "").rstrip("/"), self.settings.weeks
+        for week in sorted(series.weeks if weeks is None else self.known_weeks(name).intersection(weeks)):
             for key in series.files if self.settings.images else series.needed:
                 path = series.files[key].format(week=int(week) if week == int(week) else week)
                 copies = self._in_folder[series.files[key]].get(week) or self._shipped(path)
@@ -71,11 +71,6 @@ class UsedAtlas:
                 record = series.weeks.get(week, {}).get(key, AtlasFileRecord())
                 place = copies[0] if copies else self.folder / path
                 yield AtlasFile(name, week, key, place, url, record, tuple(copies))
-
-    def _weeks_of(self, name: str) -> list[float]:
-        if self.settings.weeks is None:
-            return sorted(self.atlas.series[name].weeks)
-        return [week for week in sorted(self.settings.weeks) if week in self.known_weeks(name)]
 
     def known_weeks(self, name: str) -> set[float]:
         """Return the weeks of a series that are published, or whose required files are in the folder."""
@@ -86,28 +81,26 @@ class UsedAtlas:
     @cached_property
     def _in_folder(self) -> dict[str, dict[float, list[Path]]]:
         patterns = {pattern for series in self.atlas.series.values() for pattern in series.files.values()}
-        return {pattern: self._copies(pattern) for pattern in patterns}
-
-    @cached_property
-    def _folder_files(self) -> list[Path]:
-        return files_below(self.folder)
-
-    def _copies(self, pattern: str) -> dict[float, list[Path]]:
-        parts = pattern.split("/")
-        tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
-        pieces = list(Formatter().parse(tail))
-        name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
-        copies: dict[float, list[Path]] = {}
-        for path in self._folder_files:
-            if match := re.fullmatch(f"(?:.*/)?{name}", path.as_posix()):
-                copies.setdefault(float(match[1]), []).append(path)
-        return copies
+        files = files_below(self.folder)
+        return {pattern: _copies(pattern, files) for pattern in patterns}
 
     def _shipped(self, path: str) -> list[Path]:
         if self.atlas.folder is None:
             return []
         place = own_name(self.settings.description.parent / self.atlas.folder / path)
         return [place] if place.is_file() else []
+
+
+def _copies(pattern: str, files: Iterable[Path]) -> dict[float, list[Path]]:
+    parts = pattern.split("/")
+    tail = "/".join(parts[max(number for number, part in enumerate(parts) if "{week" in part) :])
+    pieces = list(Formatter().parse(tail))
+    name = "".join(re.escape(text) + (r"(\d+(?:\.\d+)?)" if field else "") for text, field, *_ in pieces)
+    copies: dict[float, list[Path]] = {}
+    for path in files:
+        if match := re.fullmatch(f"(?:.*/)?{name}", path.as_posix()):
+            copies.setdefault(float(match[1]), []).append(path)
+    return copies
 
 
 def atlas_brains(used: UsedAtlas) -> list[dict[str, Any]]:

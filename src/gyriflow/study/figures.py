@@ -8,19 +8,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from ..settings.terms import MAX_COLOURS, min_norm_subjects, run_names
-from .paths import DEVIATION, ENSEMBLE_MAPS, FOLDING, MESH, PUBLISHED
+from .paths import DEVIATION, ENSEMBLE_MAPS, FOLDING, MESH
 from .records import Brain, Measurement, Simulation, Sweep
-from .registry import (
-    Arguments,
-    Figure,
-    Kind,
-    halves_of,
-    kinds,
-    observed_by_week,
-    observed_name,
-    regions_of,
-    surfaces_by_week,
-)
+from .registry import Arguments, Figure, Kind, kinds, observed_name
 from .study import Study
 
 ZONES = {"contact", "no_growth", "support"}
@@ -59,7 +49,7 @@ def figures_of(study: Study) -> list[Figure]:
 def brain_regions(kind: Kind, study: Study) -> Iterator[Figure]:
     for brain in study.brains.values():
         if brain.has_regions:
-            yield Figure(kind, {"brain": brain.id}, {"brains": {brain.id: regions_of(brain.measurement)}})
+            yield Figure(kind, {"brain": brain.id}, {"brains": {brain.id: brain.measurement.halves_with_regions}})
 
 
 def inputs_figure(kind: Kind, study: Study) -> Iterator[Figure]:
@@ -111,45 +101,45 @@ def predicted_figure(kind: Kind, study: Study) -> Iterator[Figure]:
         yield Figure(kind, simulation.names, {"runs": {}, "observed": brains}, {"predicted": predicted})
 
 
-def _by_start(study: Study) -> Iterator[tuple[dict[str, str], list[Simulation]]]:
-    """Yield the simulations from each start brain, with its name."""
+def _by_start(study: Study) -> Iterator[tuple[dict[str, str], list[Simulation], dict[float, Brain]]]:
+    """Yield for each start brain its name, its simulations, and by week the observed brains shown with them."""
     for start in study.starts:
-        yield {"brain": start.id}, [simulation for simulation in study.run_simulations if simulation.start is start]
+        simulations = [simulation for simulation in study.run_simulations if simulation.start is start]
+        observed = [simulation.observed_with_start for simulation in simulations]
+        yield {"brain": start.id}, simulations, {week: brain for weeks in observed for week, brain in weeks.items()}
 
 
 def weekly_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    for names, simulations in _by_start(study):
-        observed = observed_by_week(*simulations)
+    for names, simulations, observed in _by_start(study):
         inputs = {
-            "runs": {simulation.run: surfaces_by_week(simulation) for simulation in simulations},
+            "runs": {simulation.run: simulation.surfaces for simulation in simulations},
             "observed": {week: brain.pial for week, brain in observed.items()},
         }
         yield Figure(kind, names, inputs, {"observed_name": observed_name(observed.values())})
 
 
 def outlines_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    for names, simulations in _by_start(study):
-        observed, runs = observed_by_week(*simulations), {}
-        for simulation in simulations:
-            surfaces = surfaces_by_week(simulation)
-            runs[simulation.run] = {week: surfaces[week] for week in observed_by_week(simulation)}
+    for names, simulations, observed in _by_start(study):
+        runs = {
+            simulation.run: {week: simulation.surfaces[week] for week in simulation.observed_with_start}
+            for simulation in simulations
+        }
         inputs = {"observed": {week: brain.pial for week, brain in observed.items()}, "runs": runs}
         yield Figure(kind, names, inputs, {"observed_name": observed_name(observed.values())})
 
 
 def displacement_maps(kind: Kind, study: Study) -> Iterator[Figure]:
-    for names, simulations in _by_start(study):
+    for names, simulations, _ in _by_start(study):
         frames = {simulation.run: simulation.file(FOLDING["frames"]) for simulation in simulations}
         yield Figure(kind, names, {"frames": frames})
 
 
 def shape_maps(kind: Kind, study: Study) -> Iterator[Figure]:
-    for names, simulations in _by_start(study):
-        observed = observed_by_week(*simulations)
+    for names, simulations, observed in _by_start(study):
         brains = {
-            simulation.run: {row.week: halves_of(row) for row in simulation.measurements} for simulation in simulations
+            simulation.run: {row.week: row.halves for row in simulation.measurements} for simulation in simulations
         }
-        measured = {week: halves_of(brain.measurement) for week, brain in observed.items()}
+        measured = {week: brain.measurement.halves for week, brain in observed.items()}
         yield Figure(kind, names, {"brains": {**brains, observed_name(observed.values()): measured}})
 
 
@@ -185,9 +175,7 @@ def displacement_figure(kind: Kind, study: Study) -> Iterator[Figure]:
         yield Figure(kind, options={"runs": run_names(study.pairs)})
 
 
-def paper_displacement_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    if study.run_simulations:
-        yield Figure(kind, inputs={"published": PUBLISHED}, options={"runs": run_names(study.pairs)})
+paper_displacement_figure = displacement_figure
 
 
 # metrics
@@ -252,7 +240,8 @@ def regions_figure(kind: Kind, study: Study) -> Iterator[Figure]:
         if simulation.has_regions
     }
     if rows and simulated:
-        yield Figure(kind, inputs={"brains": {head: regions_of(row) for head, row in (rows | simulated).items()}})
+        brains = {head: row.halves_with_regions for head, row in (rows | simulated).items()}
+        yield Figure(kind, inputs={"brains": brains})
 
 
 # runs compared with observed brains
@@ -271,13 +260,13 @@ def prediction_figure(kind: Kind, study: Study) -> Iterator[Figure]:
 
 def _deviations(simulation: Simulation) -> dict[float, list[str]]:
     """Return the expected surface and the maps of the observed brain's deviation from it, by week."""
-    surfaces = surfaces_by_week(simulation)
-    return {week: [surfaces[week], simulation.file(DEVIATION["maps"], week=week)] for week in simulation.observed}
+    files = {week: simulation.file(DEVIATION["maps"], week=week) for week in simulation.observed}
+    return {week: [simulation.surfaces[week], file] for week, file in files.items()}
 
 
 def expected_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for simulation in study.atlas_predictions:
-        surfaces, observed = surfaces_by_week(simulation), observed_by_week(simulation)
+        surfaces, observed = simulation.surfaces, simulation.observed_with_start
         deviations = _deviations(simulation)
         # the last week, and others at equal steps
         weeks = sorted(deviations, reverse=True)[:: -(-len(deviations) // MAX_DEVIATIONS)]
@@ -321,9 +310,8 @@ def _sweep_figure(kind: Kind, sweep: Sweep, inputs: Arguments, **options: Any) -
     """Return a figure of the runs of a sweep; runs may have ended before the week of comparison."""
     start = _first_start(sweep)
     values = {simulation.run: dict(values) for simulation, values in sweep.members if simulation.start is start}
-    may_end = [(run, start.id, sweep.week) for run in inputs["members"]]
     options |= {"values": values, "observed_name": observed_name(sweep.observed[start.id][:1])}
-    return Figure(kind, _sweep_names(sweep), inputs, options, may_end)
+    return Figure(kind, _sweep_names(sweep), inputs, options, (start.id, sweep.week))
 
 
 def _sweep_names(sweep: Sweep) -> dict[str, str]:
@@ -334,8 +322,8 @@ def influence_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for sweep in study.sweeps.values():
         observed = sweep.observed[_first_start(sweep).id]
         inputs = {
-            "members": {run: halves_of(row) for run, row in _members(sweep).items()},
-            "observed": halves_of(observed[0].measurement) if observed else None,
+            "members": {run: row.halves for run, row in _members(sweep).items()},
+            "observed": observed[0].measurement.halves if observed else None,
         }
         yield _sweep_figure(kind, sweep, inputs)
 
@@ -350,18 +338,17 @@ def influence_spectra(kind: Kind, study: Study) -> Iterator[Figure]:
         yield _sweep_figure(kind, sweep, inputs, week=sweep.week)
 
 
-def nearest_figure(kind: Kind, study: Study, **inputs: str) -> Iterator[Figure]:
+def nearest_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     for sweep in study.sweeps.values():
         start, values = _first_start(sweep), study.config.studies[sweep.name].vary
         observed = [brain.id for brain in sweep.observed[start.id][:1]]
         (varied, *others), tried = sweep.members[0][1], next(iter(values.values()))
         if observed and not others and all(isinstance(value, int | float) for value in tried):
             options = {"varied": varied, "subject": start.id, "observed": observed, "week": sweep.week}
-            yield Figure(kind, _sweep_names(sweep), inputs, options)
+            yield Figure(kind, _sweep_names(sweep), options=options)
 
 
-def paper_nearest_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    return nearest_figure(kind, study, published=PUBLISHED)
+paper_nearest_figure = nearest_figure
 
 
 def calibration_figure(kind: Kind, study: Study) -> Iterator[Figure]:

@@ -58,6 +58,16 @@ class Measurement:
         """The files with the vertex maps of its hemispheres."""
         return [f"{self.folder}/{side}.shape.gii" for side in self.sides]
 
+    @property
+    def halves(self) -> list[list[str]]:
+        """Its hemispheres, each with its maps."""
+        return [list(pair) for pair in zip(self.hemispheres, self.maps, strict=True)]
+
+    @property
+    def halves_with_regions(self) -> list[list[str]]:
+        """Its hemispheres, each with its regions."""
+        return [list(pair) for pair in zip(self.hemispheres, self.regions.values(), strict=True)]
+
 
 @dataclass(frozen=True, eq=False)
 class Brain:
@@ -212,11 +222,6 @@ class Simulation:
         return {self.weeks[0]: self.start, **{week: brains[0] for week, brains in self.observed_brains.items()}}
 
     @property
-    def follows_registration(self) -> bool:
-        """Whether its growth comes from registration with the brains that it is compared with."""
-        return self.shapes is not None and not self.is_atlas_prediction
-
-    @property
     def followed_series(self) -> str | None:
         """The growth series whose curves it follows, or None."""
         return self.series if self.curves else None
@@ -281,6 +286,11 @@ class Simulation:
     @property
     def measurements(self) -> list[Measurement]:
         return [self.at(week) for week in self.weeks]
+
+    @property
+    def surfaces(self) -> dict[float, str]:
+        """The surfaces of the simulated brains by week."""
+        return {row.week: row.parts["whole"] for row in self.measurements}
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Records of the figures and tables of a study: the entries of `workflow/figures.yaml`, and their files."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -8,7 +8,8 @@ from typing import Any
 from ..io.yaml_files import read_keys
 from ..settings.terms import OBSERVED_BRAIN
 from ..shipped import SHIPPED
-from .records import Brain, Measurement, Simulation
+from .paths import PUBLISHED
+from .records import Brain
 
 Arguments = Mapping[str, Any]
 """Inputs or options of a drawing function, by parameter."""
@@ -51,18 +52,17 @@ class Figure:
         Files by parameter of the function: a file, or lists and dictionaries of files. Those of the kind are added.
     options : the other arguments of the function. Those of the kind are added.
     may_end
-        Run, start and week of simulations that may end before that week; their files in `inputs["members"]` are then
-        left out.
+        Start and week of runs that may end before that week. Their files are in `inputs["members"]` by run.
     """
 
     kind: Kind
     names: Mapping[str, str] = field(default_factory=dict)
     inputs: Arguments = field(default_factory=dict)
     options: Arguments = field(default_factory=dict)
-    may_end: Sequence[tuple[str, str, float]] = ()
+    may_end: tuple[str, float] | None = None
 
     def __post_init__(self) -> None:
-        files = {key: file.format(**self.names) for key, file in self.kind.inputs.items()}
+        files = {key: file.format(**self.names, published=PUBLISHED) for key, file in self.kind.inputs.items()}
         object.__setattr__(self, "inputs", {**files, **self.inputs})
         object.__setattr__(self, "options", {**self.kind.options, **self.options})
 
@@ -79,12 +79,11 @@ class Figure:
         """The names that occur in the path."""
         return {key: name for key, name in self.names.items() if f"{{{key}}}" in self.kind.file}
 
-    def inputs_without(self, runs: Iterable[str]) -> Arguments:
-        """Return the inputs, with None for runs that ended before."""
-        if "members" not in self.inputs:
+    def reached_inputs(self, reaches: Callable[[str, str, float], bool]) -> Arguments:
+        """Return the inputs, with None for runs that ended before; `reaches` says of run, start and week if not."""
+        if self.may_end is None:
             return self.inputs
-        ended = set(runs)
-        members = {run: None if run in ended else files for run, files in self.inputs["members"].items()}
+        members = {run: files if reaches(run, *self.may_end) else None for run, files in self.inputs["members"].items()}
         return {**self.inputs, "members": members}
 
     @property
@@ -146,23 +145,3 @@ def observed_name(brains: Iterable[Brain]) -> str:
     if kinds:
         names.append(kinds.pop() if len(kinds) == 1 else "simple shape")
     return " or ".join(names) or OBSERVED_BRAIN
-
-
-def halves_of(row: Measurement) -> list[list[str]]:
-    """Return the hemispheres of a brain, each with its maps."""
-    return [list(pair) for pair in zip(row.hemispheres, row.maps, strict=True)]
-
-
-def regions_of(row: Measurement) -> list[list[str]]:
-    """Return the hemispheres of a brain, each with its regions."""
-    return [list(pair) for pair in zip(row.hemispheres, row.regions.values(), strict=True)]
-
-
-def surfaces_by_week(simulation: Simulation) -> dict[float, str]:
-    """Return the surfaces of the simulated brains by week."""
-    return {row.week: row.parts["whole"] for row in simulation.measurements}
-
-
-def observed_by_week(*simulations: Simulation) -> dict[float, Brain]:
-    """Return the observed brains that are shown with simulations, by week."""
-    return {week: brain for simulation in simulations for week, brain in simulation.observed_with_start.items()}

@@ -110,7 +110,7 @@ def series_of(config: Config, brains: Mapping[str, Brain], atlases: Iterable[Use
     matched, unmatched = {}, {}
     for name, ids in names.items():
         members = sorted((brains[brain].config for brain in ids), key=lambda brain: brain.week)
-        if all(brain.has_vertices for brain in members):
+        if not any(brain.has_labels or brain.synthetic for brain in members):
             cause: str | None = "growth.matched_surfaces is false"
             if config.growth.matched_surfaces:
                 cause = unmatched_reason(members, assumed)
@@ -187,10 +187,6 @@ class Chain:
         return self.brains[1:]
 
     @property
-    def later_weeks(self) -> list[float]:
-        return self.weeks[1:]
-
-    @property
     def pairs(self) -> list[tuple[tuple[Brain, Brain], list[bool]]]:
         """The pairs of brains that correspond, those of its path included, and whether each map is posed."""
         own = list(zip(pairwise(self.brains), self.posed, strict=False))
@@ -209,7 +205,7 @@ def chains_of(start: Brain, end: float, series: Series, brains: Sequence[Brain])
     name = atlases[0] if len(atlases) == 1 else None
     atlas = _along_path(start, start.week, end, name, series)
     observed = later_observed_weeks(start, brains)
-    further = tuple(week for week in observed if week <= end and week not in atlas.later_weeks)
+    further = tuple(week for week in observed if week <= end and week not in atlas.weeks[1:])
     return {
         (start.id, "self"): _chain("self", _own_chain(start, end, series), series),
         (start.id, "atlas"): replace(atlas, further_weeks=further),

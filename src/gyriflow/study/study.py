@@ -277,33 +277,32 @@ class Study:
         return [side for side in row.sides if template is not None and side in template.sides]
 
     @cached_property
-    def exported(self) -> list[dict[str, Any]]:
-        """Names and files, by side, of each observed or simulated brain for the export."""
+    def exported(self) -> list[ExportedBrain]:
+        """Each observed or simulated brain for the export."""
         return [self._exported(row, self.brains[row.subject]) for row in self.measurements.values()]
 
-    def _exported(self, row: Measurement, brain: Brain) -> dict[str, Any]:
+    def _exported(self, row: Measurement, brain: Brain) -> ExportedBrain:
         is_observed = row.run == MEASURED
-        white = paths.white_of(*row.sides) if is_observed and brain.has_white else {}
-        whites = {name: file.format(brain=brain.id) for name, file in white.items()}
-        sides = [side for side in row.sides if whites]
+        white_sides = row.sides if is_observed and brain.has_white else ()
+        white = {name: file.format(brain=brain.id) for name, file in paths.white_of(*white_sides).items()}
         template = {side: paths.TEMPLATE_MAPS.format(where=row.where, side=side) for side in self.template_sides(row)}
         volume = {"labels": brain.labels, "surface": row.parts["whole"], "thickness": row.thickness}
-        return {
-            "brain": row.subject,
-            "run": row.run,
-            "week": row.week,
-            "subject": brain.subject,
-            "surfaces": dict(zip(row.sides, row.hemispheres, strict=True)),
-            "maps": dict(zip(row.sides, row.maps, strict=True)),
-            "regions": dict(zip(SIDES, row.regions.values(), strict=False)),
-            "report": brain.report,
-            "covariates": brain.config.covariates,
-            "white": {side: whites[f"{side}_surface"] for side in sides},
-            "white_maps": {side: whites[f"{side}_maps"] for side in sides},
-            "template": self.config.metrics.template,
-            "template_maps": template,
-            "volume": volume if brain.labels and not is_observed else {},
-        }
+        return ExportedBrain(
+            brain=row.subject,
+            run=row.run,
+            week=row.week,
+            subject=brain.subject,
+            surfaces=dict(zip(row.sides, row.hemispheres, strict=True)),
+            maps=dict(zip(row.sides, row.maps, strict=True)),
+            regions=dict(zip(SIDES, row.regions.values(), strict=False)),
+            report=brain.report,
+            covariates=brain.config.covariates,
+            white={side: white[f"{side}_surface"] for side in white_sides},
+            white_maps={side: white[f"{side}_maps"] for side in white_sides},
+            template=self.config.metrics.template,
+            template_maps=template,
+            volume=volume if brain.labels and not is_observed else {},
+        )
 
     # contents of the report and the quality table, other than figures
 
@@ -313,8 +312,7 @@ class Study:
         if (simulation := self.prediction) is None:
             return None
         last, atlas_brain = simulation.measurements[-1], self.atlas_brain(simulation)
-        exported = [ExportedBrain(**brain) for brain in self.exported]
-        brain = next(brain for brain in exported if (brain.run, brain.week) == (simulation.run, last.week))
+        brain = next(brain for brain in self.exported if (brain.run, brain.week) == (simulation.run, last.week))
         atlas = self.atlases.get(atlas_brain.id)
         return {
             **{**simulation.names, "start_week": simulation.start.week, "week": last.week},
@@ -324,5 +322,5 @@ class Study:
             "atlas": atlas and atlas.model_dump(include={"name", "title", "licence", "reference"}),
             "surfaces": [*last.parts.values()],
             "atlas_surface": simulation.atlas_surface,
-            "labels": labels_file("results/export", brain, exported) if brain.volume else None,
+            "labels": labels_file("results/export", brain, self.exported) if brain.volume else None,
         }

@@ -76,7 +76,7 @@ def test_a_carried_mesh_is_compared_with_the_observed_brain_of_each_week(tmp_pat
     }
     params |= {"carried_weeks": [21.0, 21.5, *weeks], "curvature_radius_mm": 3.0}
     job = {"params": params, "wildcards": SimpleNamespace(brain="b21")}
-    run_script("registration_ceiling.py", tmp_path, inputs, {"table": "ceiling.csv", "carried": "carried.h5"}, **job)
+    run_script("validation.py", tmp_path, inputs, {"table": "ceiling.csv", "carried": "carried.h5"}, **job)
     table = read_table(tmp_path / "ceiling.csv")
     assert table[["run", "kind", "start", "observed", "week", "horizon"]].to_numpy().tolist() == [
         ["registration", "explained", "b21", f"b{week:g}", week, week - 21] for week in weeks

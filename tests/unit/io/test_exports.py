@@ -52,7 +52,7 @@ def brain(tmp_path):
 
 def test_bids_derivatives(tmp_path, brain):
     folder = tmp_path / "bids"
-    simulated = replace(brain, run="run-a", week=24.0)
+    simulated = brain._replace(run="run-a", week=24.0)
     export_bids(folder, [brain, simulated], TABLES, "1.2.3", {"area": ("pial area, both hemispheres", "cm2")})
     described = read_json(folder / "dataset_description.json")
     assert described["DatasetType"] == "derivative"
@@ -95,7 +95,7 @@ def test_maps_under_names_of_other_tools_have_their_signs_and_units(tmp_path, br
     ours = {"mean_curvature": 0.3 * on_gyri, "sulcal_depth_mm": 4 - 4 * on_gyri, "thickness_mm": 2 + 0.5 * on_gyri}
     for path in brain.maps.values():
         write_vertex_maps(path, ours | {"shape_index": 0.5 * on_gyri})
-    white = replace(brain, white=brain.surfaces, white_maps=brain.maps)
+    white = brain._replace(white=brain.surfaces, white_maps=brain.maps)
     export_bids(tmp_path / "bids", [white], {}, "1", {})
     for name, (sign, unit) in OTHER_TOOLS.items():
         described = read_json(tmp_path / "bids" / f"{name}.json")
@@ -114,7 +114,7 @@ def test_maps_under_names_of_other_tools_have_their_signs_and_units(tmp_path, br
 def scans_of_two(brain):
     scans = (("1", "1", 21.0, "F", "1.5"), ("1", "2", 24.43, "F", "3"), ("2", "1", 22.0, "M", "3"))
     return [
-        replace(brain, brain=f"sub-0{subject}_ses-{session}", subject=f"sub-0{subject}", week=week, covariates=more)
+        brain._replace(brain=f"sub-0{subject}_ses-{session}", subject=f"sub-0{subject}", week=week, covariates=more)
         for subject, session, week, sex, tesla in scans
         for more in [{"sex": sex, "tesla": tesla}]
     ]
@@ -131,13 +131,13 @@ def test_subjects_and_sessions_keep_their_names(tmp_path, brain):
         "ses-2\t24.43\tsub-01_ses-2\t3",
     ]
     # scans of a subject that have no names of sessions have their weeks'
-    unnamed = [replace(one, brain=f"scan{number}") for number, one in enumerate(scans_of_two(brain))]
+    unnamed = [one._replace(brain=f"scan{number}") for number, one in enumerate(scans_of_two(brain))]
     export_bids(folder, unnamed, {}, "1", {})
     assert (folder / "sub-01" / "ses-2443w" / "anat").is_dir()
 
 
 def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
-    same = replace(brain, brain="case-1", subject="case-1")
+    same = brain._replace(brain="case-1", subject="case-1")
     with pytest.raises(InputError, check=Facts("sub-case1", "case_1", "case-1")):
         export_bids(tmp_path / "bids", [brain, same], {}, "1", {})
 
@@ -204,7 +204,7 @@ def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
     small = transformed(hemisphere(-1), np.diag([0.5, 0.5, 0.5, 1]))
     write_surface(tmp_path / "white.surf.gii", transformed(small, POSE))
     files = {"white": {"left": str(tmp_path / "white.surf.gii")}, "white_maps": {"left": brain.maps["left"]}}
-    export_bids(tmp_path / "bids", [replace(brain, **files)], {}, "1", {})
+    export_bids(tmp_path / "bids", [brain._replace(**files)], {}, "1", {})
     place = tmp_path / "bids" / "sub-case1" / "anat"
     found = read_surface(place / "sub-case1_hemi-L_white.surf.gii")
     np.testing.assert_allclose(found.vertices, small.vertices, atol=1e-5)
@@ -215,8 +215,8 @@ def test_white_surfaces_lie_below_the_pial_ones(tmp_path, brain):
 def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
     folder, path = tmp_path / "bids", str(tmp_path / "left.template.shape.gii")
     write_vertex_maps(path, {"sulcal_depth_mm": np.arange(5.0)})
-    scans = [replace(one, template="sub-01_ses-1", template_maps={"left": path}) for one in scans_of_two(brain)]
-    export_bids(folder, [*scans, replace(scans[1], run="a", week=25.0)], {}, "1", {})
+    scans = [one._replace(template="sub-01_ses-1", template_maps={"left": path}) for one in scans_of_two(brain)]
+    export_bids(folder, [*scans, scans[1]._replace(run="a", week=25.0)], {}, "1", {})
     place = folder / "sub-01" / "ses-2" / "anat" / "sub-01_ses-2_hemi-L_space-sub01ses1_den-5_sulc.shape.gii"
     assert read_vertex_maps(place)["sulc"] == pytest.approx(-np.arange(5))
     assert place.with_name(place.name.replace("_sulc", "_desc-agw2500_sulc")).exists()
@@ -230,7 +230,7 @@ def test_maps_at_the_vertices_of_a_template_say_whose_they_are(tmp_path, brain):
 
 def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain):
     folder, volume = tmp_path / "bids", labels_of(tmp_path)
-    export_bids(folder, [brain, replace(brain, run="a", week=24.0, volume=volume)], {}, "1", {})
+    export_bids(folder, [brain, brain._replace(run="a", week=24.0, volume=volume)], {}, "1", {})
     found = read_label_volume(folder / "sub-case1" / "anat" / "sub-case1_desc-agw2400_dseg.nii.gz")
     start = volume["labels"].read()
     np.testing.assert_array_equal(found.affine, start.affine)
@@ -245,8 +245,8 @@ def test_labels_of_simulated_brains_are_in_the_grid_of_the_start(tmp_path, brain
 def test_the_bids_validator_finds_no_error(tmp_path, brain):
     folder = tmp_path / "bids"
     more = {"white": brain.surfaces, "white_maps": brain.maps, "template": "sub-01_ses-1", "template_maps": brain.maps}
-    scans = [replace(one, **more) for one in scans_of_two(brain)]
-    simulated = replace(scans[0], white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path))
+    scans = [one._replace(**more) for one in scans_of_two(brain)]
+    simulated = scans[0]._replace(white={}, white_maps={}, run="run-a", week=23.5, volume=labels_of(tmp_path))
     export_bids(folder, [*scans, simulated], TABLES_OF_TWO, "1", {"area": ("pial area", "cm2")})
     done = ran(VALIDATOR, folder, "--format", "json")
     found = json.loads(done.stdout)["issues"]["issues"]

@@ -142,11 +142,11 @@ def test_simulated_and_measured_brains_are_not_exchanged():
 
 def test_members_of_a_study_that_ended_before_have_no_files():
     ((row,),) = jobs_of("influence_figure")
-    ended = row.may_end[1]
-    assert ended[1:] == ("a", 22)
-    members = row.inputs_without([ended[0]])["members"]
-    assert [run for run, halves in members.items() if halves is None] == [ended[0]]
-    assert row.inputs_without([]) == row.inputs
+    assert row.may_end == ("a", 22)
+    ended = list(row.inputs["members"])[1]
+    members = row.reached_inputs(lambda run, *_: run != ended)["members"]
+    assert [run for run, halves in members.items() if halves is None] == [ended]
+    assert row.reached_inputs(lambda *_: True) == row.inputs
 
 
 def drawn(monkeypatch, tmp_path, draw, inputs, **options):

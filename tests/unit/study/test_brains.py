@@ -35,8 +35,8 @@ def test_files_are_found_beside_the_configuration(folder):
     assert both.files == [str(folder / "l.gii"), str(folder / "r.gii")]
     assert both.white_files == {"left": str(folder / "lw.gii"), "right": str(folder / "rw.gii")}
     assert whole.white_files == {"whole": str(folder / "white.stl")}
-    assert (left.sides, left.has_vertices, left.label_volume) == (("left",), True, None)
-    assert (right.sides, right.has_vertices, right.label_volume) == (("right",), False, str(folder / "a.nii.gz"))
+    assert (left.sides, left.label_volume) == (("left",), None)
+    assert (right.sides, right.label_volume) == (("right",), str(folder / "a.nii.gz"))
     assert (shape.source, shape.files, shape.shape.kind) == ("shape", [], "ellipsoid")
 
 

@@ -154,7 +154,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
     # maps are brought to a template that is there
     in_both = study(real[:3], metrics={"template": "b23"}), found
-    assert [{len(row["template_maps"]) for row in one.exported} for one in in_both] == [{2}, {0}]
+    assert [{len(row.template_maps) for row in one.exported} for one in in_both] == [{2}, {0}]
     # nothing is left where no start is
     search = {"base": "reference", "parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}, "compare_week": 24}
     empty = study(real, ["b21"], studies={"thick": varied}, calibrate=search)
@@ -253,7 +253,7 @@ def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(rea
     further = labels(23, id="twin"), labels(27), labels(30)
     found = study([*real[:3], *further], runs={"a": {"growth": "shapes"}, "open": {"growth": SIZES}})
     chain = found.chains["b21", "self"]
-    assert (ids(chain.brains), chain.later_weeks) == (["b21", "b22", "b23", "b27"], [22, 23, 27])
+    assert (ids(chain.brains), chain.weeks[1:]) == (["b21", "b22", "b23", "b27"], [22, 23, 27])
     assert chain.correspondences[0] == "results/study/registration/b21/b22.h5"
     assert found.registered_starts == ["b21"]
     assert [one.targets for one in found.run_simulations] == ["results/brains/b21/mesh/targets.self.h5", []]
@@ -372,7 +372,7 @@ def test_runs_of_studies_and_of_the_calibration_are_led_to_their_own_end(of_two,
     search = {"calibrate": later | {"parameters": {"thickness_mm": [1, 3]}, "score": {"size": 1}}}
     for more in (varied, search):
         if preset == "measured":
-            assert study(of_two(22, 24, 26), **runs, **more).chains["own22", "self"].later_weeks == [24, 26]
+            assert study(of_two(22, 24, 26), **runs, **more).chains["own22", "self"].weeks[1:] == [24, 26]
         else:
             # the atlas ends at 25 GW
             assert refusal(of_two(22, 24, 26), **runs, **more) == Facts("own22", 22, 26)
@@ -383,7 +383,7 @@ def test_what_is_expected_is_compared_in_the_weeks_of_its_later_brains(of_two):
     found = study(brains, runs=EXPECTED["runs"] | {"plain": {}})
     one, chain = found.simulations["a", "own22.4"], found.chains["own22.4", "atlas"]
     assert one.weeks == pytest.approx([22.4, 23, 23.4, 23.7, 24])
-    assert (chain.later_weeks, chain.further_weeks) == ([22, 23, 24], (23.4, 23.7))
+    assert (chain.weeks[1:], chain.further_weeks) == ([22, 23, 24], (23.4, 23.7))
     assert found.chains["own22.4", "self"].further_weeks == ()
     assert {week: brain.id for week, brain in one.observed.items()} == {23: "own23", 23.4: "own23.4", 23.7: "own23.7"}
     # so are runs beside it; others keep the weeks that are asked for
@@ -416,7 +416,7 @@ def test_brains_without_labels_are_filled_with_a_cortex_that_is_their_own_or_mea
     settings = EXPECTED | {"growth": {"matched_surfaces": False}}
     brains = of_two(22, atlas=(22, 23, 24, 25))
     found = study(map(given, brains), **settings)
-    assert found.chains["own22", "atlas"].later_weeks == [22, 23, 24]
+    assert found.chains["own22", "atlas"].weeks[1:] == [22, 23, 24]
     source = "typical" if surfaces == "both" else "measured"
     ids = names[surfaces]
     assert found.filled == [{"ids": ids, "cortex": source, "by_cortex": True}]
