@@ -3,14 +3,14 @@
     ./run gyriflow run config/examples/paper.yaml -d paper --stage replication
     ./run python benchmarks/replication.py paper
 
-Rows that cannot be compared (costs on another machine, statements about other brains) are left out; the page
-`results/study/replication.html` has them.
+Rows that cannot be compared (costs on another machine, results of other authors, bands that are not resolved) are left
+out; the page `results/study/replication.html` has them.
 """
 
 import argparse
 from pathlib import Path
 
-from gyriflow.compare.published import NOT_COMPARABLE, NOT_RUN, NOT_TESTED
+from gyriflow.compare.published import NO_BANDS, NOT_COMPARABLE, NOT_RUN, NOT_TESTED
 from gyriflow.io.files import read_table
 
 
@@ -19,7 +19,8 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="working directory of the run")
     table = read_table(parser.parse_args().folder / "results" / "study" / "replication.csv")
     print("| result | the paper | here | verdict |\n| --- | --- | --- | --- |")
-    for row in table[~table["verdict"].isin([NOT_RUN, NOT_COMPARABLE, NOT_TESTED])].itertuples():
+    is_compared = ~table["verdict"].isin([NOT_RUN, NOT_COMPARABLE, NOT_TESTED]) & (table["here"] != NO_BANDS)
+    for row in table[is_compared & ~table["result"].str.contains("measured")].itertuples():
         print(f"| {row.result} | {row.paper} | {row.here} | {row.verdict} |")
 
 

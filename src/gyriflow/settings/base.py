@@ -33,7 +33,7 @@ PROBLEM = "problem"
 
 REMOVED_KEYS = {
     ("Contact", "distance_mm"): "contact begins at a fifth of the mean edge, or at the smallest gap of the start",
-    ("Contact", "gap_mm"): "the planes are those of the paper, 0.625 mm from the middle of the fissure",
+    ("Contact", "gap_mm"): "the planes follow the fissure of the start brain",
     ("Solver", "max_newton"): "a step is halved after 20 Newton iterations without progress",
     ("MeshSettings", "min_radius_ratio"): "elements with a radius ratio below 0.001 are refused",
     ("GrowthSettings", "atlas_ages"): "atlas brains have the ages at which the curve of their volumes has their size",
