@@ -99,21 +99,21 @@ def test_maps_are_made_for_the_runs_that_have_any(files, labels):
 
 
 @pytest.mark.parametrize(
-    ("growth", "curves", "series", "kind", "follows_registration"),
+    ("growth", "curves", "series", "kind"),
     [
-        ({}, [], None, "predicted", False),
-        (SIZES, [], None, "predicted", False),
-        (SIZES | {"volume_ml": "measured"}, CURVES["curves"], "volume", "explained", False),
+        ({}, [], None, "predicted"),
+        (SIZES, [], None, "predicted"),
+        (SIZES | {"volume_ml": "measured"}, CURVES["curves"], "volume", "explained"),
         # its sizes come from its shapes
-        ({"model": "shapes"}, [], None, "explained", True),
+        ({"model": "shapes"}, [], None, "explained"),
     ],
 )
 def test_a_run_waits_for_the_sizes_that_it_follows_and_is_explained_by_measured_growth(
-    real, growth, curves, series, kind, follows_registration
+    real, growth, curves, series, kind
 ):
     (one,) = study(real, runs={"r": {"growth": growth}}).run_simulations
     assert (one.curves, one.followed_series) == (curves, series)
-    assert (one.kind, one.follows_registration) == (kind, follows_registration)
+    assert one.kind == kind
 
 
 # brains that were refused
