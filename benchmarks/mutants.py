@@ -115,7 +115,7 @@ BY_TESTS = {
     "compare/test_accuracy.py": [
         ("src/gyriflow/compare/accuracy.py", "count / (count + 1)", "(count - 1) / count"),
         ("src/gyriflow/compare/accuracy.py", "np.maximum(shorter, shortest)", "shorter"),
-        ("src/gyriflow/compare/accuracy.py", "(count + 1) * LEVEL", "count * LEVEL"),
+        ("src/gyriflow/compare/accuracy.py", "(rank + 1) * LEVEL", "rank * LEVEL"),
         ("src/gyriflow/compare/accuracy.py", "abs(means.mean()) > error", "True"),
         ("src/gyriflow/compare/accuracy.py", "max(found.largest for found in smaller)", "smaller[-1].largest"),
         ("src/gyriflow/compare/accuracy.py", 'rows["start_week"] + rows["horizon"]', 'rows["horizon"]'),

@@ -80,7 +80,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     if downloads:
         yield f"  {downloads} atlas file{'s are' if downloads > 1 else ' is'} missing and will be downloaded", False
     if valid:
-        yield "  input files: all are readable and fit their label schemes", False
+        yield "  input files: no problem found", False
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
     yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))

@@ -33,10 +33,9 @@ from ..settings.brains import BrainConfig, GivenRegions
 from ..settings.terms import SIDES
 from ..settings.varying import files_of, mean_of_curve
 from ..study.study import Study
+from .recognition import NATIVE_SPACES, SPACE_NAME
 
 SUBJECT_NAME = re.compile(r"(?<![A-Za-z0-9])sub-([A-Za-z0-9]+)")
-SPACE_NAME = re.compile(r"(?:^|_)space-([A-Za-z0-9]+)_")
-OWN_SPACES = ("T1w", "T2w", "orig", "individual", "scanner")
 HULL_SHARE = 0.8
 """About the volume of a hemisphere over that of its convex hull, where a surface is open."""
 
@@ -138,8 +137,8 @@ def _outward(mesh: TriangleMesh) -> TriangleMesh:
 def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
     name, own = Path(path).name, {*SUBJECT_NAME.findall(f"{brain.id} {brain.subject}")}
     if own and (found := {*SUBJECT_NAME.findall(name)} - own):
-        yield f"{path} is named as of sub-{', sub-'.join(sorted(found))}"
-    spaces = {space for space in SPACE_NAME.findall(name) if space not in OWN_SPACES}
+        yield f"{path} has a name of sub-{', sub-'.join(sorted(found))}"
+    spaces = {space for space in SPACE_NAME.findall(name) if space.lower() not in NATIVE_SPACES}
     if is_volume(path) and Path(path).is_file() and (space := read_header(path).space) in ("mni", "talairach"):
         spaces.add(space)
     if spaces:

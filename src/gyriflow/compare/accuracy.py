@@ -112,7 +112,7 @@ def _counted(counted: pd.DataFrame, week: float, horizon: float) -> ErrorInTests
         largest.append(np.abs(values - others * (is_corrected and others_corrected)).max())
     rank, coverage = len(largest), count / (count + 1)
     if count >= MIN_STARTS:
-        rank, coverage = int(np.ceil(round((count + 1) * LEVEL, 6))), LEVEL
+        rank, coverage = min(rank, int(np.ceil(round((rank + 1) * LEVEL, 6)))), LEVEL
     return ErrorInTests(count, float(np.sort(largest)[rank - 1]), bias, is_corrected, coverage, is_beyond=False)
 
 
@@ -125,14 +125,14 @@ def _bias(means: Floats) -> tuple[float, bool]:
 
 
 def error_words(metric: str, tested: ErrorInTests) -> str:
-    """Describe a tested error, such as "largest error of 2 tests, −10 to +11 %: 2 in 3 brains at most"."""
+    """Describe a tested error, such as "largest error of 2 start brains, −10 to +11 %: holds for 2 of 3 at most"."""
     low, high = (f"{np.expm1(sign * tested.largest):+.0%}".replace("-", "−") for sign in (-1, 1))
     ends = f"± {high[1:-1]}" if low[1:] == high[1:] else f"{low[:-1]} to {high[:-1]}"
     is_few = tested.starts < MIN_STARTS
     words = "largest error" if is_few else f"{100 * LEVEL:.0f} %"
-    words += f" of {tested.starts} test{'s' if tested.starts > 1 else ''}, {ends} %"
+    words += f" of {tested.starts} start brain{'s' if tested.starts > 1 else ''}, {ends} %"
     words += " of the folding" if metric == FOLDING else ""
-    words += f": {tested.starts} in {tested.starts + 1} brains at most" if is_few else ""
+    words += f": holds for {tested.starts} of {tested.starts + 1} at most" if is_few else ""
     if tested.is_corrected:
         words += f", about the prediction less the mean error of {100 * np.expm1(tested.bias):+.0f} %".replace("-", "−")
     return words + ("; no test went as far" if tested.is_beyond else "")
@@ -192,8 +192,8 @@ def prediction_facts(tests: Sequence[Mapping[str, Any]], start_week: float, week
         tested, run, atlas = better
         advantage = (
             f"In tests over {tested:g} weeks the atlas' own brain was more like the observed brain than the prediction "
-            f"(mean r of the shape index {atlas:.2f} and {run:.2f}): the start's individual differences had faded or "
-            "changed by then, or the start was an average with few of them. For the places of folds, use the atlas' "
+            f"(mean r of the shape index {atlas:.2f} and {run:.2f}). The start's individual differences may have faded "
+            "or changed by then, or the start, an average, had few of them. For the places of folds, use the atlas' "
             "own brain, which is stored with the prediction."
         )
     held_words = {str(row.Index).replace("_", " "): f"{row.held} of {row.tests}" for row in held.itertuples()}

@@ -1,4 +1,4 @@
-"""Triangle surfaces (GIFTI, FreeSurfer, VTK, STL, PLY, OBJ, OFF), in mm, and maps and labels at their vertices (GIFTI).
+"""Triangle surfaces in mm, of the formats in `FORMATS`, and maps and labels at their vertices (GIFTI).
 
 Coordinates are transformed to scanner space if the file defines their space.
 """
@@ -41,7 +41,7 @@ System = tuple[str, str, Floats]
 
 
 def read_surface(path: AnyPath, side: str | None = None) -> TriangleMesh:
-    """Return the surface of a GIFTI, FreeSurfer, VTK, STL, PLY, OBJ or OFF file, in the order of corners of the file.
+    """Return the surface of a file of any format in `FORMATS`, in the order of corners of the file.
 
     GIFTI and FreeSurfer coordinates go to scanner space if the file defines how. InputError for invalid files,
     coordinates of another space than the subject's, and the other hemisphere than `side`.
@@ -170,7 +170,7 @@ def read_surface_map(path: AnyPath, surface_path: AnyPath, side: str | None = No
     found = format_of(surface_path, "surface")
     if found and found.name == "STL":
         problem = "cannot have a map, since STL files do not number their vertices"
-        expected = f"the GIFTI, PLY, OBJ or OFF file that {path} was made on"
+        expected = f"the file that {path} was made on, of a format that numbers vertices, such as GIFTI"
         raise InputError(problem, path=surface_path, expected=expected)
     surface, _, structure = surface_space_structure(surface_path)
     image = load_gifti(path)

@@ -5,7 +5,7 @@ A metric is an entry of `size_metrics` (any surface), `folding_metrics` (one hem
 in `gyriflow.quantities`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,11 +100,14 @@ def _mode_table(name: str, spectra: Mapping[str, Spectrum]) -> pd.DataFrame:
     return pd.DataFrame({"hemisphere": name} | modes | coefficients)
 
 
-def size_metrics(mesh: TriangleMesh) -> Metrics:
-    """Return volume and area of a hemisphere or of the whole, their ratio, and the number of faces that cut others."""
-    volume, area_of_mesh = volume_ml(cap(mesh)), area_cm2(mesh)
-    relative, crossing = area_of_mesh / volume ** (2 / 3) if volume > 0 else np.nan, float(crossing_faces(mesh))
-    return {"volume": volume, "area": area_of_mesh, "relative_area": relative, "crossing_faces": crossing}
+def size_metrics(mesh: TriangleMesh, hemispheres: Iterable[TriangleMesh] = ()) -> Metrics:
+    """Return volume and area of a hemisphere or of the whole, their ratio, and the number of faces that cut others.
+
+    The area of the whole is that of its `hemispheres`, without caps of medial walls.
+    """
+    volume, cm2 = volume_ml(cap(mesh)), sum(map(area_cm2, hemispheres)) or area_cm2(mesh)
+    relative, crossing = cm2 / volume ** (2 / 3) if volume > 0 else np.nan, float(crossing_faces(mesh))
+    return {"volume": volume, "area": cm2, "relative_area": relative, "crossing_faces": crossing}
 
 
 def folding_metrics(sides: Sequence[Folds]) -> Metrics:
@@ -262,9 +265,7 @@ def measure_brain(
         values = np.concatenate([thickness[name] for name in names])
         return folding_metrics([folds[name] for name in names]) | thickness_metrics(values, areas)
 
-    whole_metrics = size_metrics(whole) | folding_and_thickness(list(meshes))
-    # without caps of medial walls
-    whole_metrics["area"] = sum(area_cm2(mesh) for mesh in meshes.values())
+    whole_metrics = size_metrics(whole, meshes.values()) | folding_and_thickness(list(meshes))
     volumes = label_volumes_ml or {}
     whole_metrics |= {f"volume_{name}": volumes[name] for name in LABEL_VOLUMES if name in volumes}
     bent = [np.average(part.curvature_maps.mean, weights=vertex_areas(part.mesh)) for part in folds.values()]

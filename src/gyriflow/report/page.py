@@ -25,6 +25,8 @@ _SUFFIXES = (*ALL_SUFFIXES, ".yaml", ".yml", ".h5", ".csv", ".tsv", ".sif")
 _FILE_NAME = re.compile(rf"[/\\]|({'|'.join(map(re.escape, _SUFFIXES))})(\.gz)?$", re.IGNORECASE)
 _FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\n;:]*/)+")
 """Folders of a file: they may contain names, so they are stripped."""
+KIND_NOTES = {"explained": ": its growth was measured on that brain"}
+"""What the kind of a comparison means, where a reader may take it for a prediction."""
 NOT_COMPARED = "No simulation is compared: an observed brain of the same population and week is missing."
 MAX_PENETRATION_MM = 0.5
 """Penetration of the contact planes at the start above which the report warns."""
@@ -117,7 +119,7 @@ def study_page(
         title = f"Simulated cortical folding of {', '.join(dict.fromkeys(runs['subject']))}"
         sentence = accuracy_sentence(prediction) if prediction else NOT_COMPARED
         sentence = verdict(runs, validation, tables.warnings, sentence)
-        if prediction and validation is not None:
+        if prediction and validation is not None and len(validation):
             sentence = f"{prediction['tests']['advantage']} {sentence}".lstrip()
         # without observed brains, a prediction has no scores
         scores = "" if prediction and validation is None else html_table(scores_table(runs, validation))
@@ -287,10 +289,12 @@ def accuracy_sentence(prediction: Mapping[str, Any]) -> str:
         "more similar in shape index": means["atlas"]["r_shape_index"] > means["run"]["r_shape_index"],
     }
     better = " and ".join(words for words, holds in is_better.items() if holds)
-    simpler = f" On average the atlas' own brain was {better}; it is given beside the prediction." if better else ""
+    advantage, simpler = prediction["tests"]["advantage"], ""
+    if better and not advantage:
+        simpler = f" On average the atlas' own brain was {better}; it is stored with the prediction."
     beyond = f" No test went as far as {weeks_ahead:.3g} weeks." if weeks_ahead > horizon + 1e-6 else ""
     return (
-        f"{prediction['tests']['advantage']} This is a prediction, not a scan. "
+        f"{advantage} This is a prediction, not a scan. "
         f"In tests over {horizon:g} weeks, the mean distance from the observed brain "
         f"and the correlation of shape index with it were {run} for predictions, {atlas} for the atlas' own brain and "
         f"{scaled} for the scaled start.{simpler}{beyond} The test brains were averages of many normal fetuses; the "
@@ -318,7 +322,8 @@ def verdict(
         last = validation[validation["week"] == validation["week"].max()]
         best = last.sort_values("r_shape_index", ascending=False).iloc[0]
         sentence = (
-            f"At {week_label(best['week'])}, run {best['run']} agrees best with the observed brain ({best['kind']}): "
+            f"At {week_label(best['week'])}, run {best['run']} agrees best with the observed brain "
+            f"({best['kind']}{KIND_NOTES.get(best['kind'], '')}): "
             f"shape index r {best['r_shape_index']:.2f} (scaled start: {best['r_start_shape_index']:.2f}), distance "
             f"{best['distance_mm']:.2f} mm."
         ).replace("-", "−")

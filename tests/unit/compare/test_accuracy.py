@@ -99,7 +99,7 @@ def test_ninety_percent_need_nine_starts():
             held.append(abs(errors[-1] - found.bias * found.is_corrected) <= found.largest)
         assert found.coverage == pytest.approx(coverage)
         assert np.mean(held) == pytest.approx(coverage, abs=0.1), count
-    assert "90 % of 19 tests" in error_words("volume", found)
+    assert "90 % of 19 start brains" in error_words("volume", found)
     # of 20 starts the 19th in size: ⌈21 · 0.9⌉
     errors = [0.01 * number * (-1) ** number for number in range(1, 21)]
     found = volume_error([row for n, e in enumerate(errors) for row in rows(f"s{n}", 22, {2.0: e})], 24.0, 2.0)
@@ -121,9 +121,12 @@ def test_a_bias_is_corrected_where_it_exceeds_its_error():
 def test_words_say_by_how_many_tests_and_for_how_many_brains_at_most():
     three = [*A, *B, *rows("c", 22, {2.0: 0.0, 4.0: 0.26, 8.0: 0.0})]
     words = error_words("volume", volume_error(three, 26.0, 4.0))
-    assert words == Facts("largest error of 3 tests", "−23 to +30 %", "3 in 4 brains at most")
+    assert words == Facts("largest error of 3 start brains", "−23 to +30 %", "holds for 3 of 4 at most")
     assert "90 %" not in words
-    assert error_words("volume", volume_error(A, 24.0, 2.0)) == "largest error of 1 test, ± 5 %: 1 in 2 brains at most"
+    assert (
+        error_words("volume", volume_error(A, 24.0, 2.0))
+        == "largest error of 1 start brain, ± 5 %: holds for 1 of 2 at most"
+    )
     assert "of the folding" in error_words("gyrification_index", volume_error(A, 24.0, 2.0))
     assert "no test went as far" in error_words("volume", volume_error(A, 40.0, 2.0))
     biased = [row for start, e in zip("abc", (-0.2, -0.22, -0.24), strict=True) for row in rows(start, 22, {2.0: e})]

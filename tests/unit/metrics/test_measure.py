@@ -14,6 +14,7 @@ from gyriflow.geometry.tetrahedra import TetrahedralMesh
 from gyriflow.geometry.triangles import TriangleMesh, area_cm2, flipped, merged, submesh, vertex_areas
 from gyriflow.growth.carrying import maps_on_template
 from gyriflow.metrics.curvature import curvature
+from gyriflow.metrics.gyrification import cap
 from gyriflow.metrics.measure import (
     BrainMetrics,
     area_ratio,
@@ -49,6 +50,16 @@ def cut() -> BrainMetrics:
     on_right = whole.vertices[whole.faces].mean(axis=1)[:, 0] > 0
     left, right = submesh(whole, ~on_right)[0], submesh(whole, on_right)[0]
     return measure_brain(whole, left, right, spangy_modes=60)
+
+
+def test_ratios_of_the_whole_have_its_area_without_caps() -> None:
+    ball = octasphere(25.0)
+    half = submesh(ball, ball.vertices[ball.faces].mean(axis=1)[:, 0] < 0)[0]
+    other = flipped(TriangleMesh(half.vertices * [-1.0, 1.0, 1.0] + [1.0, 0.0, 0.0], half.faces))
+    found = measure_brain(merged(cap(half), cap(other)), half, other, spangy_modes=60)
+    area, volume = value(found, "whole", "area"), value(found, "whole", "volume")
+    assert area == pytest.approx(area_cm2(ball))
+    assert value(found, "whole", "relative_area") == pytest.approx(area / volume ** (2 / 3))
 
 
 def test_two_spheres(apart: BrainMetrics) -> None:
