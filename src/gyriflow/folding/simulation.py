@@ -34,7 +34,7 @@ from .zones import Zones
 
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
-MAX_STEP_VOLUME_RATIO = 2.0
+MAX_STEP_VOLUME_RATIO = 3.0
 """Largest volume of an element after one step of growth by rates, over that before: more is not resolved in time."""
 
 
