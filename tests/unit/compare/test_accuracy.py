@@ -106,6 +106,14 @@ def test_ninety_percent_need_nine_starts():
     assert (found.is_corrected, found.largest) == (False, pytest.approx(0.19))
 
 
+def test_more_starts_over_a_longer_horizon_do_not_make_an_interval_narrower():
+    near = [row for n in range(9) for row in rows(f"near{n}", 22, {2.0: 0.5 if n == 0 else 0.01 * (-1) ** n})]
+    far = [row for n in range(10) for row in rows(f"far{n}", 22, {4.0: 0.01 * (-1) ** n})]
+    found = volume_error([*near, *far], 26.0, 4.0)
+    assert found.largest == pytest.approx(volume_error(near, 24.0, 2.0).largest)
+    assert found.largest > 0.4
+
+
 def test_a_bias_is_corrected_where_it_exceeds_its_error():
     clear = [row for start, e in zip("abc", (0.20, 0.22, 0.24), strict=True) for row in rows(start, 22, {2.0: e})]
     found = volume_error(clear, 24.0, 2.0)
