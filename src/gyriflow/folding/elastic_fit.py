@@ -49,11 +49,10 @@ SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTH_MM = 0.2
 """Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
 depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
-RELEASED_MM, SOFTER = 6.0, 100.0
-"""Around the most compressed element of a step that fails, over this distance, the body does not grow, and springs are
-softer by this factor: a fold that cannot be followed does not hold back the rest."""
-MAX_RELEASES, MAX_DRAWS = 4, 3
-"""Places that are released on the way to a shape, and attempts to draw the boundary to its goals."""
+SOFTER = 4.0
+"""Factor by which springs are softened if no solution is found with them."""
+MAX_DRAWS = 2
+"""Attempts to draw the boundary to its goals."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
@@ -69,8 +68,9 @@ SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
-MAX_LEFT_MM = 1.0
-"""Largest distance, as a root mean square, at which a body may stay from a shape."""
+MAX_LEFT_MM = 3.0
+"""Largest distance, as a root mean square, at which a body may stay from a shape: it is warned of, and the way to the
+next shape begins there."""
 MAX_HALVINGS, MAX_DRAW_HALVINGS = 5, 1
 """Largest number of times that a step which fails is halved, and one that only draws the boundary."""
 SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=4, max_krylov=500)
@@ -125,7 +125,6 @@ class ElasticFit:
         pieces, self._tets = linear_pieces(mesh), mesh.tets
         self._passed: list[Floats] = []
         self._moved_straight = False
-        self._released = np.zeros(len(mesh.vertices))
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
@@ -149,10 +148,9 @@ class ElasticFit:
     def follow(self, shape: Floats) -> Floats:
         """Move the body to near a shape (n, 3) in mm, which may have inverted elements; return its (n, 3) positions.
 
-        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. Places that
-        cannot follow are released, until the next shape. If it still cannot go on it stays, with a warning, or
-        SolverError with the place if its boundary is still more than `MAX_LEFT_MM` from that of the shape (root mean
-        square).
+        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. Where it
+        cannot go on it stays, with a warning, or SolverError with the place if its boundary is still more than
+        `MAX_LEFT_MM` from that of the shape (root mean square).
         """
         boundary = self.boundary
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
@@ -164,22 +162,15 @@ class ElasticFit:
             max(abs(math.log(max(ratio, 1e-3))), float(np.quantile(np.linalg.norm(logs, axis=(1, 2)), 0.9))) / 3
         )
         steps = max(1, math.ceil(mean_strain / STRAIN_PER_STEP))
-        self._released[:] = 0.0
-        left, releases = steps, MAX_RELEASES
-        while left:
+        lengths = np.full(len(self._used), SPRING_LENGTH_MM)
+        for left in range(steps, 0, -1):
             displacement = (goal - self.positions_mm) / left
             logs = log_stretch(self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH)
             integrals = integrals_at_vertices(self.positions_mm, self._pieces, packed(logs))
             strain = smooth_integrals(self.positions_mm, self._pieces, integrals, SMOOTHING_MM)
-            strain *= (1.0 - self._released)[:, None]
             try:
-                self._step((self.positions_mm + displacement)[self._used], SPRING_LENGTH_MM, strain, MAX_HALVINGS)
-                left -= 1
+                self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
             except SolverError as error:
-                if releases:
-                    self._release()
-                    releases -= 1
-                    continue
                 misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
                 if misfit_mm > MAX_LEFT_MM:
                     raise
@@ -191,18 +182,20 @@ class ElasticFit:
     def draw(self, goals: Floats) -> Floats:
         """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
-        Places that cannot follow are released; a body that cannot be drawn at all stays as it is, with a warning.
+        Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is, with a
+        warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
+        lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
         for _ in range(MAX_DRAWS):
             try:
-                self._step(transform_points(goals, motion), CLOSE_SPRING_LENGTH_MM, None, MAX_DRAW_HALVINGS)
+                self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
                 self._straighten()
                 break
             except SolverError as error:
-                self._release()
                 self.positions_mm, problem = start, str(error)
+                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
         else:
             log.warning("the body is not drawn to a surface: %s", problem)
         return self._move(np.linalg.inv(motion))
@@ -325,17 +318,10 @@ class ElasticFit:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
-    def _release(self) -> None:
-        """Release the surroundings of the most compressed element of the step that failed."""
-        _, _, place = self._solver.most_compressed()
-        distance = np.linalg.norm(self.positions_mm - place, axis=1)
-        self._released = np.maximum(self._released, np.exp(-((distance / RELEASED_MM) ** 2)))
-
-    def _step(self, goals: Floats, length_mm: float, strain: Floats | None, halvings: int) -> None:
+    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None, halvings: int) -> None:
         domain, problem, self._moved_straight = self._domain, self._problem, False
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
-        lengths = length_mm * SOFTER ** self._released[self._used]
         self._springs.draw_to(goals, vertex_areas(self.boundary), lengths)
         shape = len(domain.cells), len(problem.points.weights)
         inverse = np.tile(np.eye(3), (*shape, 1, 1))
@@ -354,8 +340,8 @@ class ElasticFit:
                     remedy="Look at the labels or surfaces of this week and the one before at that place.",
                 ) from None
             half = None if strain is None else strain / 2
-            self._step(0.5 * (goals + self.positions_mm[self._used]), length_mm, half, halvings - 1)
-            self._step(goals, length_mm, half, halvings - 1)
+            self._step(0.5 * (goals + self.positions_mm[self._used]), lengths, half, halvings - 1)
+            self._step(goals, lengths, half, halvings - 1)
             return
         self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M
         self._passed.append(self.positions_mm)

@@ -213,21 +213,16 @@ class NewtonSolver:
             return Iterate(iterate.residual, before, exhausted=True)
         raise NotConvergedError("the line search found no step that lowers the energy")
 
-    def most_compressed(self) -> tuple[float, int, Floats]:
-        """Return det F, number and centre (3,) in mm of the most compressed element of a failed solve."""
-        problem, domain = self.problem, self.problem.domain
-        last = self.last or problem.residual(problem.rest())
-        ratios = problem.volume_ratios(last.displacement) if self.inverted is None else self.inverted
-        centres = domain.local(domain.positions)[domain.corners].mean(axis=1) * MM_PER_M
-        return domain.locate_minimum(ratios.min(axis=1), domain.tet_of_cell, centres)
-
     def worst_places(self) -> str:
         """Return where a failed solve was worst: the most compressed element and the largest residual, in mm."""
-        domain, last = self.problem.domain, self.last or self.problem.residual(self.problem.rest())
+        problem, domain = self.problem, self.problem.domain
+        last = self.last or problem.residual(problem.rest())
+        before = domain.local(domain.positions)
+        ratios = problem.volume_ratios(last.displacement) if self.inverted is None else self.inverted
         forces = -np.linalg.norm(last.owned.reshape(-1, 3), axis=1)
-        ratio, tet, centre = self.most_compressed()
-        positions = domain.local(domain.positions) * MM_PER_M
-        force, vertex, position = domain.locate_minimum(forces, domain.vertex_of_node, positions)
+        centres = before[domain.corners].mean(axis=1) * MM_PER_M
+        ratio, tet, centre = domain.locate_minimum(ratios.min(axis=1), domain.tet_of_cell, centres)
+        force, vertex, position = domain.locate_minimum(forces, domain.vertex_of_node, before * MM_PER_M)
         return (
             f"smallest det F {ratio:.3g} in element {tet} at {np.round(centre, 1).tolist()} mm, "
             f"largest residual {-force:.2e} N at vertex {vertex} at {np.round(position, 1).tolist()} mm"
