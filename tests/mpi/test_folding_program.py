@@ -137,7 +137,7 @@ def test_a_thickness_map_acts_at_its_vertices_on_any_number_of_ranks(mesh, tmp_p
 @pytest.mark.fault(37)
 def test_a_second_run_in_the_same_folder_is_refused(mesh, tmp_path):
     out = tmp_path / "out"
-    slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0])
+    slow = command(mesh, out, end_week=30.0, output_weeks=[21.0, 30.0], step_s=3600)
     with subprocess.Popen(slow, stdout=subprocess.PIPE, text=True) as first:
         next(line for line in first.stdout if "step" in line)
         second = fold(mesh, out)
