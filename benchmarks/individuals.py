@@ -163,8 +163,7 @@ def held_by_tests(folder: Path, individuals: Sequence[str], weeks: Sequence[int]
             observed = metrics(f"brains/{name}-{persistence}-{week}/metrics")
             error = log_value(metric, predicted[metric]) - log_value(metric, observed[metric])
             tested = error_in_tests(log_errors(tests, metric), week, week - weeks[0])
-            is_held = abs(error - tested.bias * tested.is_corrected) <= tested.largest
-            rows.append({"metric": metric, "persistence": persistence, "error": error, "held": is_held})
+            rows.append({"metric": metric, "persistence": persistence, "error": error, "held": tested.holds(error)})
     shares = pd.DataFrame(rows).groupby(["metric", "persistence"])
     return shares.agg(
         brains=("held", "size"), held=("held", "sum"), mean_error=("error", "mean"), sd=("error", "std")

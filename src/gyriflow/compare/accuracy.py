@@ -48,6 +48,10 @@ class ErrorInTests:
     coverage: float
     is_beyond: bool
 
+    def holds(self, error: float) -> bool:
+        """Return whether the interval contains a brain that was predicted with an error, as logarithm."""
+        return abs(error - self.bias * self.is_corrected) <= self.largest
+
 
 def log_value(metric: str, value: Any) -> Any:
     """Return the logarithm of a metric, whose differences are errors; for `FOLDING` that of the folding."""
@@ -154,9 +158,9 @@ def held_intervals(tests: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
                 for week, horizon, error in own[["week", "horizon", "error"]].to_numpy(dtype=float)
                 if (interval := error_in_tests(others, week, horizon))
             ]
-            held = sum(abs(error - part.bias * part.is_corrected) <= part.largest for error, part in tested)
+            held = sum(interval.holds(error) for error, interval in tested)
             if tested:
-                rows.append((metric, start, len(tested), held, max(part.coverage for _, part in tested)))
+                rows.append((metric, start, len(tested), held, max(interval.coverage for _, interval in tested)))
     return pd.DataFrame(rows, columns=["metric", "start", "tests", "held", "at_most"])
 
 

@@ -192,13 +192,12 @@ class ElasticFit:
             try:
                 self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
                 self._straighten()
-                break
+                return self._move(np.linalg.inv(motion))
             except SolverError as error:
                 self.positions_mm, problem = start, str(error)
                 lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
-        else:
-            log.warning("the body is not drawn to a surface: %s", problem)
-        return self._move(np.linalg.inv(motion))
+        log.warning("the body is not drawn to a surface: %s", problem)
+        return start
 
     def move_to(self, shape: Floats) -> Floats:
         """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n, 3) positions in mm.

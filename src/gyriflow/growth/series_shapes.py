@@ -132,15 +132,9 @@ def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints,
         if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
             break
         body.draw(goals)
-        # a body that stays is moved as a whole
-        if np.allclose(radii(body.boundary.vertices), radii(before), atol=1e-6):
+        if np.allclose(body.boundary.vertices, before, atol=1e-6):
             break
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
-
-
-def radii(points: Floats) -> Floats:
-    """Return the distances (n,) of points from their centre, which a rigid motion does not change."""
-    return np.asarray(np.linalg.norm(points - points.mean(axis=0), axis=1))
 
 
 def follow_series(
