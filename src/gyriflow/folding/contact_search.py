@@ -57,6 +57,12 @@ class NearPairs:
             return np.inf
         return float(np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions)))
 
+    def distance_mm(self, i: int) -> float:
+        """Return the distance between the two sides of pair `i`."""
+        # ipctk's pairs do not keep their list alive: a pair with a name may outlive it, and then reads freed memory
+        places = self.pairs[i].dof(self.part_positions, self.mesh.edges, self.mesh.faces)
+        return float(np.sqrt(self.pairs[i].compute_distance(places)))
+
     def vertices_of_pairs(self) -> list[list[int]]:
         """Return the vertices of each pair, as numbers of the part's vertices."""
         corners = [self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces) for i in range(len(self.pairs))]
