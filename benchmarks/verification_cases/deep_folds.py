@@ -34,18 +34,27 @@ COARSENING = 1.5
 
 @dataclass(frozen=True)
 class Slab:
-    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step."""
+    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step.
+
+    `memory_gw` is the time in weeks over which stress is forgotten.
+    """
 
     cells: float
     order: int
     growth: float
     contact: str = "global"
+    memory_gw: float = 0.0
 
     def parameters(self) -> FoldingParameters:
         """Return the parameters of the run; the core grows, too, which widens gyri and closes the sulcus."""
-        contact = {"kind": self.contact}
-        more = {"fissure_x_mm": 0.0, "core_growth_rate_per_s": RATE_PER_S, "contact": contact}
-        return slab_parameters(CONTRAST, self.growth, **more)
+        return slab_parameters(
+            CONTRAST,
+            self.growth,
+            fissure_x_mm=0.0,
+            core_growth_rate_per_s=RATE_PER_S,
+            stress_memory_gw=self.memory_gw,
+            contact={"kind": self.contact},
+        )
 
 
 @dataclass(frozen=True)
