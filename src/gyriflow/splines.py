@@ -88,8 +88,8 @@ def _data_shares(normal: Floats, penalty: Floats) -> Floats:
     """
     both = normal + penalty
     # diagonals of 1, so that the numbers depend neither on the unit of time nor on the distances of the weeks
-    scales = 1 / np.sqrt(np.diag(both))
-    scales = np.outer(scales, scales)
+    factors = 1 / np.sqrt(np.diag(both))
+    scales = np.outer(factors, factors)
     # directions that neither decides, of weeks that nearly coincide, count as decided by data
     ridge = RIDGE * np.eye(len(both))
     shares = eigh(scales * normal + ridge, scales * both + ridge, eigvals_only=True)

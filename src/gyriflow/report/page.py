@@ -266,7 +266,8 @@ def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> 
     """Return a row for each run: how it ended, and its scores at the last week with an observed brain.
 
     `runs` has the columns run, subject, start_week, end_week, weeks, growth.model, min_J, elements_through_cortex,
-    order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
+    order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's
+    table.
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
