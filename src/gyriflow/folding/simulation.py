@@ -15,7 +15,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.terms import ELEMENTS_NEEDED
+from ..settings.terms import ELEMENTS_NEEDED, is_too_coarse
 from ..settings.varying import Maps, value_at, value_range
 from ..settings.weeks import WEEK_RANGE
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
@@ -238,7 +238,8 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            coarse = resolution_warning(after.rows, folding.domain.order)
+            has_layers = p.growth.definition.has_layers
+            coarse = resolution_warning(after.rows, folding.domain.order) if has_layers else ""
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
                 warn(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
@@ -260,12 +261,9 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Return a warning at the first step with too few elements through the cortex, else an empty text."""
-    # NaN: no element has its centre in the cortex
-    through = [
-        0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]
-    ]
-    current, before = through[-1], through[0] if len(through) > 1 else math.inf
-    if not current < ELEMENTS_NEEDED[order] <= before:
+    coarse = [is_too_coarse(order, row["elements_through_cortex"]) for row in rows[-2:]]
+    was_coarse = len(rows) > 1 and coarse[0]
+    if was_coarse or not coarse[-1]:
         return ""
     start = f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
     return (
