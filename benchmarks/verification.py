@@ -40,8 +40,12 @@ DEEP_GROWTH = (0.04, 0.02)
 """Growth of a step."""
 DEEP_AREA_RATIOS = (1.6, 2.0)
 DEEP_MEMORIES_GW = (0.0, 1.0)
+CONTACT_DISTANCES = ((0.05, 0.1), (0.1, 0.2), (0.2, 0.4), (0.4, np.inf))
+"""Contact distance as a multiple of the mean edge, at most of a short edge."""
+CONTACT_SLABS = ((4, 1, 0.02), (1, 2, 0.02), (1.5, 2, 0.04), (1.5, 2, 0.02))
+"""Cells, order and growth of a step."""
 RANKS = (1, 2, 3)
-SERIAL = ("theory", "elements", "deep")
+SERIAL = ("theory", "elements", "deep", "contact_distance")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -185,7 +189,7 @@ def deep() -> list[dict]:
     return found
 
 
-def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float) -> dict:
+def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float = 0.0) -> dict:
     """Return what a slab has at each area ratio, and the CPU seconds of its run."""
     from verification_cases.deep_folds import Slab, at_ratio, folded
 
@@ -207,8 +211,33 @@ def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float)
     return row
 
 
+def contact_distance() -> list[dict]:
+    """Fold slabs with other contact distances than the default: it is to be so small that it does not matter."""
+    from gyriflow.folding import contact
+
+    found = []
+    for per_mean_edge, per_short_edge in CONTACT_DISTANCES:
+        contact.DISTANCE_PER_MEAN_EDGE = per_mean_edge
+        contact.DISTANCE_PER_SHORT_EDGE = per_short_edge
+        for slab in CONTACT_SLABS:
+            found.append({"per_mean_edge": per_mean_edge, "per_short_edge": per_short_edge, **deep_fold(*slab)})
+    return found
+
+
 PARTS = {
-    part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory, deep)
+    part.__name__: part
+    for part in (
+        consistency,
+        manufactured,
+        elements,
+        symmetry,
+        ranks,
+        theory,
+        rates,
+        memory,
+        deep,
+        contact_distance,
+    )
 }
 
 
