@@ -36,8 +36,10 @@ STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 5
 DEEP_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4), 2: (1, 1.5)}
 """Cells per cortical thickness by element order."""
 DEEP_GROWTH, DEEP_AREA_RATIO = (0.04, 0.02), 1.6
+MAPS = {"box of 30 mm": (30.0, 37.7, (10, 16, 24)), "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30))}
+"""Side of a box and mean length of its waves in mm, and numbers of intervals between nodes along a side."""
 RANKS = (1, 2, 3)
-SERIAL = ("theory", "elements", "deep")
+SERIAL = ("theory", "elements", "deep", "maps")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -187,8 +189,21 @@ def deep() -> list[dict]:
     return found
 
 
+def maps() -> dict:
+    """Compare maps of growth towards shapes, on meshes of both orders, with the growth of the continuous shape."""
+    from verification_cases.growth_maps import WavyBox, errors_of_map
+
+    found: dict = {}
+    for name, (side_mm, wave_mm, counts) in MAPS.items():
+        for order, elements in ORDERS.items():
+            boxes = [WavyBox(side_mm, wave_mm, nodes, order) for nodes in counts]
+            found[f"{name}, {elements}"] = [errors_of_map(box) for box in boxes]
+    return found
+
+
 PARTS = {
-    part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory, deep)
+    part.__name__: part
+    for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory, deep, maps)
 }
 
 
