@@ -44,8 +44,10 @@ CONTACT_DISTANCES = ((0.05, 0.1), (0.1, 0.2), (0.2, 0.4), (0.4, np.inf))
 """Contact distance as a multiple of the mean edge, at most of a short edge."""
 CONTACT_SLABS = ((4, 1, 0.02), (1, 2, 0.02), (1.5, 2, 0.04), (1.5, 2, 0.02))
 """Cells, order and growth of a step."""
+MAPS = {"box of 30 mm": (30.0, 37.7, (10, 16, 24)), "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30))}
+"""Side of a box and mean length of its waves in mm, and numbers of intervals between nodes along a side."""
 RANKS = (1, 2, 3)
-SERIAL = ("theory", "elements", "deep", "contact_distance")
+SERIAL = ("theory", "elements", "deep", "contact_distance", "maps")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -224,6 +226,18 @@ def contact_distance() -> list[dict]:
     return found
 
 
+def maps() -> dict:
+    """Compare maps of growth towards shapes, on meshes of both orders, with the growth of the continuous shape."""
+    from verification_cases.growth_maps import WavyBox, errors_of_map
+
+    found: dict = {}
+    for name, (side_mm, wave_mm, counts) in MAPS.items():
+        for order, elements in ORDERS.items():
+            boxes = [WavyBox(side_mm, wave_mm, nodes, order) for nodes in counts]
+            found[f"{name}, {elements}"] = [errors_of_map(box) for box in boxes]
+    return found
+
+
 PARTS = {
     part.__name__: part
     for part in (
@@ -237,6 +251,7 @@ PARTS = {
         memory,
         deep,
         contact_distance,
+        maps,
     )
 }
 

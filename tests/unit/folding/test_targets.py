@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from shapes import box_mesh, ellipsoid_mesh
+from verification_cases.growth_maps import WavyBox, errors_of_map
 
 from gyriflow.folding.growth import GrowthInputs, StepStart
 from gyriflow.folding.targets import FEEDBACK_FROM_MM, FEEDBACK_GW, FEEDBACK_SMOOTHING_MM, growth_on_path
@@ -72,3 +73,11 @@ def test_misfits_of_the_solver_are_not_made_up_for():
     direction = np.sin(BODY.vertices[:, [1, 2, 0]] / 8)
     before, after = misfits_after_steps(BODY, 0.5 * FEEDBACK_FROM_MM * direction, 1)
     assert remaining_share(before, after) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_map_of_growth_has_the_error_of_its_elements():
+    coarse, fine = (errors_of_map(WavyBox(30.0, 30.0, nodes)) for nodes in (8, 16))
+    for name in ("tensor", "area"):
+        assert fine[name] < 0.6 * coarse[name]
+        assert fine[name] < 2.5 / fine["per_wave"]
+    assert coarse["slope"] < fine["slope"] < 1.01
