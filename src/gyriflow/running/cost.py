@@ -1,7 +1,7 @@
 """Predict time, memory and disk space of simulations, within a factor of two."""
 
 from bisect import bisect_left
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil, prod
 from typing import NamedTuple
 
@@ -10,11 +10,10 @@ from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
-from ..study.paths import PATH_MESH, TARGETS
+from ..study.paths import TARGETS
 from ..study.records import Brain, Simulation
 from ..study.study import Study
 from ..units import ML_PER_MM3, SECONDS_PER_GW
-from .path_store import PATH_MESH_SETTINGS
 
 FOLDINGS = ("simulate", "simulate_member")
 """Rules that fold."""
@@ -68,16 +67,15 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     return Needs(rate * elements * steps, memory, disk)
 
 
-def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str], inputs: Collection[str] = ()) -> float:
-    """Predict the time of a job on one core; 0 for an atlas' path without a mesh among its inputs, which is kept."""
+def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
+    """Predict the time of a job on one core."""
     mesh, brain = study.config.mesh, wildcards.get("brain", "")
     if rule in FOLDINGS:
         return simulation_needs(study.simulations[wildcards["run"], brain], mesh).seconds
     if rule == "atlas_path":
-        if PATH_MESH["mesh"].format(brain=brain) not in inputs:
-            return 0.0
         paths = (chain.path for chain in study.chains.values() if chain.path)
-        return _series_seconds(next(path.weeks for path in paths if path.brains[0].id == brain), PATH_MESH_SETTINGS)
+        path_weeks = next(path.weeks for path in paths if path.brains[0].id == brain)
+        return _series_seconds(path_weeks, study.config.growth.path_mesh)
     if rule not in ("targets", "predicted_targets"):
         return SECONDS_PER_JOB
     chain, file = study.chains[brain, wildcards["origin"]], TARGETS.format(**wildcards)

@@ -30,7 +30,6 @@ from gyriflow.running.cost import (
     simulation_needs,
     surface_memory_mib,
 )
-from gyriflow.running.path_store import PATH_MESH_SETTINGS
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
 from gyriflow.shipped import SHIPPED
@@ -326,7 +325,7 @@ def test_a_prediction_takes_the_time_of_its_atlas_path_its_shapes_and_its_foldin
     folding_s = 6e-6 * linear_elements(23, mesh) * steps
     assert simulation_needs(simulation, mesh).seconds == pytest.approx(folding_s)
     # the path has 12 weeks; the prediction ends at the second week at or past the end
-    path_s = 9e-5 * linear_elements(22, PATH_MESH_SETTINGS) * 12
+    path_s = 9e-5 * linear_elements(22, study.config.growth.path_mesh) * 12
     targets_s = 10 + 4e-5 * linear_elements(23, mesh) * (27 - 23)
     for jobs, cores, seconds in (
         ([path, targets, folding], 1, path_s + targets_s + folding_s),
