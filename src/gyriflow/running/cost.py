@@ -10,8 +10,10 @@ from ..errors import InputError
 from ..folding.predicted_memory import predicted_memory_mib
 from ..io.volumes import read_header
 from ..settings.stages import MeshSettings
+from ..settings.terms import SIDES
 from ..study.paths import TARGETS
 from ..study.records import Brain, Simulation
+from ..study.series import Chain
 from ..study.study import Study
 from ..units import ML_PER_MM3, SECONDS_PER_GW
 
@@ -24,12 +26,20 @@ SECONDS_PER_ELEMENT_AND_STEP = {1: 12e-6, 2: 48e-6}
 quadratic element counts as the eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
 """With linear elements that grow towards shapes."""
-SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 9e-5
-"""For a mesh to follow the brains of its own series: targets, or an atlas' path."""
+SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.3e-4
+"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 111 k elements, 23 to 32 GW."""
+DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
+"""Week from which bodies are folded so deeply that to follow a brain for a week takes so many times as long."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
-SECONDS_PER_JOB = 5.0
-"""Mean duration of the other jobs, in the demo."""
+MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
+"""By mesher; of elements of the mesh, linear or quadratic."""
+SECONDS_PER_ML = {"register": 0.13, "pial": 0.16}
+"""By stage, for each mL of the (later) brain; its files are read, registered or surfaced voxel by voxel."""
+SECONDS_PER_VERTEX = {"measure": 1.0e-3, "measure_simulated": 1.0e-3, "brain_figures": 0.5e-3}
+"""By stage, for each vertex of the brain's surface."""
+START_SECONDS = 2.0
+"""For any job to start Python, import packages, and read and write small files."""
 ERROR_FACTOR = 2.0
 """Factor by which predictions may be wrong."""
 MIN_MIB, MIN_MINUTES, MIN_SURFACE_MIB = 2000, 60, 4000
@@ -44,11 +54,16 @@ class Needs(NamedTuple):
     disk_mib: float
 
 
+def surface_area_mm2(week: float) -> float:
+    """Predict the area of the pial surface of a brain of a week, with sulci as labels of 0.8 mm show them."""
+    return 9900 * (expected_volume_ml(week) / 51) ** 0.74
+
+
 def linear_elements(week: float, mesh: MeshSettings) -> float:
     """Predict the number of linear elements of a brain of a week, from its surface area and volume."""
     volume_ml, edge = expected_volume_ml(week), mesh.surface_edge_mm
-    area_mm2, graded = 9900 * (volume_ml / 51) ** 0.74, 1 / edge**2 - 1 / mesh.core_edge_mm**2
-    cubes = area_mm2 * (2.5 / edge**2 + max(graded, 0)) + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
+    graded = 1 / edge**2 - 1 / mesh.core_edge_mm**2
+    cubes = surface_area_mm2(week) * (2.5 / edge**2 + max(graded, 0)) + volume_ml / ML_PER_MM3 / mesh.core_edge_mm**3
     return ELEMENTS_PER_CUBE[mesh.mesher] * cubes
 
 
@@ -68,28 +83,71 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
 
 
 def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
-    """Predict the time of a job on one core."""
-    mesh, brain = study.config.mesh, wildcards.get("brain", "")
+    """Predict the processor time of a job, by its rule and wildcards."""
+    mesh = study.config.mesh
     if rule in FOLDINGS:
-        return simulation_needs(study.simulations[wildcards["run"], brain], mesh).seconds
+        return START_SECONDS + simulation_needs(study.simulations[wildcards["run"], wildcards["brain"]], mesh).seconds
+    if rule in ("tetrahedralise", "path_mesh"):
+        settings = study.config.growth.path_mesh if rule == "path_mesh" else mesh
+        week = study.brains[wildcards["brain"]].week
+        return START_SECONDS + _meshing_seconds(week, settings)
     if rule == "atlas_path":
-        paths = (chain.path for chain in study.chains.values() if chain.path)
-        path_weeks = next(path.weeks for path in paths if path.brains[0].id == brain)
-        return _series_seconds(path_weeks, study.config.growth.path_mesh)
-    if rule not in ("targets", "predicted_targets"):
-        return SECONDS_PER_JOB
-    chain, file = study.chains[brain, wildcards["origin"]], TARGETS.format(**wildcards)
-    if chain.path is None:
-        return _series_seconds(chain.weeks, mesh)
+        path = _path_from(study, wildcards["brain"])
+        return START_SECONDS + _series_seconds(path.weeks, study.config.growth.path_mesh)
+    if rule == "targets":
+        return START_SECONDS + _series_seconds(study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh)
+    if rule == "predicted_targets":
+        return START_SECONDS + _prediction_seconds(study, wildcards["brain"], wildcards["origin"])
+    return START_SECONDS + _brain_seconds(study, rule, wildcards)
+
+
+def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
+    """Predict the time of a stage that deals with one brain, measured or simulated, or registers it as the later."""
+    brain = study.brains.get(wildcards.get("later") or wildcards.get("brain", ""))
+    if brain is None:
+        return 0.0
+    week = float(wildcards.get("week", brain.week))
+    share = len(brain.sides) / len(SIDES)
+    # rules of one hemisphere or with thickness are variants of a stage
+    volume_stage = next((stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None)
+    if volume_stage and brain.config.has_labels:
+        return SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(week)
+    longest_first = sorted(SECONDS_PER_VERTEX, key=len, reverse=True)
+    surface_stage = next((stage for stage in longest_first if rule.startswith(stage)), None)
+    if surface_stage:
+        edge_mm = study.config.surface.edge_length_mm
+        return SECONDS_PER_VERTEX[surface_stage] * share * surface_area_mm2(week) / (0.87 * edge_mm**2)
+    return 0.0
+
+
+def _meshing_seconds(week: float, mesh: MeshSettings) -> float:
+    elements = linear_elements(week, mesh) / (8 if mesh.order == 2 else 1)
+    return MESHING_SECONDS_PER_ELEMENT[mesh.mesher] * elements
+
+
+def _path_from(study: Study, brain: str) -> Chain:
+    """Return the path of an atlas from its first brain."""
+    return next(chain.path for chain in study.chains.values() if chain.path and chain.path.brains[0].id == brain)
+
+
+def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
+    """Predict the time for the shapes that an atlas' growth gives a start brain."""
+    chain, file = study.chains[brain, origin], TARGETS.format(brain=brain, origin=origin)
     end = max(simulation.weeks[-1] for simulation in study.simulations.values() if simulation.targets == file)
-    start, later = chain.weeks[0], [week for week in chain.path.weeks if week > chain.weeks[0]]
+    start = chain.weeks[0]
+    later = [week for week in chain.path.weeks if week > start] if chain.path else []
     # it ends two weeks of the atlas after the end
     weeks = max(later[: bisect_left(later, end) + 2], default=start) - start
-    return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(start, mesh) * weeks
+    elements = linear_elements(start, study.config.mesh)
+    return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
 
 
 def _series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
-    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(weeks[0], mesh) * (weeks[-1] - weeks[0])
+    """Predict the time for a mesh to follow the brains of a series, most of which the late weeks take."""
+    first, last = weeks[0], weeks[-1]
+    deep_gw = max(last - max(first, DEEP_FOLDS_GW), 0.0)
+    weeks_in_all = last - first + (DEEP_FOLDS_FACTOR - 1) * deep_gw
+    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(first, mesh) * weeks_in_all
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:
