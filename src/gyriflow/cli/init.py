@@ -235,13 +235,12 @@ def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool, lea
 
 
 def _thinned(weeks: Sequence[float], end: float, least_gw: float) -> list[float]:
-    """Return ascending weeks at least so far apart, up to the second one at or past an end, or as far as they go."""
+    """Return ascending weeks at least so far apart, up to the first one at or past an end, or as far as they go."""
     chosen = [weeks[0]]
     for week in weeks[1:]:
-        past_end = [earlier for earlier in chosen if earlier >= end]
         is_far = week - chosen[-1] >= least_gw
-        is_last_chance = week == weeks[-1] and not past_end
-        if (is_far and len(past_end) < 2) or is_last_chance:
+        is_last_chance = week == weeks[-1]
+        if chosen[-1] < end and (is_far or is_last_chance):
             chosen.append(week)
     return chosen
 

@@ -21,9 +21,9 @@ FOLDINGS = ("simulate", "simulate_member")
 """Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 """Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
-SECONDS_PER_ELEMENT_AND_STEP = {1: 12e-6, 2: 48e-6}
-"""By element order; fitted to runs of 156 k and 500 k linear elements and 28 to 126 steps, within a factor of 1.3. A
-quadratic element counts as the eight linear elements with the same nodes."""
+SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 46e-6}
+"""By element order; fitted to runs of 130 k, 216 k and 500 k linear and 10 k quadratic elements and 28 to 126 steps,
+within a factor of 1.4. A quadratic element counts as the eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
 """With linear elements that grow towards shapes."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.3e-4
@@ -34,10 +34,14 @@ PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
-SECONDS_PER_ML = {"register": 0.13, "pial": 0.16}
-"""By stage, for each mL of the (later) brain; its files are read, registered or surfaced voxel by voxel."""
-SECONDS_PER_VERTEX = {"measure": 1.0e-3, "measure_simulated": 1.0e-3, "brain_figures": 0.5e-3}
-"""By stage, for each vertex of the brain's surface."""
+SECONDS_PER_ML = {"register": 0.13, "pial": 0.17}
+"""By stage, for each mL of the (later) brain, whose labels are registered or surfaced voxel by voxel; 22 to 38 GW."""
+SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
+"""To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k to 18 k vertices."""
+BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
+"""Modes up to the end of a band, of a hemisphere."""
+SECONDS_PER_STAGE = {"brain_figures": 6.5, "prepared_surfaces": 8.0}
+"""By stage, for a brain of any size."""
 START_SECONDS = 2.0
 """For any job to start Python, import packages, and read and write small files."""
 ERROR_FACTOR = 2.0
@@ -52,6 +56,10 @@ class Needs(NamedTuple):
     seconds: float
     memory_mib: float
     disk_mib: float
+
+
+VERTEX_AREA = 0.87
+"""Area of a vertex of an even triangulation over the square of the edge length."""
 
 
 def surface_area_mm2(week: float) -> float:
@@ -103,20 +111,24 @@ def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
 
 def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
     """Predict the time of a stage that deals with one brain, measured or simulated, or registers it as the later."""
+    if rule in SECONDS_PER_STAGE:
+        return SECONDS_PER_STAGE[rule]
     brain = study.brains.get(wildcards.get("later") or wildcards.get("brain", ""))
     if brain is None:
         return 0.0
-    week = float(wildcards.get("week", brain.week))
     share = len(brain.sides) / len(SIDES)
     # rules of one hemisphere or with thickness are variants of a stage
     volume_stage = next((stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None)
     if volume_stage and brain.config.has_labels:
-        return SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(week)
-    longest_first = sorted(SECONDS_PER_VERTEX, key=len, reverse=True)
-    surface_stage = next((stage for stage in longest_first if rule.startswith(stage)), None)
-    if surface_stage:
-        edge_mm = study.config.surface.edge_length_mm
-        return SECONDS_PER_VERTEX[surface_stage] * share * surface_area_mm2(week) / (0.87 * edge_mm**2)
+        return SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(brain.week)
+    if rule.startswith("measure"):
+        # the surface of a simulated brain is that of its mesh, whatever its week
+        is_simulated = rule.startswith("measure_simulated")
+        edge_mm = study.config.mesh.surface_edge_mm if is_simulated else study.config.surface.edge_length_mm
+        vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
+        modes = study.config.metrics.spangy_modes
+        n_modes = modes if isinstance(modes, int) else BAND_MODES[modes]
+        return vertices * (SECONDS_PER_VERTEX + SECONDS_PER_VERTEX_AND_MODE * n_modes)
     return 0.0
 
 
