@@ -21,8 +21,8 @@ FOLDINGS = ("simulate", "simulate_member")
 """Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 """Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
-SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 46e-6}
-"""By element order; fitted to runs of 130 k, 216 k and 500 k linear and 10 k quadratic elements and 28 to 126 steps,
+SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 14e-6}
+"""By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic elements and 28 to 126 steps,
 within a factor of 1.4. A quadratic element counts as the eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
 """With linear elements that grow towards shapes."""
