@@ -29,7 +29,7 @@ from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
-from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error
+from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error, is_too_coarse
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
@@ -175,6 +175,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
     coarse: dict[str, list[str]] = defaultdict(list)
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
+        if not simulation.settings.growth.definition.has_layers:
+            continue
         thickness = simulation.settings.thickness_mm
         # a map's thickness is unknown before the surface is made
         if isinstance(thickness, Varying) and thickness.map:
@@ -183,7 +185,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
         few, remedy = "", "mesh.order: 2"
-        if is_coarse := elements < 0.99 * needed:
+        if is_coarse := is_too_coarse(mesh.order, elements):
             few = f", fewer than the {needed:g} needed"
             remedy = f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
         if is_coarse or error > LARGE_ELEMENT_ERROR:

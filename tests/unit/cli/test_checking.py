@@ -1,6 +1,7 @@
 """What `gyriflow check` says of input files, of the mesh and of what a study takes, and what it leaves behind."""
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -204,10 +205,25 @@ def test_a_mesh_too_coarse_for_the_cortex_is_told_before_it_is_made():
     assert "mesh.surface_edge_mm: 0.48" in coarse(fine, thickness_mm={"weeks": {22: 0.5, 24: 1.5}})[0]
 
 
+def test_growth_without_layers_needs_no_elements_through_the_cortex():
+    coarse_mesh = {"surface_edge_mm": 1.2, "order": 1}
+    for growth, warnings in (("rates", 1), ("sizes", 1), ("shapes", 0)):
+        folding = {"end_week": 24, "growth": growth}
+        study = resolved(labelled(22, 23, 24), mesh=coarse_mesh, folding=folding)
+        assert len(list(coarse_cortices(study))) == warnings
+
+
+@pytest.mark.parametrize("edge_mm", np.linspace(0.4, 0.8, 81))
+def test_as_many_elements_as_needed_are_never_called_too_few(edge_mm):
+    (text,) = coarse({"surface_edge_mm": edge_mm, "order": 1}, thickness_mm=1.0)
+    found = float(re.search(r"about (\S+) linear", text).group(1))
+    assert ("fewer than the 2 needed" in text) == (found < 2)
+
+
 @pytest.mark.fault(84)
 @pytest.mark.parametrize(
     ("edge_mm", "facts"),
-    [(0.47, ["2.0 linear", "32 %", "4 %", "mesh.order: 2"]), (0.235, ["4.0 linear", "13 %"]), (0.12, None)],
+    [(0.47, ["2 linear", "32 %", "4 %", "mesh.order: 2"]), (0.235, ["4 linear", "13 %"]), (0.12, None)],
 )
 def test_linear_elements_that_are_enough_are_told_with_their_error(edge_mm, facts):
     found = coarse({"surface_edge_mm": edge_mm, "order": 1}, thickness_mm=1.0)

@@ -56,7 +56,7 @@ def folder(tmp_path, monkeypatch):
         write_text(f"{brain}.nii.gz", f"voxels of {brain}")
         write_text(f"results/brains/{brain}/mesh/brain.h5", f"mesh of {brain}")
         write_text(f"{at}/folding/maps.h5", f"maps of {run}")
-        write_yaml(f"{at}/params.yaml", {"thickness_mm": 1.5 + number})
+        write_yaml(f"{at}/params.yaml", {"thickness_mm": 1.5 + number, "growth": {"model": "rates"}})
         write_json(f"{at}/folding/summary.json", {"steps": 7 + number})
         zones = {"order": 1, "clamped_share": 0.1, "initial_penetration_mm": 0.2, "elements_through_cortex": 2.5}
         write_json(f"{at}/folding/zones.json", zones)
@@ -161,7 +161,8 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
         assert found[1] == found[0] | {path: sha256_of(path) for path in others}
         assert read_json(outputs["study"])["inputs"][start] == alone["inputs"]
         assert (alone["configuration"], others[0] in "".join(alone["results"])) == (brain, True)
-        assert folded["configuration"] == {"run": name, "start": start, "parameters": {"thickness_mm": thickness}}
+        parameters = {"thickness_mm": thickness, "growth": {"model": "rates"}}
+        assert folded["configuration"] == {"run": name, "start": start, "parameters": parameters}
 
 
 def test_tables_tell_runs_apart(folder):
