@@ -26,8 +26,8 @@ SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 14e-6}
 within a factor of 1.4. A quadratic element counts as the eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
 """With linear elements that grow towards shapes."""
-SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.3e-4
-"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 111 k elements, 23 to 32 GW."""
+SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
+"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 107 k to 130 k elements, 23 to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
 """Week from which bodies are folded so deeply that to follow a brain for a week takes so many times as long."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
@@ -40,7 +40,7 @@ SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
 """To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k to 18 k vertices."""
 BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
 """Modes up to the end of a band, of a hemisphere."""
-SECONDS_PER_STAGE = {"brain_figures": 6.5, "prepared_surfaces": 8.0}
+SECONDS_PER_STAGE = {"brain_figures": 6.5, "prepared_surfaces": 8.0, "named_sulci": 6.0, "prepare_with_maps": 4.0}
 """By stage, for a brain of any size."""
 START_SECONDS = 2.0
 """For any job to start Python, import packages, and read and write small files."""

@@ -290,14 +290,21 @@ def reference(raw):
 
 
 @pytest.mark.parametrize(
-    ("elements", "steps", "seconds"),
-    # reference and measured of the demo, and of a brain over nine weeks
-    [(156_307, 28, 53), (156_307, 28, 63), (500_000, 126, 620), (500_000, 63, 470)],
+    ("order", "elements", "steps", "seconds"),
+    [
+        # `reference` of the demo and of a brain over nine weeks, half a brain
+        (1, 129_958, 28, 24),
+        (1, 498_358, 126, 331),
+        (1, 215_812, 72, 67),
+        # the same half, by 27 k and 45 k elements
+        (2, 217_000, 72, 186),
+        (2, 360_000, 72, 344),
+    ],
 )
-def test_a_folding_takes_as_long_as_measured_ones_within_the_error(elements, steps, seconds):
-    predicted = SECONDS_PER_ELEMENT_AND_STEP[1] * elements * steps
-    assert seconds / 1.3 < predicted < 1.3 * seconds
-    assert ERROR_FACTOR > 1.3
+def test_a_folding_takes_as_long_as_measured_ones_within_the_error(order, elements, steps, seconds):
+    predicted = SECONDS_PER_ELEMENT_AND_STEP[order] * elements * steps
+    assert seconds / 1.4 < predicted < 1.4 * seconds
+    assert ERROR_FACTOR > 1.4
 
 
 def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
