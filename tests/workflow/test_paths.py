@@ -85,3 +85,14 @@ def test_a_path_is_made_once_and_found_again_whatever_becomes_of_the_kept_one(wo
     for damaged in (whole[:middle], whole[:middle] + bytes(100) + whole[middle + 100 :]):
         kept.write_bytes(damaged)
         assert workflow.jobs(*call)["atlas_path"] == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("atlas", "files"), [("dhcp-surface", 2 * 15), ("dhcp-volume", 15)])
+def test_a_prediction_by_a_shipped_atlas_without_checksums_is_planned(workflow, atlas, files):
+    mine = {"id": "mine", "week": 22, "labels": "phantom-22.nii.gz", "scheme": "spina-bifida-atlas", "population": "b"}
+    settings = {"name": atlas, "weeks": [*range(22, 37)], "accept_licence": True}
+    folding = {"preset": "expected", "end_week": 30}
+    name = workflow.write("study.yaml", {"brains": [mine], "atlas": settings, "start": "mine", "folding": folding})
+    planned = workflow.jobs(TARGETS, "--configfile", name)
+    assert (planned["atlas_file"], planned["atlas_path"]) == (files, 1)
