@@ -24,10 +24,10 @@ ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 14e-6}
 """By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic elements and 28 to 126 steps,
 within a factor of 1.4. A quadratic element counts as the eight linear elements with the same nodes."""
-SHAPES_SECONDS_PER_ELEMENT_AND_STEP = 6e-6
-"""With linear elements that grow towards shapes."""
+SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 11e-6, 2: 18e-6}
+"""Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k, quadratic ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
-"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 107 k to 130 k elements, 23 to 32 GW."""
+"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 107 k to 130 k elements to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
 """Week from which bodies are folded so deeply that to follow a brain for a week takes so many times as long."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
@@ -85,9 +85,8 @@ def simulation_needs(simulation: Simulation, mesh: MeshSettings) -> Needs:
     )
     # positions and fields of each output week, by a quarter as many nodes
     disk = ((run.end_week - week) / run.output_every_gw + 1) * elements / 4 * (24 + 12 * len(run.fields)) / 2**20
-    follows_shapes = simulation.shapes and mesh.order == 1
-    rate = SHAPES_SECONDS_PER_ELEMENT_AND_STEP if follows_shapes else SECONDS_PER_ELEMENT_AND_STEP[mesh.order]
-    return Needs(rate * elements * steps, memory, disk)
+    rates = SHAPES_SECONDS_PER_ELEMENT_AND_STEP if simulation.shapes else SECONDS_PER_ELEMENT_AND_STEP
+    return Needs(rates[mesh.order] * elements * steps, memory, disk)
 
 
 def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:

@@ -30,6 +30,7 @@ from gyriflow.running.cost import (
     SECONDS_PER_ELEMENT_AND_STEP,
     SECONDS_PER_ML,
     SERIES_SECONDS_PER_ELEMENT_AND_WEEK,
+    SHAPES_SECONDS_PER_ELEMENT_AND_STEP,
     START_SECONDS,
     job_limits,
     job_seconds,
@@ -353,7 +354,7 @@ def test_a_prediction_takes_the_time_of_its_atlas_path_its_shapes_and_its_foldin
     folding = checking.PlannedJob("simulate", {"run": "p", "brain": "a"}, 2, reason, made[1:])
     simulation = study.simulations["p", "a"]
     steps = 2 * 7 * 86400 / simulation.settings.step_s
-    folding_s = START_SECONDS + 6e-6 * linear_elements(23, mesh) * steps
+    folding_s = START_SECONDS + SHAPES_SECONDS_PER_ELEMENT_AND_STEP[mesh.order] * linear_elements(23, mesh) * steps
     assert simulation_needs(simulation, mesh).seconds == pytest.approx(folding_s - START_SECONDS)
     # the path has 12 weeks, two of them after 32 GW; the prediction ends at the second week at or past the end
     per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(22, study.config.growth.path_mesh)
