@@ -27,7 +27,7 @@ within a factor of 1.4. A quadratic element counts as the eight linear elements 
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 11e-6, 2: 18e-6}
 """Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k, quadratic ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
-"""For a mesh to follow the brains of its own series: targets, or an atlas' path; by 107 k to 130 k elements to 32 GW."""
+"""For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k to 130 k elements to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
 """Week from which bodies are folded so deeply that to follow a brain for a week takes so many times as long."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
@@ -40,6 +40,8 @@ SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
 """To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k to 18 k vertices."""
 BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
 """Modes up to the end of a band, of a hemisphere."""
+OPENED_FROM_GW, OPENED_PER_GW = 25.0, 0.11
+"""Week from which the banks of opened sulci, which lie close and so have short edges, add vertices, and how many."""
 SECONDS_PER_STAGE = {"brain_figures": 6.5, "prepared_surfaces": 8.0, "named_sulci": 6.0, "prepare_with_maps": 4.0}
 """By stage, for a brain of any size."""
 START_SECONDS = 2.0
@@ -125,6 +127,9 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
         is_simulated = rule.startswith("measure_simulated")
         edge_mm = study.config.mesh.surface_edge_mm if is_simulated else study.config.surface.edge_length_mm
         vertices = share * surface_area_mm2(brain.week) / (VERTEX_AREA * edge_mm**2)
+        has_slits = brain.labels is not None and brain.labels.scheme.cortex and study.config.surface.open_sulci
+        if has_slits and not is_simulated:
+            vertices *= 1 + OPENED_PER_GW * max(brain.week - OPENED_FROM_GW, 0.0)
         modes = study.config.metrics.spangy_modes
         n_modes = modes if isinstance(modes, int) else BAND_MODES[modes]
         return vertices * (SECONDS_PER_VERTEX + SECONDS_PER_VERTEX_AND_MODE * n_modes)
