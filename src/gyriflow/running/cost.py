@@ -42,8 +42,20 @@ BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
 """Modes up to the end of a band, of a hemisphere."""
 OPENED_FROM_GW, OPENED_PER_GW = 25.0, 0.11
 """Week from which the banks of opened sulci, which lie close and so have short edges, add vertices, and how many."""
-SECONDS_PER_STAGE = {"brain_figures": 6.5, "prepared_surfaces": 8.0, "named_sulci": 6.0, "prepare_with_maps": 4.0}
-"""By stage, for a brain of any size."""
+SECONDS_PER_STAGE = {
+    "brain_figures": 6.5,
+    "folding_figures": 13.0,
+    "growth_found_figures": 5.0,
+    "named_sulci": 6.0,
+    "onset": 2.0,
+    "prepare": 2.0,
+    "prepare_with_maps": 4.0,
+    "prepared_surfaces": 9.0,
+    "registration_ceiling": 16.0,
+    "shape_maps": 6.5,
+    "validation": 16.0,
+}
+"""By stage, for brains of any size, as in the demo."""
 START_SECONDS = 2.0
 """For any job to start Python, import packages, and read and write small files."""
 ERROR_FACTOR = 2.0
