@@ -21,15 +21,17 @@ FOLDINGS = ("simulate", "simulate_member")
 """Rules that fold."""
 ELEMENTS_PER_CUBE = {"tetgen": 2.2, "pytetwild": 7.4}
 """Linear elements per cube of the requested edge length, fitted to meshes of 31 k to 464 k elements."""
-SECONDS_PER_ELEMENT_AND_STEP = {1: 5e-6, 2: 14e-6}
+SECONDS_PER_ELEMENT_AND_STEP = {1: 4.3e-6, 2: 14e-6}
 """By element order; fitted to runs of 130 k to 500 k linear and 27 k to 45 k quadratic elements and 28 to 126 steps,
-within a factor of 1.4. A quadratic element counts as the eight linear elements with the same nodes."""
+within a factor of 1.6. A quadratic element counts as the eight linear elements with the same nodes."""
 SHAPES_SECONDS_PER_ELEMENT_AND_STEP = {1: 11e-6, 2: 18e-6}
 """Likewise for growth towards shapes; linear elements fitted to runs of 130 k and 599 k, quadratic ones a guess."""
 SERIES_SECONDS_PER_ELEMENT_AND_WEEK = 1.2e-4
 """For a mesh to follow the brains of its series: targets, or an atlas' path; by 107 k to 130 k elements to 32 GW."""
 DEEP_FOLDS_GW, DEEP_FOLDS_FACTOR = 32.0, 12.0
-"""Week from which bodies are folded so deeply that to follow a brain for a week takes so many times as long."""
+"""Week from which opened sulci are so deep that to follow a brain for a week takes so many times as long."""
+FUSED_SHARE = {"pial": 0.53, "series": 0.5}
+"""What surfaces, and bodies that follow them, take with `open_sulci: false`, over that with opened sulci."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 4e-5
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
 MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 1.9e-4, "tetgen": 5.4e-5}
@@ -114,9 +116,9 @@ def job_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> float:
         return START_SECONDS + _meshing_seconds(week, settings)
     if rule == "atlas_path":
         path = _path_from(study, wildcards["brain"])
-        return START_SECONDS + _series_seconds(path.weeks, study.config.growth.path_mesh)
+        return START_SECONDS + _series_seconds(study, path.weeks, study.config.growth.path_mesh)
     if rule == "targets":
-        return START_SECONDS + _series_seconds(study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh)
+        return START_SECONDS + _series_seconds(study, study.chains[wildcards["brain"], wildcards["origin"]].weeks, mesh)
     if rule == "predicted_targets":
         return START_SECONDS + _prediction_seconds(study, wildcards["brain"], wildcards["origin"])
     return START_SECONDS + _brain_seconds(study, rule, wildcards)
@@ -133,7 +135,8 @@ def _brain_seconds(study: Study, rule: str, wildcards: Mapping[str, str]) -> flo
     # rules of one hemisphere or with thickness are variants of a stage
     volume_stage = next((stage for stage in SECONDS_PER_ML if rule.startswith(stage)), None)
     if volume_stage and brain.config.has_labels:
-        return SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(brain.week)
+        opening = 1.0 if study.config.surface.open_sulci else FUSED_SHARE.get(volume_stage, 1.0)
+        return opening * SECONDS_PER_ML[volume_stage] * share * expected_volume_ml(brain.week)
     if rule.startswith("measure"):
         # the surface of a simulated brain is that of its mesh, whatever its week
         is_simulated = rule.startswith("measure_simulated")
@@ -170,12 +173,14 @@ def _prediction_seconds(study: Study, brain: str, origin: str) -> float:
     return PREDICTION_SECONDS + PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK * elements * weeks
 
 
-def _series_seconds(weeks: Sequence[float], mesh: MeshSettings) -> float:
-    """Predict the time for a mesh to follow the brains of a series, most of which the late weeks take."""
+def _series_seconds(study: Study, weeks: Sequence[float], mesh: MeshSettings) -> float:
+    """Predict the time for a mesh to follow the brains of a series; with opened sulci, late weeks take most of it."""
     first, last = weeks[0], weeks[-1]
+    per_week_s = SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(first, mesh)
+    if not study.config.surface.open_sulci:
+        return FUSED_SHARE["series"] * per_week_s * (last - first)
     deep_gw = max(last - max(first, DEEP_FOLDS_GW), 0.0)
-    weeks_in_all = last - first + (DEEP_FOLDS_FACTOR - 1) * deep_gw
-    return SERIES_SECONDS_PER_ELEMENT_AND_WEEK * linear_elements(first, mesh) * weeks_in_all
+    return per_week_s * (last - first + (DEEP_FOLDS_FACTOR - 1) * deep_gw)
 
 
 def job_limits(simulation: Simulation, mesh: MeshSettings) -> tuple[int, int]:

@@ -297,6 +297,8 @@ def reference(raw):
         (1, 129_958, 28, 24),
         (1, 498_358, 126, 331),
         (1, 215_812, 72, 67),
+        # the twelve of the paper, in all
+        (1, 470_220, 1071, 1747),
         # the same half, by 27 k and 45 k elements
         (2, 217_000, 72, 186),
         (2, 360_000, 72, 344),
@@ -304,8 +306,8 @@ def reference(raw):
 )
 def test_a_folding_takes_as_long_as_measured_ones_within_the_error(order, elements, steps, seconds):
     predicted = SECONDS_PER_ELEMENT_AND_STEP[order] * elements * steps
-    assert seconds / 1.4 < predicted < 1.4 * seconds
-    assert ERROR_FACTOR > 1.4
+    assert seconds / 1.6 < predicted < 1.6 * seconds
+    assert ERROR_FACTOR > 1.6
 
 
 def test_the_limits_of_a_job_are_what_is_predicted_with_its_error():
@@ -398,6 +400,8 @@ def test_stages_of_a_brain_take_time_by_its_size(tmp_path):
     fused = resolve(load(config | {"surface": {"edge_length_mm": 1.0, "open_sulci": False}}))
     fused_s = job_seconds(fused, "measure", {"brain": "b"}) - START_SECONDS
     assert fused_s == pytest.approx(seconds["measure"][1] / (1 + 0.11 * 9))
+    fused_s = job_seconds(fused, "pial_with_thickness", {"brain": "b"}) - START_SECONDS
+    assert fused_s < 0.6 * seconds["pial_with_thickness"][1]
     fine = resolve(load(config | {"surface": {"edge_length_mm": 0.5}}))
     fine_s = job_seconds(fine, "measure", {"brain": "a"}) - START_SECONDS
     assert fine_s == pytest.approx(4 * seconds["measure"][0])
