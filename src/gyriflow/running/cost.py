@@ -1,4 +1,4 @@
-"""Predict time, memory and disk space of simulations, within a factor of two."""
+"""Predict the processor time of jobs, and memory and disk space of simulations, within a factor of two."""
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
@@ -40,6 +40,8 @@ SECONDS_PER_ML = {"register": 0.13, "pial": 0.17}
 """By stage, for each mL of the (later) brain, whose labels are registered or surfaced voxel by voxel; 22 to 38 GW."""
 SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
 """To measure a brain, by the vertices of its surface and the modes of its spectrum; 9 k to 18 k vertices."""
+VERTEX_AREA = 0.87
+"""Area of a vertex of an even triangulation over the square of the edge length."""
 BAND_MODES = {"B4": 270, "B5": 1100, "B6": 4500}
 """Modes up to the end of a band, of a hemisphere."""
 OPENED_FROM_GW, OPENED_PER_GW = 25.0, 0.11
@@ -72,10 +74,6 @@ class Needs(NamedTuple):
     seconds: float
     memory_mib: float
     disk_mib: float
-
-
-VERTEX_AREA = 0.87
-"""Area of a vertex of an even triangulation over the square of the edge length."""
 
 
 def surface_area_mm2(week: float) -> float:
