@@ -165,7 +165,7 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
     A job keeps at least one core busy, so its energy is the longer of wall and CPU time times the power of a core.
-    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if Snakemake could not measure; such jobs are
+    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown; such jobs are
     counted, and add nothing to the sums.
 
     Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh, co2e_g.

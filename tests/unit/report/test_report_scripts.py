@@ -66,7 +66,7 @@ def folder(tmp_path, monkeypatch):
             write_frame(f"{at}/{week}.h5", week, {"positions": np.vstack([np.zeros(3), np.eye(3)]) + moved})
         frames = [f"{at}/{week}.h5" for week in (22.0, 23.0)]
         join_frames(f"{at}/folding/frames.h5", np.array([[0, 1, 2, 3]]), frames)
-        write_text(f"{at}/benchmarks/simulate.tsv", f"s\tcpu_time\tmax_rss\n{3600 + 3600 * number}\t7200\t100\n")
+        write_text(f"{at}/benchmarks/simulate.tsv", f"wall_s\tcpu_s\tmemory_MiB\n{3600 + 3600 * number}\t7200\t100\n")
         write_text(f"{at}/logs/simulate.log", f"2026-01-01 10:00:00,000 WARNING root: of {run}\n")
     return tmp_path
 
