@@ -114,7 +114,7 @@ def test_contact_begins_at_a_part_of_the_edge_length_as_it_is():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_compressed_surface_does_not_repel_itself(order):
-    # edges across the box are ten times as long as those along it, so that a share of the mean edge is longer than these
+    # edges across are ten times as long as those along the box: a share of the mean edge is longer than the latter
     mesh = box_mesh((24, 3, 2), (1.5, 2.0, 2.0))
     mesh = mesh if order == 1 else quadratic(mesh)
     facets, _ = boundary_faces(mesh)

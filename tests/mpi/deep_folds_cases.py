@@ -1,4 +1,4 @@
-"""Folds whose banks press on each other: nothing crosses, and depth and growth converge in mesh, order and time step."""
+"""Folds whose banks press on each other: nothing crosses; growth and depth converge in mesh, order and time step."""
 
 from dataclasses import replace
 

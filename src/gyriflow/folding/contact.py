@@ -25,8 +25,8 @@ DISTANCE_PER_MEAN_EDGE = 0.1
 """Largest contact distance d̂ as a multiple of the mean edge length of the contact surface: well below what the mesh
 resolves. It grows with the edges of the surface; a fixed distance would only make contact harder to solve."""
 DISTANCE_PER_SHORT_EDGE = 0.2
-"""Largest contact distance as a multiple of the length of a short edge: a compressed surface whose neighbours are nearer
-to each other than that would repel itself and resist compression (docs/verification.md)."""
+"""Largest contact distance as a multiple of the length of a short edge. With a larger one a compressed surface would
+repel itself and resist compression (docs/verification.md)."""
 SHORT_EDGES = 0.05
 """The share of edges that are shorter than a short edge."""
 STIFFNESS_PER_MODULUS = 0.1
