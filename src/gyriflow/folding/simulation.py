@@ -9,8 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.jacobians import EDGES, lower_bounds
-from ..geometry.straightening import straightened
+from ..geometry.jacobians import EDGES
+from ..geometry.straightening import straightened_inside
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
@@ -35,9 +35,8 @@ from .zones import Zones
 
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
-MIN_BOUND = 0.4
-"""Least bound of the Jacobian determinant of a curved element, as a multiple of that of a straight one, above which its
-inner sides stay as they are."""
+MIN_STRAIGHTNESS = 0.4
+"""Straightness of a curved element (`geometry.straightening`) above which its inner sides stay as they are."""
 MAX_STEP_VOLUME_RATIO = 3.0
 """Largest growth in volume by rates in one step: more is not resolved in time."""
 
@@ -138,13 +137,11 @@ class Folding:
         """Return (n, 3) positions in m with straight inner sides of elements that are about to fold over.
 
         Nothing pulls the inner nodes of tissue without stress back, so that sides bow until a corner of their element
-        turns over. The surface stays as it is. Where a straight side would invert an element, all sides stay.
+        turns over.
         """
-        tets = self.inputs.mesh.tets
-        straight = straightened(positions, tets, MIN_BOUND, self._is_on_surface)
-        is_valid = bool((lower_bounds(straight, tets) > 0).all())
+        straight = straightened_inside(positions, self.inputs.mesh.tets, MIN_STRAIGHTNESS, self._is_on_surface)
         # from rank 0, since other processors may round differently
-        return self.domain.comm.bcast(straight if is_valid else positions, root=0)
+        return self.domain.comm.bcast(straight, root=0)
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
         """Set up the problem of a step; return its tissue, with the parameters at mid-step, and its growth."""
