@@ -4,8 +4,8 @@ import logging
 import os
 from pathlib import Path
 
-# pymeshlab brings libraries that keep PETSc from loading after it; in this order both work
-import petsc4py.PETSc  # noqa: F401
+# dolfinx, PETSc and MPI in the order that their wheels need
+import gyriflow.folding  # noqa: F401
 import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
