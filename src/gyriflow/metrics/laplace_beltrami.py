@@ -109,9 +109,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
     return Modes(eigenvalues, np.hstack([modes.functions for modes in slices]))
 
 
-def _modes_between(
-    stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, count: int
-) -> Modes:
+def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, count: int) -> Modes:
     """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M and σ in the middle.
 
     SolverError where the number of modes found is another one.
@@ -146,7 +144,7 @@ def _modes_between(
         is_inside = (low < eigenvalues) & (eigenvalues < high)
         residuals = np.linalg.norm(coupling @ vectors[-BLOCK:], axis=0)
         has_converged = residuals <= RESIDUAL_TOL * np.abs(inverse)
-        found = np.count_nonzero(is_inside & has_converged)
+        found = int(np.count_nonzero(is_inside & has_converged))
         if found == count == np.count_nonzero(is_inside):
             order = np.argsort(eigenvalues[is_inside])
             functions = basis[:, :used] @ vectors[:, is_inside][:, order]

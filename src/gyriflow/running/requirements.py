@@ -4,18 +4,17 @@
 """
 
 import ctypes
-import importlib.util
-import os
 import platform
 import re
-import shutil
 import sys
 import sysconfig
 from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 from ..code_hash import PACKAGE, modules_behind
 from ..errors import InputError
+from ..folding.compiler import has_compiler
 from ..shipped import SHIPPED
 
 FOLD_PACKAGES = ("dolfinx", "ipctk", "picsl_greedy", "pytetwild", "SimpleITK", "sklearn")
@@ -35,7 +34,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
         needed = packages_behind(program)
         compiles |= "dolfinx" in needed
         for package in needed:
-            if importlib.util.find_spec(package) is None:
+            if find_spec(package) is None:
                 missing.setdefault(package, name)
     if missing:
         package, rule = next(iter(missing.items()))
@@ -78,13 +77,6 @@ def missing_libraries() -> list[str]:
         except OSError:
             lacking.append(name)
     return lacking
-
-
-def has_compiler() -> bool:
-    """Return whether forms can be compiled: by $CC, the system's compiler or ziglang."""
-    own = os.environ.get("CC") or "cc"
-    names = [own.split()[0], "gcc", "clang"]
-    return any(map(shutil.which, names)) or importlib.util.find_spec("ziglang") is not None
 
 
 def missing_debian_packages() -> list[str]:
