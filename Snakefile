@@ -64,7 +64,8 @@ complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
 if workflow.is_main_process:
-    know_inputs_by_content(CONTENTS, EARLIER_CONTENTS.values(), folders_in(CONFIG))
+    AWAITED = [f"/{file}" for file in ATLAS_FILES if f"/{file}" not in CONTENTS]
+    know_inputs_by_content(CONTENTS, EARLIER_CONTENTS.values(), folders_in(CONFIG), AWAITED)
 if RUNS and (REFUSED or CONFIG.left_out):
     remove_stale(workflow.rules, STUDY, REPORT)
 

@@ -181,6 +181,44 @@ BY_TESTS = {
         ("src/gyriflow/io/vtk_files.py", 'content, "<i4"', 'content, ">i4"'),
     ],
     # simulations, jobs and exit codes
+    # feedback, limits and the layer of growth
+    "folding/test_targets.py": [
+        (
+            "src/gyriflow/folding/targets.py",
+            "back = (1 - np.exp((week - end) / FEEDBACK_GW)) * misfit",
+            "back = 0 * misfit",
+        ),
+        ("src/gyriflow/folding/targets.py", "if misfit_mm > FEEDBACK_FROM_MM:", "if True:"),
+    ],
+    "folding/test_steering.py": [
+        (
+            "src/gyriflow/folding/steering.py",
+            "weight, volumes = cortical_weight(distance, thickness)",
+            "weight, volumes = cortical_weight(distance, 1.02 * thickness)",
+        ),
+    ],
+    "folding/test_elastic_fit.py": [
+        (
+            "src/gyriflow/folding/elastic_fit.py",
+            "self.positions_mm + displacement), limit=MAX_LOG_STRETCH",
+            "self.positions_mm + displacement), limit=9.0",
+        ),
+    ],
+    "folding/test_simulation.py": [
+        (
+            "src/gyriflow/folding/simulation.py",
+            'folding.domain.order) if has_layers else ""',
+            "folding.domain.order)",
+        ),
+    ],
+    "geometry/test_paths.py": [
+        ("src/gyriflow/geometry/paths.py", "np.exp(-((distance / STRAIGHT_MM) ** 2))[:, None]", "1.0"),
+        ("src/gyriflow/geometry/paths.py", "np.exp(-((distance / STRAIGHT_MM) ** 2))[:, None]", "0.0"),
+    ],
+    "test_splines.py": [
+        ("src/gyriflow/splines.py", "freedom <= lowest + FREEDOM_TOL", "freedom <= lowest"),
+        ("src/gyriflow/splines.py", "freedom >= highest - FREEDOM_TOL", "freedom >= highest"),
+    ],
     "folding/test_stress.py": [("src/gyriflow/folding/stretches.py", "-step_gw / memory_gw", "-memory_gw / step_gw")],
     "cli/test_scan_ages.py": [
         ("src/gyriflow/study/participants.py", "is_only_scan &= len({*sessions, session} - {None}) < 2", "pass"),

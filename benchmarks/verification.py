@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import asdict
 from pathlib import Path
 
@@ -33,11 +34,20 @@ MEMORIES = (0.0, 0.05, np.inf)
 TWO_WEEKS = 2e-7 * 2 * 604_800
 """Growth of the reference model in two weeks."""
 STEPS_IN_TWO_WEEKS = {"2 days": 7, "1 day": 14, "half a day": 28, "a quarter": 56}
-DEEP_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4), 2: (1, 1.5)}
+DEEP_CELLS: dict[int, tuple[float, ...]] = {1: (2, 3, 4, 6), 2: (1, 1.25, 1.5, 2)}
 """Cells per cortical thickness by element order."""
-DEEP_GROWTH, DEEP_AREA_RATIO = (0.04, 0.02), 1.6
+DEEP_GROWTH = (0.04, 0.02)
+"""Growth of a step."""
+DEEP_AREA_RATIOS = (1.6, 2.0)
+DEEP_MEMORIES_GW = (0.0, 1.0)
+CONTACT_DISTANCES = ((0.05, 0.1), (0.1, 0.2), (0.2, 0.4), (0.4, np.inf))
+"""Contact distance as a multiple of the mean edge, at most of a short edge."""
+CONTACT_SLABS = ((4, 1, 0.02), (1, 2, 0.02), (1.5, 2, 0.04), (1.5, 2, 0.02))
+"""Cells, order and growth of a step."""
+MAPS = {"box of 30 mm": (30.0, 37.7, (10, 16, 24)), "folds of 10 mm": (20.0, 10.0, (10, 16, 20, 24, 30))}
+"""Side of a box and mean length of its waves in mm, and numbers of intervals between nodes along a side."""
 RANKS = (1, 2, 3)
-SERIAL = ("theory", "elements", "deep")
+SERIAL = ("theory", "elements", "deep", "contact_distance", "maps")
 """Parts that run on one rank."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -172,23 +182,77 @@ def waves_on_slab(counts: tuple[int, ...], *case: float) -> list[np.ndarray]:
 
 
 def deep() -> list[dict]:
-    """Fold a slab until its banks press on each other: growth, depth and pressure at an area ratio, and crossings."""
+    """Fold a slab until its banks press on each other: growth, depth and pressure at area ratios, and crossings."""
+    found = []
+    for memory_gw in DEEP_MEMORIES_GW:
+        for order, counts in DEEP_CELLS.items():
+            for growth in DEEP_GROWTH:
+                found += [deep_fold(cells, order, growth, memory_gw) for cells in counts]
+    return found
+
+
+def deep_fold(cells: float, order: int, growth_of_step: float, memory_gw: float = 0.0) -> dict:
+    """Return what a slab has at each area ratio, and the CPU seconds of its run."""
     from verification_cases.deep_folds import Slab, at_ratio, folded
 
+    slab = Slab(cells, order, growth_of_step, memory_gw=memory_gw)
+    began = time.process_time()
+    folds = folded(slab, max(DEEP_AREA_RATIOS))
+    row = {
+        "order": slab.order,
+        "cells": slab.cells,
+        "growth_of_step": slab.growth,
+        "memory_gw": slab.memory_gw,
+        "steps": len(folds),
+        "crossing": sum(fold.crossing for fold in folds),
+        "cpu_s": time.process_time() - began,
+    }
+    for area_ratio in DEEP_AREA_RATIOS:
+        growth, depth_mm, pressure_pa = at_ratio(folds, area_ratio)
+        row[f"at_{area_ratio:g}"] = {"growth": growth, "depth_mm": depth_mm, "pressure_pa": pressure_pa}
+    return row
+
+
+def contact_distance() -> list[dict]:
+    """Fold slabs with other contact distances than the default: it is to be so small that it does not matter."""
+    from gyriflow.folding import contact
+
     found = []
-    for order, counts in DEEP_CELLS.items():
-        for slab in [Slab(cells, order, growth) for growth in DEEP_GROWTH for cells in counts]:
-            folds = folded(slab, DEEP_AREA_RATIO)
-            values = dict(zip(("growth", "depth_mm", "pressure_pa"), at_ratio(folds, DEEP_AREA_RATIO), strict=True))
-            crossing = sum(fold.crossing for fold in folds)
-            found.append(
-                {"order": order, "cells": slab.cells, "growth_of_step": slab.growth, "crossing": crossing} | values
-            )
+    for per_mean_edge, per_short_edge in CONTACT_DISTANCES:
+        contact.DISTANCE_PER_MEAN_EDGE = per_mean_edge
+        contact.DISTANCE_PER_SHORT_EDGE = per_short_edge
+        for slab in CONTACT_SLABS:
+            found.append({"per_mean_edge": per_mean_edge, "per_short_edge": per_short_edge, **deep_fold(*slab)})
+    return found
+
+
+def maps() -> dict:
+    """Compare maps of growth towards shapes, on meshes of both orders, with the growth of the continuous shape."""
+    from verification_cases.growth_maps import WavyBox, errors_of_map
+
+    found: dict = {}
+    for name, (side_mm, wave_mm, counts) in MAPS.items():
+        for order, elements in ORDERS.items():
+            boxes = [WavyBox(side_mm, wave_mm, nodes, order) for nodes in counts]
+            found[f"{name}, {elements}"] = [errors_of_map(box) for box in boxes]
     return found
 
 
 PARTS = {
-    part.__name__: part for part in (consistency, manufactured, elements, symmetry, ranks, theory, rates, memory, deep)
+    part.__name__: part
+    for part in (
+        consistency,
+        manufactured,
+        elements,
+        symmetry,
+        ranks,
+        theory,
+        rates,
+        memory,
+        deep,
+        contact_distance,
+        maps,
+    )
 }
 
 

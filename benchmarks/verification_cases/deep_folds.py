@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.simulation import Folding, advance
 from gyriflow.geometry.matching import crossing_faces
-from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid, quadratic
-from gyriflow.geometry.triangles import TriangleMesh, area
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, finer_surface, grid, quadratic
+from gyriflow.geometry.triangles import Floats, Ints, TriangleMesh, area
 from gyriflow.settings.folding import FoldingParameters
 from gyriflow.units import M_PER_MM, MM_PER_M
 
@@ -34,18 +34,27 @@ COARSENING = 1.5
 
 @dataclass(frozen=True)
 class Slab:
-    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step."""
+    """A slab with `cells` elements of an order through the cortex, which grows by `growth` in each step.
+
+    `memory_gw` is the time in weeks over which stress is forgotten.
+    """
 
     cells: float
     order: int
     growth: float
     contact: str = "global"
+    memory_gw: float = 0.0
 
     def parameters(self) -> FoldingParameters:
         """Return the parameters of the run; the core grows, too, which widens gyri and closes the sulcus."""
-        contact = {"kind": self.contact}
-        more = {"fissure_x_mm": 0.0, "core_growth_rate_per_s": RATE_PER_S, "contact": contact}
-        return slab_parameters(CONTRAST, self.growth, **more)
+        return slab_parameters(
+            CONTRAST,
+            self.growth,
+            fissure_x_mm=0.0,
+            core_growth_rate_per_s=RATE_PER_S,
+            stress_memory_gw=self.memory_gw,
+            contact={"kind": self.contact},
+        )
 
 
 @dataclass(frozen=True)
@@ -89,23 +98,42 @@ def folded(slab: Slab, area_ratio: float, comm: MPI.Comm = MPI.COMM_SELF) -> lis
     return folds
 
 
+def curved_surface(positions: Floats, facets: Ints, order: int) -> TriangleMesh:
+    """Return the surface with `facets` (f, 3) of a mesh at (n, 3) positions in mm; of quadratic elements, a finer one.
+
+    A quadratic element's face is curved: triangles between its nodes have a smaller area.
+    """
+    if order == 1:
+        return TriangleMesh(positions, facets)
+    nodes, numbers = np.unique(facets, return_inverse=True)
+    weights, faces = finer_surface(numbers.reshape(-1, 3))
+    return TriangleMesh(weights @ positions[nodes], faces)
+
+
 def fold_of(slab: Slab, folding: Folding, state: State) -> Fold:
     """Return the fold after the last step."""
-    top, start, places = folding.zones.cortex_facets, mesh_of(slab).vertices, state.positions * MM_PER_M
-    width_mm, height, row = 1 / slab.cells, places[np.unique(top), 2], state.rows[-1]
-    depth_mm, force, surface = float(np.ptp(height)), 0.0, TriangleMesh(places, folding.zones.facets)
-    if (contact := folding.contact) is not None:
-        u, curved = folding.solved.displacement, contact.surface
-        # of quadratic elements, the finer surface that contact acts on
-        surface = TriangleMesh(curved.reference_mm() + curved.displacement_mm(u), curved.faces)
-        is_bank = (start[curved.nodes, 0] < 0) & (places[curved.nodes, 2] > height.min() + BOTTOM * depth_mm)
-        force = abs(float(contact.forces(u)[is_bank, 0].sum()))
+    zones = folding.zones
+    start = mesh_of(slab).vertices
+    places = state.positions * MM_PER_M
+    top_at_start = curved_surface(start, zones.cortex_facets, slab.order)
+    top = curved_surface(places, zones.cortex_facets, slab.order)
+    height = top.vertices[np.unique(top.faces), 2]
+    depth_mm = float(np.ptp(height))
+    force = 0.0
+    if folding.contact is not None:
+        nodes = folding.contact.surface.nodes
+        is_bank = (start[nodes, 0] < 0) & (places[nodes, 2] > height.min() + BOTTOM * depth_mm)
+        forces = folding.contact.forces(folding.solved.displacement)
+        force = abs(float(forces[is_bank, 0].sum()))
+    row = state.rows[-1]
+    bank_area_m2 = (1 - BOTTOM) * depth_mm / slab.cells * M_PER_MM**2
+    growth_of_step = row["dt_s"] * RATE_PER_S
     return Fold(
         growth=float(np.expm1(np.log1p(slab.growth) * state.time_s / folding.parameters.step_s)),
-        area_ratio=area(TriangleMesh(places, top)) / area(TriangleMesh(start, top)),
+        area_ratio=area(top) / area(top_at_start),
         depth_mm=depth_mm,
-        pressure_pa=force / (width_mm * (1 - BOTTOM) * depth_mm * M_PER_MM**2) / (row["dt_s"] * RATE_PER_S),
-        crossing=crossing_faces(surface),
+        pressure_pa=force / bank_area_m2 / growth_of_step,
+        crossing=crossing_faces(curved_surface(places, zones.facets, slab.order)),
         least_volume_ratio=row["min_J"],
     )
 

@@ -9,15 +9,21 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 log = logging.getLogger(__name__)
 type Floats = NDArray[np.float64]
 
 STRENGTHS = (-8.0, 8.0)
-"""The range of the logarithm of the penalty's strength."""
-FREEDOM_TOL = 0.05
-"""Degrees of freedom may miss the wanted ones by this without a warning."""
+"""The range of the logarithm of a penalty's strength, relative to the traces of the normal matrix and the penalty."""
+FREEDOM_TOL = 0.01
+"""Degrees of freedom this near to those of an end of the range are that end's; farther beyond it they are warned of.
+
+Near its ends the range is flat, so that a search there would end where rounding, and thus the processor, lets it.
+"""
+RIDGE = 1e-13
+"""Added to matrices with diagonals of 1 to keep them regular."""
 
 
 def design(weeks: Floats, first: float, last: float, intervals: int) -> Floats:
@@ -44,23 +50,50 @@ def penalty(first: float, last: float, intervals: int, order: int) -> Floats:
 def strength(normal: Floats, penalty: Floats, freedom: float, name: str = "curve") -> float:
     """Return the factor of a penalty with which a fit has the degrees of freedom, by its normal matrix (k, k).
 
-    Where no factor gives them, it is the end of the range that comes nearest, with a warning.
+    Where no factor gives them within `FREEDOM_TOL`, it is the end of the range that comes nearest, with a warning;
+    where both ends give them, the strongest.
     """
-    # the ridge keeps the matrix regular if there are fewer weeks than splines
-    ridge = 1e-10 * np.trace(normal) * np.eye(len(normal))
+    unit = np.trace(normal) / np.trace(penalty)
+    data_shares = _data_shares(normal, unit * penalty)
 
-    def excess(exponent: float) -> float:
-        return float(np.trace(np.linalg.solve(normal + 10**exponent * penalty + ridge, normal))) - freedom
+    def freedom_at(exponent: float) -> float:
+        penalty_shares = 10**exponent * (1 - data_shares)
+        return float((data_shares / (data_shares + penalty_shares)).sum())
 
-    for end, sign in zip(STRENGTHS, (1, -1), strict=True):
-        if sign * (found := excess(end)) <= 0:
-            if abs(found) > FREEDOM_TOL:
-                log.warning(
-                    "%s: has %.3g degrees of freedom instead of %.3g: there are too few weeks, or it needs more knots",
-                    *(name, found + freedom, freedom),
-                )
-            return float(10**end)
-    return float(10 ** brentq(excess, *STRENGTHS))
+    weakest, strongest = STRENGTHS
+    highest = freedom_at(weakest)
+    lowest = freedom_at(strongest)
+    if freedom > highest + FREEDOM_TOL or freedom < lowest - FREEDOM_TOL:
+        log.warning(
+            "%s: has %.3g degrees of freedom instead of %.3g: there are too few weeks, or it needs more knots",
+            name,
+            np.clip(freedom, lowest, highest),
+            freedom,
+        )
+    # first the strongest: two weeks have two degrees of freedom with any penalty, and the smoothest curve is a line
+    if freedom <= lowest + FREEDOM_TOL:
+        exponent = strongest
+    elif freedom >= highest - FREEDOM_TOL:
+        exponent = weakest
+    else:
+        exponent = brentq(lambda exponent: freedom_at(exponent) - freedom, weakest, strongest)
+    return float(unit * 10**exponent)
+
+
+def _data_shares(normal: Floats, penalty: Floats) -> Floats:
+    """Return what data (k, k) decide, from 0 to 1, of each of the k directions that neither term mixes with others.
+
+    With another factor of the penalty the directions stay the same (Demmler and Reinsch 1975, doi 10.1007/BF01437407),
+    so that no matrix with very large and very small terms is solved.
+    """
+    both = normal + penalty
+    # diagonals of 1, so that the numbers depend neither on the unit of time nor on the distances of the weeks
+    factors = 1 / np.sqrt(np.diag(both))
+    scales = np.outer(factors, factors)
+    # directions that neither decides, of weeks that nearly coincide, count as decided by data
+    ridge = RIDGE * np.eye(len(both))
+    shares = eigh(scales * normal + ridge, scales * both + ridge, eigvals_only=True)
+    return np.clip(shares, 0.0, 1.0)
 
 
 def _knots(first: float, last: float, intervals: int) -> Floats:

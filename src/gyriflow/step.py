@@ -1,15 +1,20 @@
-"""Run a step of the workflow: its log, short error messages, and its exit code.
+"""Run a step of the workflow: its log, short error messages, its exit code, and the time and memory that it took.
 
 `python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code and exits with it.
 """
 
 import logging
 import os
+import resource
 import sys
+import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
+
+import psutil
 
 from .errors import GyriflowError, StorageError
 
@@ -36,6 +41,43 @@ def recorded_exit_code(path: Path) -> int | None:
     with suppress(OSError, ValueError):
         return int(path.read_text())
     return None
+
+
+class Usage(NamedTuple):
+    """Wall time since a program began, CPU time and peak memory, those of its ended children included."""
+
+    wall_s: float
+    cpu_s: float
+    memory_mib: float
+
+
+USAGE_COLUMNS = ("wall_s", "cpu_s", "memory_MiB")
+"""Columns of the table of a step's `Usage`."""
+
+
+def usage() -> Usage:
+    """Return what this program has used, as the system counts it."""
+    own, children = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu_s = own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
+    # macOS counts bytes, Linux KiB
+    per_mib = 2**20 if sys.platform == "darwin" else 2**10
+    memory_mib = max(own.ru_maxrss, children.ru_maxrss) / per_mib
+    return Usage(time.time() - psutil.Process().create_time(), cpu_s, memory_mib)
+
+
+def record_usage(log: str | Path, used: Usage) -> None:
+    """Write what a step has used to a table, which lies in the folder `benchmarks` next to that of its log."""
+    log = Path(log)
+    # no step of the workflow has its log elsewhere
+    folder = next((folder for folder in log.parents if folder.name == "logs"), None)
+    if folder is None:
+        return
+    path = folder.with_name("benchmarks") / log.relative_to(folder).with_suffix(".tsv")
+    rows = ["\t".join(USAGE_COLUMNS), "\t".join(f"{value:.2f}" for value in used)]
+    # a step that has made its results does not fail for this
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("\n".join(rows) + "\n")
 
 
 @contextmanager
@@ -71,6 +113,7 @@ def step(log: str, *inputs: str) -> Iterator[None]:
         traceback.print_exc()
         code = 1
     else:
+        record_usage(log, usage())
         return
     record_exit_code(code)
     sys.exit(code)

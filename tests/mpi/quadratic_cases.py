@@ -6,10 +6,15 @@ from boxes import COMM, at_the_bottom, curved_box, gathered, problem_on, solved,
 from contact_bodies import GAP_MM, HEIGHT_MM, SIDE_MM, approach, in_a_tube, stress_at, two_blocks
 from mpi4py import MPI
 from shapes import box_mesh
+from verification_cases.boxes import slab_parameters
 
+from gyriflow.folding.checkpoint import State
 from gyriflow.folding.contact import SelfContact
 from gyriflow.folding.domain import Domain
-from gyriflow.geometry.tetrahedra import boundary_faces, quadratic, signed_volumes
+from gyriflow.folding.simulation import Folding
+from gyriflow.geometry.jacobians import EDGES, lower_bounds
+from gyriflow.geometry.straightening import corner_determinants
+from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_faces, quadratic, signed_volumes
 from gyriflow.units import M_PER_MM, MM_PER_M
 
 
@@ -99,3 +104,34 @@ def test_the_diagonal_has_the_blocks_of_contact():
             expected = product.array.reshape(-1, 3)[node - first]
             # products are in single precision
             assert blocks[node - first, :, 1] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(blocks).max())
+
+
+def box_with_a_bowed_side():
+    """Return a box with an inner side of an element bowed by 0.15 of its length, and the node in its middle."""
+    mesh = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
+    middles, sides = mesh.tets[:, 4:].ravel(), mesh.tets[:, EDGES].reshape(-1, 2)
+    inner = np.flatnonzero(~np.isin(middles, boundary_faces(mesh)[0]))[0]
+    positions = mesh.vertices.copy()
+    along = np.diff(positions[sides[inner]], axis=0)[0]
+    across = np.cross(along, [0.3, 0.5, 0.8])
+    positions[middles[inner]] += 0.15 * np.linalg.norm(along) * across / np.linalg.norm(across)
+    return TetrahedralMesh(positions, mesh.tets), middles[inner]
+
+
+@pytest.mark.parametrize("memory_gw", [0.0, 1.0])
+def test_inner_sides_that_bow_are_straightened_unless_stress_is_kept(memory_gw):
+    mesh, bowed = box_with_a_bowed_side()
+    p = slab_parameters(5.0, 0.01, stress_memory_gw=memory_gw, fissure_x_mm=0.0, contact={"kind": "global"})
+    state = State.at_start(mesh.vertices * M_PER_MM, p.step_s)
+    after = Folding(COMM, mesh, zones_of(mesh, at_the_bottom), p).step(state, p.step_s)
+    moved_by_solver = state.positions + after.last
+    is_moved = (after.positions != moved_by_solver).any(axis=1)
+    bounds = lower_bounds(after.positions, mesh.tets) / corner_determinants(after.positions, mesh.tets)
+    if memory_gw:
+        assert not is_moved.any()
+        assert bounds.min() < 0.4
+    else:
+        assert is_moved[bowed]
+        assert not is_moved[boundary_faces(mesh)[0]].any()
+        assert bounds.min() > 0.4
+    assert (COMM.bcast(after.positions) == after.positions).all()

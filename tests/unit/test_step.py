@@ -1,12 +1,15 @@
 """A step ends in the exit code of its error, with one message on the terminal and in its log."""
 
 import logging
+import resource
 import sys
+from types import SimpleNamespace
 
 import pytest
 from facts import Facts
 from processes import ran
 
+from gyriflow import step as step_module
 from gyriflow.errors import MeshError
 from gyriflow.step import EXIT_FILE, record_exit_code, recorded_exit_code, step
 
@@ -83,3 +86,25 @@ def test_a_killed_program_is_said_to_have_run_out_of_memory(exit_file, tmp_path)
     assert end.stderr == Facts("gyriflow:", "memory")
     assert log.read_text() == f"before\n{end.stderr}"
     assert recorded_exit_code(exit_file) == 137
+
+
+def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_its_log(tmp_path, monkeypatch):
+    counted = {
+        resource.RUSAGE_SELF: SimpleNamespace(ru_utime=2.0, ru_stime=0.5, ru_maxrss=2**20),
+        resource.RUSAGE_CHILDREN: SimpleNamespace(ru_utime=10.0, ru_stime=0.25, ru_maxrss=3 * 2**20),
+    }
+    monkeypatch.setattr(step_module.resource, "getrusage", counted.get)
+    monkeypatch.setattr(step_module.sys, "platform", "linux")
+    (tmp_path / "a" / "logs").mkdir(parents=True)
+    with step(str(tmp_path / "a" / "logs" / "one.week-21.00.log")):
+        pass
+    head, row = (tmp_path / "a" / "benchmarks" / "one.week-21.00.tsv").read_text().splitlines()
+    assert head.split("\t") == ["wall_s", "cpu_s", "memory_MiB"]
+    assert [float(value) for value in row.split("\t")[1:]] == [12.75, 3072]
+
+
+def test_a_step_that_fails_records_no_time(exit_file, tmp_path):
+    (tmp_path / "logs").mkdir()
+    with pytest.raises(SystemExit), step(str(tmp_path / "logs" / "one.log")):
+        raise MeshError("has a hole")
+    assert not (tmp_path / "benchmarks").exists()

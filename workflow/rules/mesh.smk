@@ -1,5 +1,4 @@
 # Tetrahedral meshes of start brains.
-from gyriflow.running.path_store import PATH_MESH_SETTINGS
 
 
 rule tetrahedralise:
@@ -24,8 +23,8 @@ use rule tetrahedralise as path_mesh with:
     output:
         **PATH_MESH,
     params:
-        settings=PATH_MESH_SETTINGS.model_dump(exclude={"max_surface_distance_mm"}),
-        gates=PATH_MESH_SETTINGS.gates,
+        settings=CONFIG.growth.path_mesh.model_dump(exclude={"max_surface_distance_mm"}),
+        gates=CONFIG.growth.path_mesh.gates,
         refused=f"{BRAIN}/path/refused",
 
 

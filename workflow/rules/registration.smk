@@ -1,6 +1,7 @@
 # Correspondences between brains of successive weeks, and the targets of start brains.
 from gyriflow.running.cost import targets_memory_mib
-from gyriflow.running.path_store import PATH_MESH_SETTINGS, path_store
+from gyriflow.io.origins import origin_key
+from gyriflow.running.path_store import has_path, kept_path, path_origin, store_folder
 
 if workflow.is_main_process:
     for series, cause in study.series.unmatched.items():
@@ -112,45 +113,60 @@ rule targets:
         weeks=lambda w: chain_of(w).weeks,
         posed=lambda w: chain_of(w).posed,
         opens_sulci=CONFIG.surface.open_sulci,
+        origin=None,
         store=None,
     script:
         "../scripts/targets.py"
 
 
+# by the id of their first brain, from which rules get them
 PATHS = {chain.path.brains[0].id: chain.path for chain in study.chains.values() if chain.path}
+PATH_ORIGINS = {brain: path_origin(study, path) for brain, path in PATHS.items()}
+# None until all files of the atlas are there
+PATH_KEYS = {brain: origin_key(origin, CONTENTS) for brain, origin in PATH_ORIGINS.items()}
+# No rule makes a path that the study has: one that was copied needs nothing of what it was made from, and one that was
+# made here stays where the kept one is taken away.
+NEEDED_PATHS = {brain: path for brain, path in PATHS.items() if not has_path(path, PATH_KEYS[brain])}
+KEPT_PATHS = {brain: kept_path(study, path, PATH_KEYS[brain]) for brain, path in NEEDED_PATHS.items()}
 
 
-def path_inputs(wildcards):
-    """Return what an atlas' path is made from; nothing where it has been kept."""
-    store = path_store(study, PATHS[wildcards.brain], CONTENTS)
-    if store and store.exists():
-        return {"kept": str(store)}
-    path = PATHS[wildcards.brain]
-    return {
-        "mesh": PATH_MESH["mesh"],
-        "data": PATH_MESH["data"],
-        "report": PIAL["report"],
-        "correspondences": path.correspondences,
-        "surfaces": [brain.pial for brain in path.later],
-        "reports": [brain.report for brain in path.later],
-    }
+def path_of(wildcards):
+    """Return the path of an atlas, whose first brain is that of the wildcards."""
+    return PATHS[wildcards.brain]
 
 
 # the same of the first brain of an atlas, which other brains are carried by
 use rule targets as atlas_path with:
     input:
-        unpack(path_inputs),
+        mesh=PATH_MESH["mesh"],
+        data=PATH_MESH["data"],
+        report=PIAL["report"],
+        correspondences=lambda w: path_of(w).correspondences,
+        surfaces=lambda w: [brain.pial for brain in path_of(w).later],
+        reports=lambda w: [brain.report for brain in path_of(w).later],
     output:
         ATLAS_PATH,
     wildcard_constraints:
-        brain=one_of(PATHS),
+        brain=one_of(brain for brain, kept in KEPT_PATHS.items() if kept is None),
     resources:
-        mem_mb=lambda w: targets_memory_mib(brain_of(w), PATH_MESH_SETTINGS),
+        mem_mb=lambda w: targets_memory_mib(brain_of(w), CONFIG.growth.path_mesh),
     params:
-        weeks=lambda w: PATHS[w.brain].weeks,
-        posed=lambda w: PATHS[w.brain].posed,
+        weeks=lambda w: path_of(w).weeks,
+        posed=lambda w: path_of(w).posed,
         opens_sulci=CONFIG.surface.open_sulci,
-        store=lambda w: path_store(study, PATHS[w.brain], CONTENTS),
+        origin=lambda w: PATH_ORIGINS[w.brain],
+        store=lambda w: store_folder(study, path_of(w)),
+
+
+rule kept_path:
+    output:
+        ATLAS_PATH,
+    wildcard_constraints:
+        brain=one_of(brain for brain, kept in KEPT_PATHS.items() if kept is not None),
+    params:
+        kept=lambda w: KEPT_PATHS[w.brain],
+    script:
+        "../scripts/kept_path.py"
 
 
 def atlas_of(wildcards):

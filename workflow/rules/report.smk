@@ -2,7 +2,7 @@
 # and tables of `workflow/figures.yaml`.
 from itertools import takewhile
 
-from gyriflow.running.snakemake_internals import benchmark_patterns
+from gyriflow.running.snakemake_internals import usage_patterns
 from gyriflow.settings.terms import run_names
 
 # the configuration; brains of atlases and of the table of participants are already among its brains
@@ -19,7 +19,7 @@ PAGE = f"{workflow.basedir}/workflow/report/page"
 # also of the report's own tables, so that they exist if the page cannot be made
 rule study_records:
     input:
-        # logs and benchmark files are not inputs, since a missing one would repeat its job
+        # logs and records of time and memory are not inputs, since a missing one would repeat its job
         rules.figures.input,
         target_files(FIGURES, "brain", "small"),
         rules.metrics.input,
@@ -55,8 +55,8 @@ rule study_records:
         ],
         folded=study.pairs,
         costs=CONFIG.costs.model_dump(),
-        # pattern of the benchmark files of each rule; files of earlier configurations do not match
-        benchmarks=lambda w: benchmark_patterns(
+        # pattern of the records of time and memory of each rule; those of earlier configurations do not match
+        benchmarks=lambda w: usage_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
         ),
         growth_of=[study.growth_source(simulation) for simulation in study.run_simulations],

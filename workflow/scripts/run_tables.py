@@ -9,6 +9,7 @@ from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.tables import weekly_norms
 from gyriflow.report.tables import COMMON_PARAMETERS, html_table, resolution_over_steps, runs_table
+from gyriflow.settings.growth import GROWTH_MODELS
 from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
@@ -22,8 +23,10 @@ with step(snakemake.log[0]):
     for name, (run, brain), grown, (params, summary, zones, steps, frames) in runs_and_files:
         report = read_json(zones)
         before = {name: report[name] for name in BEFORE_THE_SOLVE}
-        resolved = resolution_over_steps(report["order"], read_table(steps))
-        settings, found = read_yaml(params), {**read_json(summary), **before, **resolved}
+        settings = read_yaml(params)
+        has_layers = GROWTH_MODELS[settings["growth"]["model"]].has_layers
+        resolved = resolution_over_steps(report["order"], read_table(steps), has_layers=has_layers)
+        found = {**read_json(summary), **before, **resolved}
         settings["growth_of"] = grown
         rows.append({"run": run, "subject": brain, **settings, **found})
         # targets are in files

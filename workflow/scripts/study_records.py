@@ -8,7 +8,7 @@ from gyriflow.io.files import files_in, fingerprints, read_json, read_text, writ
 from gyriflow.io.yaml_files import read_yaml, write_yaml
 from gyriflow.report.page import methods_text
 from gyriflow.report.tables import html_table, resources
-from gyriflow.running.jobs import gather_messages, read_benchmarks
+from gyriflow.running.jobs import gather_messages, read_usage
 from gyriflow.running.provenance import software, texts_in
 from gyriflow.settings.stages import CostSettings
 from gyriflow.settings.terms import run_names
@@ -25,7 +25,7 @@ def results_in(folder):
 
 with step(snakemake.log[0]):
     names = dict(zip(map(tuple, params.folded), run_names(params.folded), strict=True))
-    jobs = read_benchmarks(".", params.benchmarks)
+    jobs = read_usage(".", params.benchmarks)
     # simulations are listed one by one, other jobs by rule
     jobs["run"] = [
         names.get((run, brain)) if rule == "simulate" else None

@@ -1,8 +1,8 @@
 """Write the shapes of a brain's mesh in the later weeks of its own series: targets of a run, or an atlas' path."""
 
-import sys
 from contextlib import suppress
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -11,16 +11,14 @@ from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
 from gyriflow.growth.series_shapes import follow_series, sizes_of
 from gyriflow.io.files import read_json
-from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
+from gyriflow.io.origins import present_key
+from gyriflow.io.registrations import WeeklyShapes, read_correspondence, stored_name, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
 with step(snakemake.log[0]):
-    if "kept" in dict(files):
-        write_weekly_shapes(snakemake.output[0], read_weekly_shapes(files.kept))
-        sys.exit()
     mesh = read_tetrahedral_mesh(files.mesh)
     surfaces = [read_surface(path) for path in files.surfaces]
     # mesh and surfaces are posed; correspondences are too, or are in the coordinates of the files
@@ -37,8 +35,13 @@ with step(snakemake.log[0]):
     open_sulci = params.opens_sulci and any(opened)
     found = follow_series(mesh, params.weeks, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
     sizes = sizes_of(mesh, found.positions)
-    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, stops=found.stops, tets=mesh.tets)
+    key = ""
+    if params.origin:
+        # known now that all files of the atlas are there
+        key = present_key(params.origin) or ""
+    own = {"stops": found.stops, "tets": mesh.tets, "made_from": key}
+    shapes = WeeklyShapes(np.array(found.weeks), found.positions, sizes, **own)
     write_weekly_shapes(snakemake.output[0], shapes)
-    if params.store:
+    if params.store and key:
         with suppress(StorageError):
-            write_weekly_shapes(params.store, shapes)
+            write_weekly_shapes(Path(params.store, stored_name(snakemake.wildcards.brain, key)), shapes)

@@ -29,7 +29,7 @@ from ..settings.base import folder_of
 from ..settings.brains import BrainConfig
 from ..settings.root import Config
 from ..settings.schemes import LabelScheme
-from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error
+from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, element_error, is_too_coarse
 from ..settings.varying import Varying, curve_at
 from ..study.atlases import atlas_brains, known_checksums, used_atlases
 from ..study.loading import load
@@ -175,6 +175,8 @@ def coarse_cortices(study: Study) -> Iterator[str]:
     coarse: dict[str, list[str]] = defaultdict(list)
     needed = ELEMENTS_NEEDED[mesh.order]
     for simulation in study.run_simulations:
+        if not simulation.settings.growth.definition.has_layers:
+            continue
         thickness = simulation.settings.thickness_mm
         # a map's thickness is unknown before the surface is made
         if isinstance(thickness, Varying) and thickness.map:
@@ -183,7 +185,7 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         elements = through / mesh.surface_edge_mm
         error, text = element_error(mesh.order, elements)
         few, remedy = "", "mesh.order: 2"
-        if is_coarse := elements < 0.99 * needed:
+        if is_coarse := is_too_coarse(mesh.order, elements):
             few = f", fewer than the {needed:g} needed"
             remedy = f"mesh.surface_edge_mm: {math.floor(100 * through / needed) / 100:g}"
         if is_coarse or error > LARGE_ELEMENT_ERROR:
@@ -244,7 +246,7 @@ def _check_labels(volume: str, brain: BrainConfig, scheme: LabelScheme) -> Itera
 
 
 def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int) -> Iterator[tuple[str, bool]]:
-    seconds = [job_seconds(study, job.rule, job.wildcards, job.inputs) for job in jobs]
+    seconds = [job_seconds(study, job.rule, job.wildcards) for job in jobs]
     made_by = {file: number for number, job in enumerate(jobs) for file in job.outputs}
 
     @cache
@@ -257,11 +259,7 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
         simulation_needs(study.simulations[job.wildcards["run"], job.wildcards["brain"]], study.config.mesh)
         for job in foldings
     ]
-    for job, path_s in zip(jobs, seconds, strict=True):
-        if job.rule == "atlas_path":
-            brain, atlas = job.wildcards["brain"], study.atlases.get(job.wildcards["brain"])
-            made = f"has to be made, about {format_duration(path_s)}{', once for all studies' if atlas else ''}"
-            yield f"path of {atlas.name if atlas else brain}: {made if path_s else 'kept from an earlier study'}", False
+    yield from ((line, False) for line in _path_lines(jobs, seconds, study, directory))
     hours = sum(seconds) / 3600
     wall_s = max(sum(seconds) / cores, *map(end_s, range(len(jobs))))
     on = f"{cores} core{'s' if cores > 1 else ''} without other load"
@@ -276,6 +274,28 @@ def _needs(jobs: Sequence[PlannedJob], study: Study, directory: Path, cores: int
     yield from _fits("memory", memory or MIN_SURFACE_MIB / 4, available_memory_mib() if here else None)
     folder = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
     yield from _fits("disk", disk, shutil.disk_usage(folder).free / 2**20)
+
+
+def _path_lines(jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Study, directory: Path) -> Iterator[str]:
+    """Yield a line on each path of an atlas: whether it is kept or has to be made, and where it will be kept."""
+    for job, path_s in zip(jobs, seconds, strict=True):
+        brain = job.wildcards.get("brain", "")
+        used = next((used for used in study.used_atlases if used.atlas is study.atlases.get(brain)), None)
+        name = used.atlas.name if used else brain
+        if job.rule == "kept_path":
+            yield f"path of {name}: kept from an earlier study"
+        elif job.rule == "atlas_path":
+            line = f"path of {name}: has to be made, about {format_duration(path_s)}"
+            yield f"{line}; {_reuse(used.folder, directory)}" if used else line
+
+
+def _reuse(folder: Path, directory: Path) -> str:
+    """Return which studies find a path again that is kept in the folder of an atlas' files."""
+    if folder.is_relative_to(directory.resolve()):
+        return (
+            "kept for this study only; with a folder of the atlas outside it (--folder, atlas.folder), for others too"
+        )
+    return f"once for all studies with the folder {folder}"
 
 
 def _fits(name: str, mib: float, there_mib: float | None) -> Iterator[tuple[str, bool]]:

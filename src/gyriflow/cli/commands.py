@@ -289,7 +289,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
 @click.option("--image", type=EXISTING_FILE, help="T2-weighted volume of the scan.")
 @click.option("--accept-licence", "accepted", is_flag=True, help="Accept the licence of the atlas.")
 @click.option("--ensemble", type=click.IntRange(3), help="Also fold so many members with uncertain inputs varied.")
-@click.option("--quick", is_flag=True, help="Use a coarse mesh and steps of one day, for a first look.")
+@click.option("--quick", is_flag=True, help="First look: coarse meshes, steps of a day, every other week of the atlas.")
 @click.option("--force", is_flag=True, help="Replace an existing configuration.")
 @directory_option
 @cores_option

@@ -27,6 +27,8 @@ TEMPLATES = SHIPPED / "config" / "templates"
 BIDS_OPTIONS = "bids.json"
 BIDS_HEAD = "# Written by `gyriflow bids`, which replaces it.\n"
 SHIPPED_ATLAS = "spina-bifida"
+QUICK_GW = 2.0
+"""Least time between the atlas' brains of a quick prediction."""
 
 
 def write_configuration(
@@ -122,7 +124,7 @@ def write_prediction(
     entry |= {"image": str(own_name(image))} if image else {}
     keys = {"name": atlas or SHIPPED_ATLAS, "folder": folder and str(folder), "accept_licence": accepted}
     settings = validated(AtlasSettings, keys, "--atlas").located(Path.cwd())
-    series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted)
+    series = _growth_series(Atlas(**read_keys(settings.description)), weeks, accepted, QUICK_GW if quick else 0.0)
     section = settings.model_dump(exclude_defaults=True) | series
     more = read_keys(TEMPLATES / "quick.yaml") if quick else {"folding": {}}
     folding = {"preset": "expected", "end_week": weeks[1]} | more["folding"]
@@ -210,7 +212,12 @@ def _weeks(brains: Sequence[FoundBrain]) -> list[float]:
     return sorted({brain.entry["week"] for brain in brains if brain.entry["week"] != UNSET})
 
 
-def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> dict[str, Any]:
+def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool, least_gw: float = 0.0) -> dict[str, Any]:
+    """Return the first series of an atlas that covers a start and an end week, and its weeks that are used.
+
+    These are all later ones, so that a prediction does not depend on where it ends; with `least_gw` between them only
+    those that a prediction to the end needs.
+    """
     if atlas.licence.accept and not accepted:
         terms = f"{atlas.licence.name} ({atlas.licence.url}): {atlas.licence.terms.rstrip('.')}"
         raise InputError(f"the licence of {atlas.name} is not accepted", found=terms, remedy="Add --accept-licence.")
@@ -219,12 +226,23 @@ def _growth_series(atlas: Atlas, weeks: tuple[float, float], accepted: bool) -> 
         first = max((week for week in available if week <= weeks[0]), default=available[0])
         last = min((week for week in available if week >= weeks[1]), default=None)
         if last is not None and weeks[0] < weeks[1] and first <= weeks[0] + BEFORE_GW:
-            # to the last one: a prediction does not depend on where it ends
-            return {"series": name, "weeks": [week for week in available if week >= first]}
+            later = [week for week in available if week >= first]
+            return {"series": name, "weeks": _thinned(later, weeks[1], least_gw) if least_gw else later}
     spans = (f"{name}: {min(series.weeks):g} to {max(series.weeks):g} GW" for name, series in atlas.series.items())
     problem = f"no series of the atlas {atlas.name} covers {weeks[0]:g} to {weeks[1]:g} GW"
     remedy = "Choose another --atlas, or another --until, after --week."
     raise InputError(problem, found="; ".join(spans), remedy=remedy)
+
+
+def _thinned(weeks: Sequence[float], end: float, least_gw: float) -> list[float]:
+    """Return ascending weeks at least so far apart, up to the first one at or past an end, or as far as they go."""
+    chosen = [weeks[0]]
+    for week in weeks[1:]:
+        is_far = week - chosen[-1] >= least_gw
+        is_last_chance = week == weeks[-1]
+        if chosen[-1] < end and (is_far or is_last_chance):
+            chosen.append(week)
+    return chosen
 
 
 def _have_shapes(scans: Sequence[FoundBrain], folder: Path) -> bool:

@@ -9,7 +9,8 @@ import pandas as pd
 from ..geometry.triangles import TriangleMesh
 from ..metrics.spangy import spectral_distances
 from ..quantities import Shown, metrics_shown
-from ..settings.terms import ELEMENTS_NEEDED, FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES
+from ..settings.growth import GROWTH_MODELS
+from ..settings.terms import FOLD_BANDS, MEASURED, SPECTRUM_PREFIXES, is_too_coarse
 from .comparison import aligned_distances
 
 WEYL_NUMBER = "weyl_number"
@@ -149,7 +150,8 @@ def member_row(
     run's files.
     """
     elements = zones["elements_through_cortex"]
-    is_resolved = elements is not None and elements >= ELEMENTS_NEEDED[zones["order"]]
+    has_layers = GROWTH_MODELS[params["growth"]["model"]].has_layers
+    is_resolved = not has_layers or (elements is not None and not is_too_coarse(zones["order"], elements))
     return {
         **labels,
         **values,

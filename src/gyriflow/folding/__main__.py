@@ -20,7 +20,7 @@ from ..io.yaml_files import read_yaml
 from ..settings.folding import FoldingParameters, parameters_from, require_maps
 from ..settings.terms import ELEMENT_FIELDS, ZONE_NAMES
 from ..settings.varying import Maps, value_at
-from ..step import record_exit_code
+from ..step import Usage, record_exit_code, record_usage, usage
 from .checks import refuse_impossible, stiffness_warning, zone_report
 from .output import log_event, print_line, warn, write_events
 from .points import IntegrationPoints
@@ -107,6 +107,12 @@ def main(comm: MPI.Comm, arguments: argparse.Namespace) -> None:
         write_json(arguments.out / "zones.json", report)
     comm.barrier()
     run(comm, mesh, zones, parameters, maps, arguments.out, may_diverge=arguments.may_diverge)
+    own = usage()
+    # by all ranks
+    cpu_s = comm.allreduce(own.cpu_s)
+    memory_mib = comm.allreduce(own.memory_mib)
+    if comm.rank == 0 and arguments.progress:
+        record_usage(arguments.progress, Usage(own.wall_s, cpu_s, memory_mib))
 
 
 def guarded(comm: MPI.Comm, arguments: argparse.Namespace) -> None:

@@ -11,7 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import cffi
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from ..io.locks import lock_file
 from .compiler import set_compiler
@@ -66,6 +68,19 @@ def compiled(comm: MPI.Comm, declarations: str, code: str) -> tuple[cffi.FFI, An
             with TemporaryDirectory(dir=library.parent) as folder:
                 Path(interface.compile(tmpdir=folder)).rename(library)
     return interface, interface.dlopen(str(library))
+
+
+def pointer(interface: cffi.FFI, array: NDArray, dtype: type, size: int, *, is_written: bool = False) -> Any:
+    """Return the pointer to an array for C code, which reads it as at least `size` numbers of a type.
+
+    TypeError for another type, ValueError for fewer numbers, an order that is not C's, or an array that `is_written`
+    although it is read-only: C code would read something else, or beyond the end, without a word.
+    """
+    if array.dtype != dtype:
+        raise TypeError(f"C code needs an array of {np.dtype(dtype)}, and this one has {array.dtype}")
+    if array.size < size:
+        raise ValueError(f"C code needs {size} numbers, and the array has the shape {array.shape}")
+    return interface.from_buffer(array, require_writable=is_written)
 
 
 def remove_incomplete_entries(cache: Path) -> None:

@@ -15,21 +15,24 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from ..errors import MeshError
-from ..geometry.triangles import Floats, TriangleMesh, connected, edges, mean_length
+from ..geometry.triangles import Floats, TriangleMesh, connected, edge_lengths, edges
 from ..units import M_PER_MM
 from .contact_search import ContactSearch, NearPairs
 from .contact_surface import ContactSurface
 from .domain import Domain, bisect_points
 
-DISTANCE_PER_EDGE = 0.2
-"""Contact distance d̂ as a multiple of the current surface's mean edge length: well below what the mesh resolves. It
-grows with the edges of the surface; a fixed distance would only make contact harder to solve."""
+DISTANCE_PER_MEAN_EDGE = 0.1
+"""Largest contact distance d̂ as a multiple of the mean edge length of the contact surface: well below what the mesh
+resolves. It grows with the edges of the surface; a fixed distance would only make contact harder to solve."""
+DISTANCE_PER_SHORT_EDGE = 0.2
+"""Largest contact distance as a multiple of the length of a short edge. With a larger one a compressed surface would
+repel itself and resist compression (docs/verification.md)."""
+SHORT_EDGES = 0.05
+"""The share of edges that are shorter than a short edge."""
 STIFFNESS_PER_MODULUS = 0.1
 """The barrier's stiffness κ as a multiple of the cortex' shear modulus. The pressure between folds, some tenths of the
 modulus, then keeps them at about half of the contact distance; a stiffer barrier takes more iterations and changes
 nothing else."""
-EDGES_PER_SPACING = {1: 1, 2: 2}
-"""Number of edges of the contact surface between neighbouring nodes, by the order of the elements."""
 STIFFEN_BELOW = 0.1
 """Fraction of the contact distance. Where the smallest gap at a step's start is smaller, the barrier is stiffer, by the
 square root of the ratio, if it may stiffen: with stress memory folds press on each other ever harder, and a barrier
@@ -43,9 +46,10 @@ FEW_VERTICES, FEW_SHARE, MAX_FEW_SHARE = 12, 0.001, 0.02
 number or this share of all, and at most the last share."""
 FEW_BELOW = 0.25
 """Factor by which these must be nearer than the rest."""
-NEIGHBOUR_EDGES = 3
-"""Vertices that so few edges connect are neighbours. Neighbours on small faces are nearer to each other than the
-contact distance, but no gap is between them."""
+NEIGHBOUR_EDGES = {1: 3, 2: 6}
+"""Vertices that so few edges connect are neighbours, by the order of the elements: a node of a quadratic element is two
+edges from the next. Neighbours on small faces are nearer to each other than the contact distance, but no gap is between
+them."""
 MAX_DISPLACEMENT_MM = 8.0
 """Longest displacement of a vertex in one iteration; a solve with a longer one diverges."""
 BARRIER = ipctk.TwoStageBarrier()
@@ -57,7 +61,7 @@ class SelfContact:
 
     Displacements `u` are those of the local nodes, (k, 3) in m, from the mesh at the start of the step.
     `facets` (f, 3) are vertex indices of the mesh, `stiffness_pa` is the barrier's initial stiffness. The contact
-    distance is the given `distance_mm`, or else `DISTANCE_PER_EDGE` of the mean edge length at each step's start, but
+    distance is the given `distance_mm`, or else by the edge lengths at each step's start (`contact_distance_mm`), but
     below the small gap at the start of the run, neighbours aside: a body that does not grow must not move, except where
     neighbours on thin triangles or a few vertices are nearer to each other. `stiffens` is for runs with stress memory.
     MeshError where the surface crosses itself at the start.
@@ -106,22 +110,20 @@ class SelfContact:
         ends = np.concatenate([self._edges, self._edges[:, ::-1]]).T
         links = sparse.coo_array((np.ones(ends.shape[1]), ends), shape=(count, count)).tocsr() + sparse.eye_array(count)
         around = links[rows]
-        for _ in range(NEIGHBOUR_EDGES * EDGES_PER_SPACING[self.domain.order] - 1):
+        for _ in range(NEIGHBOUR_EDGES[self.domain.order] - 1):
             around = around @ links
         for i, vertices in enumerate(corners):
             numbers = near.part.vertices[vertices]
             if (around[np.searchsorted(rows, numbers)][:, numbers].toarray() == 0).any():
-                pair = near.pairs[i]
-                at = pair.dof(near.part_positions, near.mesh.edges, near.mesh.faces)
-                gaps[numbers] = np.minimum(gaps[numbers], np.sqrt(pair.compute_distance(at)))
+                gaps[numbers] = np.minimum(gaps[numbers], near.distance_mm(i))
 
     def begin_step(self) -> None:
         """Start from the current positions; set the barrier by edge lengths and the smallest gap there."""
         self._rest = self.surface.reference_mm()
+        lengths = edge_lengths(self._rest, self._edges)
         # from rank 0, as above
-        spacing = EDGES_PER_SPACING[self.domain.order] * mean_length(self._rest, self._edges)
-        edge_based = DISTANCE_PER_EDGE * self.domain.comm.bcast(spacing, root=0)
-        distance_mm = self._given_mm or min(edge_based, self._max_mm)
+        by_edges = self.domain.comm.bcast(contact_distance_mm(lengths), root=0)
+        distance_mm = self._given_mm or min(by_edges, self._max_mm)
         self._search = ContactSearch(self.surface.faces, self._owned, self._rest, distance_mm, self._search)
         self._near: NearPairs | None = None
         factor = 1.0
@@ -212,6 +214,13 @@ class SelfContact:
         values = np.zeros(len(self.domain.positions))
         values[self.surface.nodes] = pressure[: len(self.surface.nodes)]
         return values
+
+
+def contact_distance_mm(lengths: Floats) -> float:
+    """Return the contact distance d̂ in mm for a surface whose edges have (e,) lengths in mm."""
+    by_mean = DISTANCE_PER_MEAN_EDGE * float(lengths.mean())
+    by_short = DISTANCE_PER_SHORT_EDGE * float(np.quantile(lengths, SHORT_EDGES))
+    return min(by_mean, by_short)
 
 
 def small_gap_mm(gaps: Floats) -> float:

@@ -1,6 +1,8 @@
 """Search for near pairs of vertices, edges and faces, and collision detection, with the IPC Toolkit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import ipctk
 import numpy as np
@@ -18,6 +20,18 @@ MAX_CLOSING = 0.9
 CCD = ipctk.AdditiveCCD(conservative_rescaling=MAX_CLOSING)
 """Continuous collision detection (Li et al. 2021) that leaves a tenth of each pair's distance. Interval bisection, the
 alternative, takes minutes if flat surfaces meet face to face."""
+
+PARALLEL_TOL = 1e-6
+"""Sine of the angle below which two edges count as parallel."""
+MIN_STEP = 1e-9
+"""Smaller collision-free steps are due to parallel edges whose distance is computed as zero."""
+
+
+class EdgePair(Protocol):
+    """A pair of two edges, by their numbers."""
+
+    edge0_id: int
+    edge1_id: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +71,12 @@ class NearPairs:
             return np.inf
         return float(np.sqrt(self.pairs.compute_minimum_distance(self.mesh, self.part_positions)))
 
+    def distance_mm(self, i: int) -> float:
+        """Return the distance between the two sides of pair `i`."""
+        # ipctk's pairs do not keep their list alive: a pair with a name may outlive it, and then reads freed memory
+        places = self.pairs[i].dof(self.part_positions, self.mesh.edges, self.mesh.faces)
+        return float(np.sqrt(self.pairs[i].compute_distance(places)))
+
     def vertices_of_pairs(self) -> list[list[int]]:
         """Return the vertices of each pair, as numbers of the part's vertices."""
         corners = [self.pairs[i].vertex_ids(self.mesh.edges, self.mesh.faces) for i in range(len(self.pairs))]
@@ -95,6 +115,7 @@ class ContactSearch:
         pairs = ipctk.NormalCollisions()
         pairs.use_area_weighting = True
         pairs.build(candidates, mesh, at, self._distance)
+        pairs = without_parallel_edges(pairs, part.edges, at)
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
@@ -111,7 +132,11 @@ class ContactSearch:
             part, mesh, candidates = self._search(first, last)
         ends = part.restrict(first), part.restrict(last)
         if candidates is not None:
-            return float(candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD))
+            step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
+            if step < MIN_STEP:
+                candidates = without_distant_parallel_edges(candidates, part.edges, *ends)
+                step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
+            return float(step)
         return float(
             ipctk.compute_collision_free_stepsize(mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=CCD)
         )
@@ -143,3 +168,71 @@ class ContactSearch:
         candidates.build(mesh, part.restrict(first), part.restrict(last), reach, self._broad_phase)
         self._candidates = candidates, SearchRange(first, last, reach)
         return part, mesh, candidates
+
+
+def without_parallel_edges(
+    pairs: ipctk.NormalCollisions, edges: NDArray[np.integer], positions: Floats
+) -> ipctk.NormalCollisions:
+    """Return the pairs without those of two edges (e, 2) that are parallel, at positions (p, 3) of their vertices.
+
+    Parallel edges do not repel each other (Li et al. 2020, section 5.1): their ends do, which are pairs of their own.
+    The distance between two edges that are parallel but for round-off may be computed as zero, however far apart they
+    are on one line, and then their barrier would be infinite.
+    """
+    are_parallel = parallel_edges(pairs.ee_collisions, edges, positions)
+    if not are_parallel.any():
+        return pairs
+    # a new object, since items of the old lists read the memory of their list when they are released
+    result = ipctk.NormalCollisions()
+    result.use_area_weighting = pairs.use_area_weighting
+    result.vv_collisions = pairs.vv_collisions
+    result.ev_collisions = pairs.ev_collisions
+    result.ee_collisions = [pair for pair, drop in zip(pairs.ee_collisions, are_parallel, strict=True) if not drop]
+    result.fv_collisions = pairs.fv_collisions
+    return result
+
+
+def without_distant_parallel_edges(
+    candidates: ipctk.Candidates, edges: NDArray[np.integer], first: Floats, last: Floats
+) -> ipctk.Candidates:
+    """Return the candidates without those of parallel edges that cannot meet between positions `first` and `last`.
+
+    Positions are (p, 3). Parallel edges are as far apart as their ends, and cannot meet if their vertices move less
+    than half of that, apart from their mean displacement.
+    """
+    pairs = candidates.ee_candidates
+    are_parallel = parallel_edges(pairs, edges, first)
+    kept = []
+    for pair, is_parallel in zip(pairs, are_parallel, strict=True):
+        vertices = np.array([*edges[pair.edge0_id], *edges[pair.edge1_id]])
+        if not is_parallel or can_meet(first[vertices], last[vertices]):
+            kept.append(pair)
+    result = ipctk.Candidates()
+    result.vv_candidates = candidates.vv_candidates
+    result.ev_candidates = candidates.ev_candidates
+    result.ee_candidates = kept
+    result.fv_candidates = candidates.fv_candidates
+    return result
+
+
+def parallel_edges(pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats) -> NDArray[np.bool_]:
+    """Return for each pair whether its two edges (e, 2) are parallel at (p, 3) positions of their vertices."""
+    numbers = np.array([(pair.edge0_id, pair.edge1_id) for pair in pairs], dtype=np.int64).reshape(-1, 2)
+    directions = positions[edges[:, 1]] - positions[edges[:, 0]]
+    first, second = directions[numbers[:, 0]], directions[numbers[:, 1]]
+    lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    return np.asarray(np.linalg.norm(np.cross(first, second), axis=1) < PARALLEL_TOL * lengths)
+
+
+def can_meet(first: Floats, last: Floats) -> bool:
+    """Return whether two parallel edges may meet, from (4, 3) places of their ends before and after a motion."""
+    distances = [
+        ipctk.point_edge_distance(first[0], first[2], first[3]),
+        ipctk.point_edge_distance(first[1], first[2], first[3]),
+        ipctk.point_edge_distance(first[2], first[0], first[1]),
+        ipctk.point_edge_distance(first[3], first[0], first[1]),
+    ]
+    displacement = last - first
+    motion = np.linalg.norm(displacement - displacement.mean(axis=0), axis=1).max()
+    # distances of ipctk are squared
+    return bool(2 * motion >= np.sqrt(min(distances)))

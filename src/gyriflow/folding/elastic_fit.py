@@ -22,8 +22,9 @@ from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
-from ..geometry.jacobians import EDGES, SLOPES, inverted_on_the_way, lower_bounds
+from ..geometry.jacobians import SLOPES, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
+from ..geometry.straightening import straightened
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
@@ -60,8 +61,6 @@ UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 an observed brain), and the distance from these, as a multiple of them."""
 MIN_VOLUME_ON_WAY = 0.2
 """Fraction of an element's volume that it should keep on the way from one shape to the next."""
-STRAIGHTENING_ROUNDS = 4
-"""Rounds that move nodes on the edges of invalid curved elements halfway, at last fully, to the middle."""
 MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
@@ -295,15 +294,7 @@ class ElasticFit:
         """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""
         if self._tets is self._pieces:
             return
-        places = self.positions_mm.copy()
-        for left in reversed(range(STRAIGHTENING_ROUNDS)):
-            bad = lower_bounds(places, self._tets) <= 0
-            if not bad.any():
-                self.positions_mm = places
-                return
-            middles, ends = self._tets[bad][:, 4:], self._tets[bad][:, EDGES]
-            straight = places[ends].mean(axis=2)
-            places[middles] = straight if left == 0 else (straight + places[middles]) / 2
+        places = straightened(self.positions_mm, self._tets)
         bad = lower_bounds(places, self._tets) <= 0
         if bad.any() or (volumes_between(places, self._pieces) <= 0).any():
             raise SolverError(

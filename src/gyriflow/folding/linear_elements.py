@@ -9,7 +9,7 @@ from scipy import sparse
 
 from ..geometry.triangles import Floats
 from ..mechanics.materials import Material, energy_code
-from .compilation import compiled
+from .compilation import compiled, pointer
 from .domain import Domain
 
 DECLARATION = """double assemble(long count, double bulk_to_shear, void *cells, void *X, void *u, void *H,
@@ -43,6 +43,23 @@ class LinearElements:
             # blocks below the diagonal are needed only if one of their nodes is a ghost
             needed = (columns >= rows) | (columns >= self._domain.n_owned) | (rows >= self._domain.n_owned)
             self._places = np.where(needed, places[rows, columns], -1)
-        arrays = cells, nodes, u, self.H, self.weight, forces, self._places, None if matrix is None else matrix.data
-        pointers = [self._interface.NULL if x is None else self._interface.from_buffer(x) for x in arrays]
-        return float(self._code.assemble(len(cells), self._bulk_to_shear, *pointers))
+        count, numbers = len(cells), nodes.size
+        arguments: list[tuple[NDArray, type, int] | None] = [
+            (cells, np.int32, 4 * count),
+            (nodes, np.float64, numbers),
+            (u, np.float64, numbers),
+            (self.H, np.float64, 9 * count),
+            (self.weight, np.float64, count),
+            None if forces is None else (forces, np.float64, numbers),
+        ]
+        if matrix is None or self._places is None:
+            arguments += [None, None]
+        else:
+            arguments += [
+                (self._places, np.int32, 16 * count),
+                (matrix.data, np.float64, 9 * len(matrix.indices)),
+            ]
+        pointers = []
+        for argument in arguments:
+            pointers.append(self._interface.NULL if argument is None else pointer(self._interface, *argument))
+        return float(self._code.assemble(count, self._bulk_to_shear, *pointers))

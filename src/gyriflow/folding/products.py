@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..geometry.triangles import Floats, Ints
-from .compilation import compiled
+from .compilation import compiled, pointer
 
 DECLARATION = """void to_single_blocks(long count, void *entries, void *values, void *blocks);
                  void to_single_vectors(long count, void *x, void *single);
@@ -29,9 +29,13 @@ def _library() -> tuple[Any, Any]:
     return compiled(MPI.COMM_SELF, DECLARATION, Path(__file__).with_suffix(".c").read_text())
 
 
-def _call(function: str, count: int, *arrays: NDArray) -> None:
+def _call(function: str, count: int, *arrays: tuple[NDArray, type, int], written: NDArray) -> None:
+    """Call a function with arrays, the type of each and the least number of its values; one of them is `written`."""
     interface, code = _library()
-    getattr(code, function)(count, *map(interface.from_buffer, arrays))
+    pointers = []
+    for array, dtype, size in arrays:
+        pointers.append(pointer(interface, array, dtype, size, is_written=array is written))
+    getattr(code, function)(count, *pointers)
 
 
 class SymmetricProducts:
@@ -52,13 +56,38 @@ class SymmetricProducts:
 
     def take(self, values: Floats, entries: NDArray[np.int32]) -> None:
         """Set the blocks to the given (b,) entries of (·, 3, 3) values."""
-        _call("to_single_blocks", len(entries), entries, values, self._blocks)
+        count = len(entries)
+        _call(
+            "to_single_blocks",
+            count,
+            (entries, np.int32, count),
+            (values, np.float64, 9 * count),
+            (self._blocks, np.float32, 9 * count + 1),
+            written=self._blocks,
+        )
 
     def multiply(self, x: Floats, y: Floats) -> None:
         """Set y (3 · n_owned,) to the product with x, both owned components."""
-        _call("to_single_vectors", self._owned, x, self._x.array)
+        owned, ghosted = self._owned, self._x.array
+        _call(
+            "to_single_vectors",
+            owned,
+            (x, np.float64, 3 * owned),
+            (ghosted, np.float32, 4 * owned),
+            written=ghosted,
+        )
         self._x.scatter_forward()
-        _call("multiply", self._owned, self._ends, self._columns, self._blocks, self._x.array, self._sums, y)
+        _call(
+            "multiply",
+            owned,
+            (self._ends, np.int32, owned + 1),
+            (self._columns, np.int32, 0),
+            (self._blocks, np.float32, 9 * len(self._columns) + 1),
+            (ghosted, np.float32, 4 * owned),
+            (self._sums, np.float32, 4 * owned),
+            (y, np.float64, 3 * owned),
+            written=y,
+        )
 
 
 class PartMotions:
@@ -70,14 +99,40 @@ class PartMotions:
     def restrict(self, x: Floats, parts: int) -> Floats:
         """Return the forces and torques (6 · parts,) on the parts from the forces (3 · k,) on the nodes."""
         loads = np.zeros(6 * parts)
-        _call("restrict_to_parts", len(self._part), self._part, self._arms, x, loads)
+        count = len(self._part)
+        _call(
+            "restrict_to_parts",
+            count,
+            (self._part, np.int32, count),
+            (self._arms, np.float32, 3 * count),
+            (x, np.float64, 3 * count),
+            (loads, np.float64, 6 * parts),
+            written=loads,
+        )
         return loads
 
     def add(self, motions: Floats, y: Floats) -> None:
         """Add translations and rotations (6 · parts,) of the parts to the displacements (3 · k,) of the nodes."""
-        _call("add_motions", len(self._part), self._part, self._arms, motions, y)
+        count = len(self._part)
+        _call(
+            "add_motions",
+            count,
+            (self._part, np.int32, count),
+            (self._arms, np.float32, 3 * count),
+            (motions, np.float64, 0),
+            (y, np.float64, 3 * count),
+            written=y,
+        )
 
 
 def multiply_blocks(blocks: NDArray[np.float32], x: Floats, y: Floats) -> None:
     """Set y (3 · k,) to the products of (k, 3, 3) blocks with x."""
-    _call("multiply_blocks", len(blocks), blocks, x, y)
+    count = len(blocks)
+    _call(
+        "multiply_blocks",
+        count,
+        (blocks, np.float32, 9 * count),
+        (x, np.float64, 3 * count),
+        (y, np.float64, 3 * count),
+        written=y,
+    )

@@ -9,12 +9,13 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import SolverError
-from ..geometry.jacobians import EDGES
-from ..geometry.tetrahedra import TetrahedralMesh
+from ..geometry.jacobians import EDGES, lower_bounds
+from ..geometry.straightening import straightened
+from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.terms import ELEMENTS_NEEDED
+from ..settings.terms import ELEMENTS_NEEDED, is_too_coarse
 from ..settings.varying import Maps, value_at, value_range
 from ..settings.weeks import WEEK_RANGE
 from ..units import M_PER_MM, MM_PER_M, SECONDS_PER_GW
@@ -34,6 +35,9 @@ from .zones import Zones
 
 STEPS_BEFORE_DOUBLING = 4
 """Accepted steps after which a halved time step is doubled again."""
+MIN_BOUND = 0.4
+"""Least bound of the Jacobian determinant of a curved element, as a multiple of that of a straight one, above which its
+inner sides stay as they are."""
 MAX_STEP_VOLUME_RATIO = 3.0
 """Largest growth in volume by rates in one step: more is not resolved in time."""
 
@@ -87,6 +91,10 @@ class Folding:
         self.solved = SolvedStep(self.problem.rest(), p.step_s, self.model(StepStart(mesh.vertices, 0.0, p.step_s)))
         self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
         self._pial = np.unique(zones.cortex_facets)
+        # with stress memory, or growth that is recorded by element, tissue must stay in its element
+        self._has_free_nodes = mesh.order == 2 and not p.keeps_stretch and not p.targets
+        self._is_on_surface = np.zeros(len(mesh.vertices), dtype=bool)
+        self._is_on_surface[boundary_faces(mesh)[0]] = True
 
     def step(self, state: State, step_s: float) -> State:
         """Return the state after a step of a given length, with a new row of the step table.
@@ -121,8 +129,22 @@ class Folding:
         self.solved = SolvedStep(u, step_s, growth)
         grown = self.grown(state, growth)
         after = state.after(displacement, step_s, row, stretch, growth.correction(size), grown)
+        if self._has_free_nodes:
+            after = replace(after, positions=self.with_straight_sides(after.positions))
         row["seconds"] = time.monotonic() - began
         return after
+
+    def with_straight_sides(self, positions: Floats) -> Floats:
+        """Return (n, 3) positions in m with straight inner sides of elements that are about to fold over.
+
+        Nothing pulls the inner nodes of tissue without stress back, so that sides bow until a corner of their element
+        turns over. The surface stays as it is. Where a straight side would invert an element, all sides stay.
+        """
+        tets = self.inputs.mesh.tets
+        straight = straightened(positions, tets, MIN_BOUND, self._is_on_surface)
+        is_valid = bool((lower_bounds(straight, tets) > 0).all())
+        # from rank 0, since other processors may round differently
+        return self.domain.comm.bcast(straight if is_valid else positions, root=0)
 
     def begin(self, state: State, step_s: float) -> tuple[Tissue, StepGrowth]:
         """Set up the problem of a step; return its tissue, with the parameters at mid-step, and its growth."""
@@ -216,7 +238,8 @@ def advance(folding: Folding, state: State, until_s: float) -> State:
             state = replace(state, step_s=half, successes=0)
             continue
         if folding.domain.comm.rank == 0:
-            coarse = resolution_warning(after.rows, folding.domain.order)
+            has_layers = p.growth.definition.has_layers
+            coarse = resolution_warning(after.rows, folding.domain.order) if has_layers else ""
             for warning in filter(None, (unconverged_warning(after.rows[-1]), coarse)):
                 warn(warning)
         if after.successes >= STEPS_BEFORE_DOUBLING and after.step_s < p.step_s:
@@ -238,12 +261,9 @@ def elements_through(domain: Domain, distance: Floats, thickness: float) -> floa
 
 def resolution_warning(rows: Sequence[dict], order: int) -> str:
     """Return a warning at the first step with too few elements through the cortex, else an empty text."""
-    # NaN: no element has its centre in the cortex
-    through = [
-        0.0 if math.isnan(row["elements_through_cortex"]) else row["elements_through_cortex"] for row in rows[-2:]
-    ]
-    current, before = through[-1], through[0] if len(through) > 1 else math.inf
-    if not current < ELEMENTS_NEEDED[order] <= before:
+    coarse = [is_too_coarse(order, row["elements_through_cortex"]) for row in rows[-2:]]
+    was_coarse = len(rows) > 1 and coarse[0]
+    if was_coarse or not coarse[-1]:
         return ""
     start = f"from GW {rows[-1]['week']:.2f} on" if len(rows) > 1 else "from the start on"
     return (

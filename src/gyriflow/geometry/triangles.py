@@ -121,9 +121,14 @@ def mean_edge_length(mesh: TriangleMesh) -> float:
     return mean_length(mesh.vertices, edges(mesh)[0])
 
 
+def edge_lengths(vertices: Floats, pairs: NDArray[np.integer]) -> Floats:
+    """Return the (e,) lengths of edges given as (e, 2) vertex indices, in the vertices' unit."""
+    return np.asarray(np.linalg.norm(vertices[pairs[:, 1]] - vertices[pairs[:, 0]], axis=1))
+
+
 def mean_length(vertices: Floats, pairs: NDArray[np.integer]) -> float:
     """Return the mean length of edges given as (e, 2) vertex indices, in the vertices' unit."""
-    return float(np.linalg.norm(np.diff(vertices[pairs], axis=1), axis=-1).mean())
+    return float(edge_lengths(vertices, pairs).mean())
 
 
 def is_closed(mesh: TriangleMesh) -> bool:

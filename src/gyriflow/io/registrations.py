@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,7 +51,7 @@ class WeeklyShapes:
     `positions` (w, n, 3) are in mm, in any pose; `sizes` ("area_cm2", "volume_ml": (w,)) those of the boundary;
     `surfaces` by name w arrays (m, 3), in mm, of simpler predictions of it. `ages` is the table of an atlas' ages by
     size, if used. `stops` are weeks without an observed brain, `between` those on the path through the others. `tets`
-    are the elements of a mesh without a file.
+    are the elements of a mesh without a file. `made_from` stands for everything that an atlas' path is made from.
     """
 
     weeks: Floats
@@ -61,6 +62,7 @@ class WeeklyShapes:
     stops: Sequence[float] = ()
     between: Sequence[float] = ()
     tets: NDArray[np.int64] | None = None
+    made_from: str = ""
 
     @property
     def passed(self) -> NDArray[np.integer]:
@@ -79,7 +81,10 @@ class WeeklyShapes:
 
 
 def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
-    """Write the data sets weeks, stops, between, positions, tets, sizes/{name}, surfaces/{name} and ages/{column}."""
+    """Write the data sets weeks, stops, between, positions, tets, sizes/{name}, surfaces/{name} and ages/{column}.
+
+    `made_from` is an attribute of the file.
+    """
     with new_hdf5(path) as file:
         for name, weeks in {"weeks": shapes.weeks, "stops": shapes.stops, "between": shapes.between}.items():
             file[name] = np.asarray(weeks, dtype=np.float64)
@@ -93,6 +98,7 @@ def write_weekly_shapes(path: AnyPath, shapes: WeeklyShapes) -> None:
         if shapes.ages is not None:
             for column in shapes.ages:
                 file[f"ages/{column}"] = shapes.ages[column].to_numpy(dtype=np.float64)
+        file.attrs["made_from"] = shapes.made_from
 
 
 def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
@@ -105,4 +111,17 @@ def read_weekly_shapes(path: AnyPath) -> WeeklyShapes:
         positions = file["positions"][:].astype(np.float64)
         stops, between = (file[name][:].tolist() for name in ("stops", "between"))
         tets = file["tets"][:] if "tets" in file else None
-        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, stops, between, tets)
+        made_from = file.attrs["made_from"]
+        return WeeklyShapes(file["weeks"][:], positions, sizes, surfaces, ages, stops, between, tets, made_from)
+
+
+def stored_name(brain: str, key: str) -> str:
+    """Return the file name under which studies find the path of an atlas, of a first brain and with a key."""
+    return f"{brain}-{key}.h5"
+
+
+def read_path_key(path: AnyPath) -> str | None:
+    """Return `made_from` of weekly shapes without reading these; None for other or damaged files."""
+    with suppress(InputError), reading_hdf5(path, "shapes of a mesh by week", "an HDF5 file") as file:
+        return file.attrs["made_from"]
+    return None

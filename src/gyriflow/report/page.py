@@ -16,7 +16,16 @@ from markupsafe import Markup
 from ..formats import ALL_SUFFIXES
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.growth import GROWTH_MODELS
-from ..settings.terms import ELEMENTS_NEEDED, LARGE_ELEMENT_ERROR, MEASURED, SPREAD_UNKNOWN, element_error, run_names
+from ..settings.terms import (
+    ELEMENTS_NEEDED,
+    LARGE_ELEMENT_ERROR,
+    MEASURED,
+    SPREAD_UNKNOWN,
+    element_error,
+    is_too_coarse,
+    rounded_elements,
+    run_names,
+)
 from .labels import metric_title, plain, week_label
 from .tables import VERDICTS, accuracy_table, brain_table, centile_text, html_table, predicted_table, range_text
 
@@ -256,8 +265,9 @@ def brain_rows(
 def scores_table(runs: pd.DataFrame, validation: pd.DataFrame | None = None) -> pd.DataFrame:
     """Return a row for each run: how it ended, and its scores at the last week with an observed brain.
 
-    `runs` has the columns run, subject, start_week, end_week, weeks, min_J, elements_through_cortex, order,
-    least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's table.
+    `runs` has the columns run, subject, start_week, end_week, weeks, growth.model, min_J, elements_through_cortex,
+    order, least_elements_through_cortex, unresolved_from_week, initial_penetration_mm; `validation` is the study's
+    table.
     """
     names = run_names(zip(runs["run"], runs["subject"], strict=True))
     rows = []
@@ -339,19 +349,28 @@ def run_verdict(run: Mapping[str, Any] | pd.Series) -> str:
     words = [f"reached {week_label(reached)}" if reached >= end else f"ended at {week_label(reached)} of {end:g}"]
     if run["min_J"] <= 0:
         words.append("elements inverted")
-    elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
-    needed = f"{ELEMENTS_NEEDED[order]:g} needed): folds may be artefacts"
-    if not elements >= ELEMENTS_NEEDED[order]:  # not a number: no element lies in the cortex
-        words.append(f"cortex not resolved ({elements:.3g} elements through it, {needed}")
-    elif pd.notna(week):
-        down = f"down to {run['least_elements_through_cortex']:.3g} elements through it, {needed} from then on"
-        words.append(f"cortex not resolved from {week_label(round(week, 2))} on ({down}")
+    has_layers = GROWTH_MODELS[run["growth.model"]].has_layers
+    if has_layers:
+        words += _coarseness(run, order)
     if run.get("initial_penetration_mm", 0.0) > MAX_PENETRATION_MM:
         words.append(f"walls of the fissure start {run['initial_penetration_mm']:.2g} mm beyond their planes")
-    if elements > 0:
-        error, text = element_error(order, elements)
+    if has_layers and run["elements_through_cortex"] > 0:
+        error, text = element_error(order, run["elements_through_cortex"])
         words += [text] if error > LARGE_ELEMENT_ERROR else []
     return "; ".join(words)
+
+
+def _coarseness(run: Mapping[str, Any] | pd.Series, order: int) -> list[str]:
+    """Return a text if the elements of a run were too large for its cortex, at the start or later; else nothing."""
+    elements, week = run["elements_through_cortex"], run["unresolved_from_week"]
+    needed = f"{ELEMENTS_NEEDED[order]:g} needed): folds may be artefacts"
+    if is_too_coarse(order, elements):
+        return [f"cortex not resolved ({rounded_elements(elements):g} elements through it, {needed}"]
+    if pd.notna(week):
+        least = rounded_elements(run["least_elements_through_cortex"])
+        down = f"down to {least:g} elements through it, {needed} from then on"
+        return [f"cortex not resolved from {week_label(round(week, 2))} on ({down}"]
+    return []
 
 
 def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """Tables of a study, and any table as HTML."""
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +12,7 @@ from markupsafe import Markup
 
 from ..quantities import METRICS, Shown, metrics_shown
 from ..settings.stages import CostSettings
-from ..settings.terms import ELEMENTS_NEEDED, MEASURED, OBSERVED_BRAIN, SIDES, element_error
+from ..settings.terms import MEASURED, OBSERVED_BRAIN, SIDES, element_error, is_too_coarse
 from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
 from .style import run_colours, runs_by_name
 
@@ -136,21 +137,27 @@ def runs_table(parameters: Mapping[str, Mapping[str, object]]) -> pd.DataFrame:
     return texts.loc[names].rename(index=parameter_label).rename_axis("parameter")
 
 
-def resolution_over_steps(order: int, steps: pd.DataFrame) -> dict[str, float]:
+def resolution_over_steps(order: int, steps: pd.DataFrame, *, has_layers: bool) -> dict[str, float]:
     """Return how well the steps of a run with elements of an order resolved the cortex, for the table of runs.
 
     `steps` has a row per step with the columns week and elements_through_cortex: NaN if no element has its centre in
     the cortex, which counts as 0.
 
     Returns `order`, `element_error_percent` (`element_error` at the start), `least_elements_through_cortex`, and
-    `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none).
+    `unresolved_from_week`, the first week with fewer elements than `ELEMENTS_NEEDED` (NaN if there is none). Of growth
+    without layers the error and that week are NaN.
     """
     through = steps["elements_through_cortex"].fillna(0.0)
+    error, first_week = math.nan, math.nan
+    if has_layers:
+        error = round(element_error(order, through.iloc[0])[0], 1)
+        too_coarse = [is_too_coarse(order, elements) for elements in through]
+        first_week = float(steps.loc[too_coarse, "week"].min())
     return {
         "order": order,
-        "element_error_percent": round(element_error(order, through.iloc[0])[0], 1),
+        "element_error_percent": error,
         "least_elements_through_cortex": float(through.min()),
-        "unresolved_from_week": float(steps.loc[through < ELEMENTS_NEEDED[order], "week"].min()),
+        "unresolved_from_week": first_week,
     }
 
 
@@ -158,7 +165,7 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
     A job keeps at least one core busy, so its energy is the longer of wall and CPU time times the power of a core.
-    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if Snakemake could not measure; such jobs are
+    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown; such jobs are
     counted, and add nothing to the sums.
 
     Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh, co2e_g.

@@ -1,4 +1,4 @@
-"""Read what jobs wrote: messages in logs, progress of simulations, Snakemake's benchmark files."""
+"""Read what jobs wrote: messages in logs, progress of simulations, time and memory of steps."""
 
 import json
 import logging
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from ..io.files import AnyPath
+from ..step import USAGE_COLUMNS
 
 NEXT = r"(?!\d{4}-\d\d-\d\d |warning: |gyriflow: )"
 """Lookahead: the line does not begin another message."""
@@ -114,37 +115,28 @@ def gather_messages(
     return pd.DataFrame(rows, columns=["subject", "run", "step", "level", "message"])
 
 
-BENCHMARK_COLUMNS = {"s": "wall_s", "cpu_time": "cpu_s", "max_rss": "memory_MiB"}
-"""Our column names, by those in Snakemake's files. Their megabyte is 2²⁰ bytes."""
+def read_usage(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
+    """Return time and memory of jobs as their steps have recorded them, in the order of the rules.
 
-
-def read_benchmarks(folder: AnyPath, patterns: Mapping[str, str]) -> pd.DataFrame:
-    """Return time and memory of jobs as measured by Snakemake, in the order of the rules.
-
-    `patterns` are regular expressions for the paths of each rule's benchmark files, with the groups `run` and `brain`
-    (None if not applicable). Values are NaN if Snakemake could not measure them or the file is incomplete.
+    `patterns` are regular expressions for the paths of each rule's records, with the groups `run` and `brain` (None if
+    not applicable). Values are NaN if a record is incomplete.
     """
     folder = Path(folder)
-    benchmarks = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))
+    paths = sorted(path.relative_to(folder).as_posix() for path in folder.glob("results/**/benchmarks/*.tsv"))
     rows = []
     for rule, pattern in patterns.items():
-        for path in benchmarks:
+        for path in paths:
             if match := re.fullmatch(pattern, path):
                 wildcards = {name: match.groupdict().get(name) for name in ("run", "brain")}
-                rows.append({"rule": rule, **wildcards, **_read_benchmark(folder / path)})
-    return pd.DataFrame(rows, columns=["rule", "run", "brain", *BENCHMARK_COLUMNS.values()])
+                rows.append({"rule": rule, **wildcards, **_read_record(folder / path)})
+    return pd.DataFrame(rows, columns=["rule", "run", "brain", *USAGE_COLUMNS])
 
 
-def _read_benchmark(path: Path) -> dict[str, float]:
+def _read_record(path: Path) -> dict[str, float]:
     try:
         table = pd.read_csv(path, sep="\t", dtype=str)
     except (OSError, ValueError) as error:
         logging.warning("%s cannot be read: %s", path, error)
         table = pd.DataFrame()
-    numbers = table.reindex(columns=list(BENCHMARK_COLUMNS)).apply(pd.to_numeric, errors="coerce")
-    # a repeated job has several lines
-    return {
-        "wall_s": numbers["s"].sum(min_count=1),
-        "cpu_s": numbers["cpu_time"].sum(min_count=1),
-        "memory_MiB": numbers["max_rss"].max(),
-    }
+    numbers = table.reindex(columns=list(USAGE_COLUMNS), index=[0]).apply(pd.to_numeric, errors="coerce")
+    return numbers.loc[0].to_dict()

@@ -1,36 +1,91 @@
-"""Storage of an atlas' path for other studies: next to the atlas' files, named by everything it depends on."""
+"""Storage of atlases' paths for other studies: next to an atlas' files, named by all that a path is made from."""
 
 import hashlib
-import json
-from collections.abc import Mapping
+import re
 from pathlib import Path
+from typing import Any
 
 from ..code_hash import code_hash
-from ..settings.stages import MeshSettings
+from ..errors import InputError
+from ..io.registrations import read_path_key, read_weekly_shapes, stored_name
 from ..shipped import SHIPPED
+from ..study.paths import ATLAS_PATH
+from ..study.records import Brain
 from ..study.series import Chain
 from ..study.study import Study
 
-PATH_MESH_SETTINGS = MeshSettings(
-    order=1, mesher="tetgen", surface_edge_mm=0.95, core_edge_mm=3.0, max_surface_distance_mm=0.5
-)
-"""The mesh of an atlas' path, the same in all studies: finer ones cost more and carry brains to the same shapes."""
-SCRIPTS = ("pial", "register", "match_surfaces", "tetrahedralise", "targets")
-"""The scripts that a path is made by."""
+RULE_FILES = ("surface", "registration", "mesh")
+"""The files with the rules that a path is made by."""
+SCRIPT = re.compile(r"scripts/(\w+\.py)")
 
 
-def path_store(study: Study, path: Chain, contents: Mapping[str, str]) -> Path | None:
-    """Return the file of a path in the folder of the atlas' files; None for other brains.
+def path_origin(study: Study, path: Chain) -> dict[str, Any]:
+    """Return everything that a path is made from, with the paths of files (see `io.origins`).
 
-    Its name has a hash of the contents of the files of all its brains, of the settings of their surfaces, and of the
-    code. `contents` are hashes by path (`provenance.input_contents`).
+    This is the description of each of its brains and of each brain whose thickness fills one of them, with all files
+    that they name; the settings of surfaces and of the mesh; and a hash of the rules and scripts.
     """
-    config, first = study.config, path.brains[0].id
+    brains = [*path.brains, *_thickness_sources(study, path)]
+    return {
+        "brains": [_description(brain) for brain in brains],
+        # by matched vertices or by registration
+        "correspondences": path.correspondences,
+        "surface": study.config.surface.model_dump(mode="json"),
+        "mesh": study.config.growth.path_mesh.model_dump(mode="json"),
+        "code": _code(),
+    }
+
+
+def _thickness_sources(study: Study, path: Chain) -> list[Brain]:
+    """Return the brains whose measured thickness fills the surfaces of a path's brains to labels."""
+    sources: dict[str, Brain] = {}
+    for pair, posed in path.pairs:
+        for brain, is_filled in zip(pair, posed, strict=True):
+            source = study.similar_in_thickness(brain) if is_filled else None
+            if source is not None:
+                sources[source.id] = source
+    return list(sources.values())
+
+
+def _description(brain: Brain) -> dict[str, Any]:
+    """Return everything that a study says of a brain, with the meaning of its labels."""
+    scheme = brain.labels.scheme.model_dump(mode="json") if brain.labels else None
+    return {"brain": brain.config.model_dump(mode="json"), "scheme": scheme}
+
+
+def _code() -> str:
+    """Return a hash of the rules and scripts that make paths, and of the code behind the scripts."""
+    workflow = SHIPPED / "workflow"
+    rules = [(workflow / "rules" / f"{name}.smk").read_text() for name in RULE_FILES]
+    scripts = [workflow / "scripts" / name for name in sorted(set(SCRIPT.findall("".join(rules))))]
+    texts = [*rules, *(script.read_text() for script in scripts), *map(code_hash, scripts)]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()
+
+
+def store_folder(study: Study, path: Chain) -> Path | None:
+    """Return the folder for a path of an atlas, next to the files of the atlas; None for other brains."""
     if not all(brain.id in study.atlases for brain in path.brains):
         return None
-    folder = next(used.folder for used in study.used_atlases if used.atlas is study.atlases[first])
-    files = [[contents[file] for file in brain.config.files] for brain in path.brains]
-    code = [code_hash(SHIPPED / "workflow" / "scripts" / f"{name}.py") for name in SCRIPTS]
-    settings = [config.surface.model_dump(mode="json"), PATH_MESH_SETTINGS.model_dump(mode="json"), path.weeks]
-    key = hashlib.sha256(json.dumps([files, settings, config.growth.matched_surfaces, code]).encode()).hexdigest()[:12]
-    return folder / "paths" / f"{first}-{key}.h5"
+    atlas = study.atlases[path.brains[0].id]
+    return next(used.folder for used in study.used_atlases if used.atlas is atlas) / "paths"
+
+
+def kept_path(study: Study, path: Chain, key: str | None) -> Path | None:
+    """Return the file with the path that an earlier study kept; None if there is none, or if it is damaged."""
+    folder = store_folder(study, path)
+    if folder is None or key is None:
+        return None
+    store = folder / stored_name(path.brains[0].id, key)
+    if not store.exists():
+        return None
+    try:
+        shapes = read_weekly_shapes(store)
+    except InputError:
+        return None
+    return store if shapes.made_from == key else None
+
+
+def has_path(path: Chain, key: str | None) -> bool:
+    """Return whether the study in the working directory has a path that was made from all that `key` stands for."""
+    file = Path(ATLAS_PATH.format(brain=path.brains[0].id))
+    return key is not None and file.exists() and read_path_key(file) == key

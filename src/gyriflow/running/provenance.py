@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..io.files import contents, read_json, write_json
+from ..io.origins import joined_contents
 from ..settings.root import Config
 from ..version import commit, version
 
@@ -96,14 +97,9 @@ def input_contents(
     if record and files != recorded:
         write_json(path, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
-    return expected | _with_companions(files), _with_companions(recorded)
+    return expected | joined_contents(files), joined_contents(recorded)
 
 
 def folders_in(config: Config) -> list[str]:
     """Return the absolute paths of the folders that a configuration names."""
     return [text for text in texts_in(config.model_dump()) if len(text) > 1 and text[0] == "/" and Path(text).is_dir()]
-
-
-def _with_companions(files: Mapping[str, Any]) -> dict[str, str]:
-    groups = {name: [path for path in dict.fromkeys([name, *files[name][-1]]) if path in files] for name in files}
-    return {name: " ".join(files[path][0] for path in group) for name, group in groups.items()}

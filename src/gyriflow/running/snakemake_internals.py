@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 from unittest.mock import patch
 
 from ..code_hash import code_hash
-from ..io.files import files_below, sha256_of
+from ..io.files import contents as file_contents
+from ..io.files import files_below
+from ..io.origins import joined_contents
 from ..shipped import SHIPPED
 from ..study.paths import log_of
 
@@ -38,7 +40,7 @@ def rerun_on_code_changes(rules: Iterable[Any], scripts: Path) -> None:
 
 
 def complete_rules(rules: Iterable[Any], environment: str) -> None:
-    """Give rules a log (see `log_of`), and rules that name no environment the common one and a benchmark file.
+    """Give rules a log (see `log_of`), and rules that name no environment the common one.
 
     For Snakemake's software deployment with conda, `environment` is the path of the environment's file.
     """
@@ -51,16 +53,18 @@ def complete_rules(rules: Iterable[Any], environment: str) -> None:
             rule.log_modifier = rule.output_modifier
             rule.set_log(log_of(rule.name, strip_wildcard_constraints(rule.output[0])))
         if runs and not rule.conda_env:
-            rule.conda_env, rule.benchmark_modifier = environment, rule.log_modifier
-            rule.benchmark = rule.log[0].replace("/logs/", "/benchmarks/").removesuffix(".log") + ".tsv"
+            rule.conda_env = environment
 
 
-def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str], folders: Collection[str]) -> None:
+def know_inputs_by_content(
+    contents: Mapping[str, str], earlier: Collection[str], folders: Collection[str], awaited: Collection[str] = ()
+) -> None:
     """Have Snakemake record the content of input files instead of their paths, so that they may be moved.
 
     Files of gyriflow and of a user count as changed if their content has, whatever their date. Dates of results mean
     nothing in a copy of a study. `contents` are hashes of the study's input files by path, `earlier` those of the last
-    run; the place of `folders` is not recorded, like that of the working directory and of gyriflow.
+    run; the place of `folders` is not recorded, like that of the working directory and of gyriflow. Of `awaited` files,
+    which jobs of this run fetch, the content is known once they are there.
     """
     from snakemake.io import _IOFile
     from snakemake.persistence import PersistenceBase
@@ -70,16 +74,27 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
     names |= dict.fromkeys([*folders, str(Path.cwd()), str(SHIPPED)], "a folder")
     # as parameters are written
     names |= {repr(path)[1:-1]: name for path, name in names.items()}
-    longest_first = sorted(names, key=len, reverse=True)
+    awaited_by_text = {text: path for path in awaited for text in (path, repr(path)[1:-1])}
+    longest_first = sorted([*names, *awaited_by_text], key=len, reverse=True)
     has_dates = not dates_before_copy(Path())
     places = re.compile(rf"(?<![\w./-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w.-])")
 
     @cache
+    def present_content(path: str) -> str:
+        return joined_contents(file_contents([path], {}))[path]
+
     def content_of(path: str) -> str | None:
         if path in contents:
             return contents[path]
-        # files of gyriflow itself
-        return sha256_of(path) if path.startswith("/") and Path(path).is_file() else None
+        # files of gyriflow itself, and files that were fetched
+        return present_content(path) if path.startswith("/") and Path(path).is_file() else None
+
+    def name_of(match: re.Match[str]) -> str:
+        text = match[0]
+        path = awaited_by_text.get(text)
+        if path is None:
+            return names[text]
+        return f"input {content}" if (content := content_of(path)) else text
 
     def by_content(self: PersistenceBase, job: Any) -> list[str]:
         return sorted(
@@ -87,7 +102,7 @@ def know_inputs_by_content(contents: Mapping[str, str], earlier: Collection[str]
         )
 
     def without_places(self: PersistenceBase, job: Any) -> list[str]:
-        return sorted(places.sub(lambda match: names[match[0]], text) for text in recorded_params(self, job))
+        return sorted(places.sub(name_of, text) for text in recorded_params(self, job))
 
     async def is_newer_or_other(self: Any, time: float) -> bool:
         content, is_known = content_of(str(self)), str(self) in contents
@@ -172,6 +187,14 @@ def _made_files(directory: Path) -> Iterator[_MadeFile]:
                 yield _MadeFile(path, record, date_s)
 
 
-def benchmark_patterns(rules: Iterable[Any]) -> dict[str, str]:
-    """Return the regular expression of the benchmark files of each rule that has any, with wildcards as groups."""
-    return {rule.name: rule.benchmark.regex().pattern for rule in rules if rule.benchmark}
+def usage_patterns(rules: Iterable[Any]) -> dict[str, str]:
+    """Return the regular expression of the records of time and memory of each rule, with wildcards as groups.
+
+    They are named like the rule's log (see `step.record_usage`).
+    """
+    patterns = {}
+    for rule in rules:
+        if rule.log:
+            log = rule.log[0].regex().pattern
+            patterns[rule.name] = log.replace("/logs/", "/benchmarks/").replace(r"\.log", r"\.tsv")
+    return patterns

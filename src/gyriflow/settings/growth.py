@@ -36,6 +36,8 @@ class GrowthModel:
     sentence
         Returns its sentence of the methods text for a run (with `parameters` and `growth_of`), given how numbers are
         written.
+    has_layers
+        Whether cortex and core grow at rates of their own, so that folds depend on the elements through the cortex.
     """
 
     keys: tuple[str, ...]
@@ -43,6 +45,7 @@ class GrowthModel:
     measured: Literal["sizes", "shapes"] | None
     sentence: Callable[[Mapping[str, Any], Callable[[Any], str]], str]
     resolved: tuple[str, ...] = ()
+    has_layers: bool = True
 
 
 def _rates_sentence(run: Mapping[str, Any], number: Callable[[Any], str]) -> str:
@@ -83,7 +86,12 @@ GROWTH_MODELS: dict[ModelName, GrowthModel] = {
         keys=("thickness_mm", *SIZES), rates=("radial_growth_rate_per_s",), measured="sizes", sentence=_sizes_sentence
     ),
     "shapes": GrowthModel(
-        keys=("of", "thickness_mm"), rates=(), measured="shapes", sentence=_shapes_sentence, resolved=SIZES
+        keys=("of", "thickness_mm"),
+        rates=(),
+        measured="shapes",
+        sentence=_shapes_sentence,
+        resolved=SIZES,
+        has_layers=False,
     ),
 }
 BEFORE_GW = 1.0

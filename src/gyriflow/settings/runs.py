@@ -11,6 +11,7 @@ from .brains import BrainConfig
 from .ensemble import Variation
 from .folding import VARYING, FoldingSettings
 from .growth import SIZES
+from .stages import MeshSettings
 from .terms import MAX_NAME_LENGTH, SCORES, Score
 from .weeks import EndWeek
 
@@ -144,6 +145,21 @@ class GrowthSettings(Settings):
     matched_surfaces: bool = True
     """Whether surfaces of a series with the same triangles correspond vertex by vertex, so that no registration is
     needed."""
+    path_edge_mm: float = Field(0.95, ge=0.5, le=5)
+    """Distance between neighbouring nodes in the cortex of the mesh that an atlas' first brain is carried by through
+    all its weeks, for growth of an atlas. [mm]"""
+
+    @property
+    def path_mesh(self) -> MeshSettings:
+        """The mesh for the path of an atlas."""
+        edge_mm = self.path_edge_mm
+        return MeshSettings(
+            order=1,
+            mesher="tetgen",
+            surface_edge_mm=edge_mm,
+            core_edge_mm=round(3.16 * edge_mm, 2),
+            max_surface_distance_mm=round(0.53 * edge_mm, 2),
+        )
 
 
 def growth_series(

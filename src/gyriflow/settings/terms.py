@@ -54,7 +54,8 @@ ELEMENTS_NEEDED = {1: 2.0, 2: 0.8}
 """Minimum number of elements through the cortex, by element order: thickness over the mean edge length there. With
 fewer, folds may depend on the mesh. The value for quadratic elements comes from docs/verification.md (Convergence on a
 brain): two node distances through the thickness at the surface are enough, and that mesh has a count of 0.81 at its
-start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious."""
+start. The count falls as the brain grows (0.49 at 28 GW), so warnings about later weeks are cautious. Runs whose growth
+has no layers (`GrowthModel.has_layers`) need none."""
 ELEMENT_ERRORS = {1: {2.0: 32.2, 4.0: 13.3, 8.0: 4.5}, 2: {1.0: 4.3, 2.0: 0.9}}
 """How much too slowly the fastest wave grows (%), by element order and cells per thickness of a uniform slab
 (docs/verification.md, Elements). The slab's mean edge is 1.26 cells, so for as many elements these are upper bounds."""
@@ -129,15 +130,26 @@ STIFFNESS_RATIO = "stiffness_ratio"
 """The parameter that sets the shear modulus of the cortex to a multiple of that of the core."""
 
 
+def rounded_elements(elements: float) -> float:
+    """Return a number of elements through the cortex to two digits, as texts show it and verdicts judge it."""
+    return float(f"{elements:.2g}")
+
+
+def is_too_coarse(order: int, elements: float) -> bool:
+    """Return whether fewer elements lie through the cortex than are needed; NaN: no element lies in it at all."""
+    return not rounded_elements(elements) >= ELEMENTS_NEEDED[order]
+
+
 def element_error(order: int, elements: float) -> tuple[float, str]:
     """Return the error of the fastest wave in % for a number of elements through the cortex, and text with both."""
     errors = ELEMENT_ERRORS[order]
     error = float(np.exp(np.interp(np.log(max(0.1, elements)), np.log(list(errors)), np.log(list(errors.values())))))
-    bound = "up to" if elements >= 0.99 * ELEMENTS_NEEDED[order] else "more than"
+    bound = "more than" if is_too_coarse(order, elements) else "up to"
     text = f"the fastest wave of folding grows {bound} {error:.0f} % too slowly (at Poisson's ratio 0.45)"
     if order == 1 and error > LARGE_ELEMENT_ERROR:
         text += f" (quadratic elements on as many nodes: up to {element_error(2, max(elements / 2, 1.0))[0]:.0f} %)"
-    return error, f"{elements:.1f} {'linear' if order == 1 else 'quadratic'} elements through the cortex: {text}"
+    kind = "linear" if order == 1 else "quadratic"
+    return error, f"{rounded_elements(elements):g} {kind} elements through the cortex: {text}"
 
 
 def run_names(folded: Iterable[Sequence[str]]) -> list[str]:

@@ -19,6 +19,7 @@ from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.running import launch
 from gyriflow.running.machine import available_cores
+from gyriflow.settings.runs import GrowthSettings
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
@@ -144,12 +145,21 @@ def test_a_quick_prediction_is_coarse_and_takes_files_from_where_one_stands(monk
     assert (section["atlas"]["name"], section["atlas"]["folder"]) == (str(atlas / "atlas.yaml"), str(atlas))
     study = resolve(load(section))
     assert all(Path(file).is_file() for brain in study.brains.values() for file in brain.config.files)
-    # what the cortex is resolved by, with the error of linear elements
-    (line,) = coarse_cortices(study)
-    assert "surface_edge_mm" not in line
-    assert line == Facts("linear", "mesh.order: 2")
+    # growth towards shapes is not by layers
+    assert list(coarse_cortices(study)) == []
     assert study.run_simulations[0].settings.step_s == 86400
     assert study.config.mesh.order == 1
+    # a path of the atlas has a quarter as many nodes on the surface
+    assert study.config.growth.path_edge_mm == 2 * GrowthSettings().path_edge_mm
+
+
+@pytest.mark.parametrize(("end", "weeks"), [("30", [25, 27, 29, 31]), ("34", [25, 27, 29, 31, 33, 34])])
+def test_a_quick_prediction_uses_every_other_week_up_to_its_end(predicted, tmp_path, end, weeks):
+    asked = ("--week", "25", "--until", end, "--atlas", "spina-bifida")
+    assert predicted(*asked, "--quick").exit_code == 0
+    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[0].weeks == tuple(weeks)
+    assert predicted(*asked, "--force").exit_code == 0
+    assert load(yaml.safe_load((tmp_path / "gyriflow.yaml").read_text())).atlas[0].weeks == tuple(range(25, 35))
 
 
 def test_a_dry_prediction_leaves_nothing_behind(monkeypatch, predicted, tmp_path):

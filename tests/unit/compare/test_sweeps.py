@@ -144,14 +144,24 @@ def test_comparisons_without_rows_keep_their_columns():
     assert len(joined_comparisons([empty, row, row])) == 2
 
 
-def member(run, thickness, through=2.0, diverged=None):
+def member(run, thickness, through=2.0, diverged=None, growth="rates"):
     return member_row(
         {"study": "thickness", "run": run, "subject": "a", "compare_week": 28},
         {"thickness_mm": thickness},
-        {"thickness_mm": thickness, "shear_modulus_cortex_pa": 3000, "end_week": 28},
+        {
+            "thickness_mm": thickness,
+            "shear_modulus_cortex_pa": 3000,
+            "end_week": 28,
+            "growth": {"model": growth},
+        },
         {"elements_through_cortex": through, "order": 1},
         {"diverged": diverged, "reached_week": 28 if diverged is None else 26.5, "steps": 7, "cpu_seconds": 3.0},
     )
+
+
+def test_growth_without_layers_is_resolved_by_any_mesh():
+    assert member("t", 1.0, 1.94)["resolution"] == "not resolved by the mesh"
+    assert member("t", 1.0, 1.96)["resolution"] == member("t", 1.0, 1.3, growth="shapes")["resolution"] == "ok"
 
 
 MEMBERS = pd.DataFrame([member("t1", 1.0, 1.3), member("t2", 2.0), member("t3", 3.0), member("t4", 9.0, 9, "det F")])

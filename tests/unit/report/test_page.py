@@ -44,7 +44,7 @@ RUNS = pd.DataFrame(
     {
         "run": ["thin"], "subject": ["young"], "start_week": [21.0], "preset": ["measured"], "end_week": [23.0],
         "weeks": ["[21.0, 22.0]"], "min_J": [0.9], "elements_through_cortex": [1.2], "initial_penetration_mm": [0.0],
-        "order": [1], "least_elements_through_cortex": [1.1], "unresolved_from_week": [21.5],
+        "growth.model": ["rates"], "order": [1], "least_elements_through_cortex": [1.1], "unresolved_from_week": [21.5],
     }
 )  # fmt: skip
 VALIDATION = pd.DataFrame(
@@ -308,7 +308,7 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     ("order", "through", "facts"),
     [
         (1, (8.4, 8.2), []),
-        (1, (2.0, 2.0), [["2.0 linear", "32 %", "4 %"]]),
+        (1, (2.0, 2.0), [["2 linear", "32 %", "4 %"]]),
         (2, (1.0, 1.0), []),
         (1, (1.0, 1.0), [[1, 2], ["32 %"]]),
         (2, (0.6, 0.5), [[0.6]]),
@@ -316,6 +316,7 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
         (2, (1.0, 0.9, 0.7, 0.6), [["22.5 GW", 0.6]]),
         (2, (1.0, 0.9, np.nan), [[0]]),
         (1, (np.nan, np.nan), [["nan", 2]]),
+        (1, (2.3, 1.96), [["2.3 linear"]]),
     ],
 )
 @pytest.mark.fault(84)
@@ -323,12 +324,16 @@ def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, fact
     # to its end, with so many elements before its steps of half a week and in them
     steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})
     run = {**RUNS.iloc[0].to_dict(), "weeks": "[21.0, 23.0]", "elements_through_cortex": through[0]}
-    run |= resolution_over_steps(order, steps)
+    run |= resolution_over_steps(order, steps, has_layers=True)
     reached, *doubts = run_verdict(run).split("; ")
     assert (reached, doubts) == (Facts("23 GW"), [Facts(*doubt) for doubt in facts])
     assert len(run_verdict(run | {"min_J": -0.1}).split("; ")) == 2 + len(doubts)
     assert run_verdict(run | {"initial_penetration_mm": 0.45}) == run_verdict(run)
     assert run_verdict(run | {"initial_penetration_mm": 0.55}) == Facts("0.55 mm")
+    # layers do not enter growth towards shapes
+    run |= {"growth.model": "shapes"} | resolution_over_steps(order, steps, has_layers=False)
+    assert run_verdict(run) == reached
+    assert np.isnan([run["element_error_percent"], run["unresolved_from_week"]]).all()
 
 
 def test_the_methods_say_what_was_run():

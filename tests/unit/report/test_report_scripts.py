@@ -56,7 +56,7 @@ def folder(tmp_path, monkeypatch):
         write_text(f"{brain}.nii.gz", f"voxels of {brain}")
         write_text(f"results/brains/{brain}/mesh/brain.h5", f"mesh of {brain}")
         write_text(f"{at}/folding/maps.h5", f"maps of {run}")
-        write_yaml(f"{at}/params.yaml", {"thickness_mm": 1.5 + number})
+        write_yaml(f"{at}/params.yaml", {"thickness_mm": 1.5 + number, "growth": {"model": "rates"}})
         write_json(f"{at}/folding/summary.json", {"steps": 7 + number})
         zones = {"order": 1, "clamped_share": 0.1, "initial_penetration_mm": 0.2, "elements_through_cortex": 2.5}
         write_json(f"{at}/folding/zones.json", zones)
@@ -66,7 +66,7 @@ def folder(tmp_path, monkeypatch):
             write_frame(f"{at}/{week}.h5", week, {"positions": np.vstack([np.zeros(3), np.eye(3)]) + moved})
         frames = [f"{at}/{week}.h5" for week in (22.0, 23.0)]
         join_frames(f"{at}/folding/frames.h5", np.array([[0, 1, 2, 3]]), frames)
-        write_text(f"{at}/benchmarks/simulate.tsv", f"s\tcpu_time\tmax_rss\n{3600 + 3600 * number}\t7200\t100\n")
+        write_text(f"{at}/benchmarks/simulate.tsv", f"wall_s\tcpu_s\tmemory_MiB\n{3600 + 3600 * number}\t7200\t100\n")
         write_text(f"{at}/logs/simulate.log", f"2026-01-01 10:00:00,000 WARNING root: of {run}\n")
     return tmp_path
 
@@ -161,7 +161,8 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
         assert found[1] == found[0] | {path: sha256_of(path) for path in others}
         assert read_json(outputs["study"])["inputs"][start] == alone["inputs"]
         assert (alone["configuration"], others[0] in "".join(alone["results"])) == (brain, True)
-        assert folded["configuration"] == {"run": name, "start": start, "parameters": {"thickness_mm": thickness}}
+        parameters = {"thickness_mm": thickness, "growth": {"model": "rates"}}
+        assert folded["configuration"] == {"run": name, "start": start, "parameters": parameters}
 
 
 def test_tables_tell_runs_apart(folder):

@@ -1,4 +1,4 @@
-"""What jobs leave is read, messages, causes and Snakemake's benchmarks, and on which modules their programs depend."""
+"""What jobs leave is read, messages, causes and time and memory, and on which modules their programs depend."""
 
 import os
 
@@ -8,9 +8,10 @@ from facts import Facts
 
 from gyriflow import code_hash as sources
 from gyriflow.code_hash import code_hash, modules_behind
-from gyriflow.running.jobs import OUT_OF_MEMORY, cause, gather_messages, read_benchmarks, read_messages
+from gyriflow.running.jobs import OUT_OF_MEMORY, cause, gather_messages, read_messages, read_usage
+from gyriflow.step import USAGE_COLUMNS
 
-HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time"
+HEAD = "\t".join(USAGE_COLUMNS)
 PATTERNS = {
     "pial_from_labels": r"results/brains/(?P<brain>a|b)/benchmarks/pial_from_labels\.tsv$",
     "simulate": r"results/runs/(?P<run>one|two)/(?P<brain>a)/benchmarks/simulate\.tsv$",
@@ -108,7 +109,7 @@ def write(folder, name, *lines, head=HEAD):
 
 
 def line(seconds, memory, cpu):
-    return f"{seconds}\t0:00:00\t{memory}\t1\t1\t1\t1\t1\t90.00\t{cpu}"
+    return f"{seconds}\t{cpu}\t{memory}"
 
 
 def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
@@ -118,7 +119,7 @@ def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
     # of an earlier configuration
     write(tmp_path, "brains/c/benchmarks/pial_from_labels.tsv", line(1, 1, 1))
     write(tmp_path, "runs/three/a/benchmarks/simulate.tsv", line(1, 1, 1))
-    jobs = read_benchmarks(tmp_path, PATTERNS)
+    jobs = read_usage(tmp_path, PATTERNS)
     assert jobs.fillna("").to_numpy().tolist() == [
         ["pial_from_labels", "", "a", 10.5, 9.75, 200.25],
         ["pial_from_labels", "", "b", 11.0, 10.0, 210.0],
@@ -127,12 +128,13 @@ def test_jobs_of_the_rules_are_found_with_their_runs_and_no_others(tmp_path):
 
 
 def test_what_could_not_be_measured_is_nan(tmp_path):
-    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", line(0.3, "NA", "NA"))
-    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", line("-", "-", "-"))
+    # a full disk may leave a part
+    write(tmp_path, "brains/a/benchmarks/pial_from_labels.tsv", "0.3")
+    write(tmp_path, "brains/b/benchmarks/pial_from_labels.tsv", "x")
     write(tmp_path, "runs/one/a/benchmarks/simulate.tsv", head="")
-    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0\t0:00:05", head="s\th:m:s")
+    write(tmp_path, "runs/two/a/benchmarks/simulate.tsv", "5.0", head="wall_s\tcpu")
     write(tmp_path, "study/benchmarks/run_tables.tsv")
-    jobs = read_benchmarks(tmp_path, PATTERNS)
+    jobs = read_usage(tmp_path, PATTERNS)
     assert len(jobs) == 5
     np.testing.assert_array_equal(jobs["wall_s"], [0.3, np.nan, np.nan, 5.0, np.nan])
     assert jobs[["cpu_s", "memory_MiB"]].isna().all(axis=None)

@@ -1,7 +1,9 @@
 """What gyriflow uses of Snakemake's internals, tried with the Snakemake that is installed."""
 
+import ast
 import json
 import os
+import re
 import sys
 
 import pytest
@@ -17,7 +19,7 @@ SNAKEFILE = """
 import json
 from pathlib import Path
 from gyriflow.running.snakemake_internals import (
-    benchmark_patterns, know_inputs_by_content, remove_stale, rerun_on_code_changes
+    know_inputs_by_content, remove_stale, rerun_on_code_changes, usage_patterns
 )
 
 contents = json.loads(Path("contents.json").read_text())
@@ -29,8 +31,7 @@ rule target:
 rule copy:
     input: list(contents)
     output: "made-{name}.csv"
-    log: "logs/{name}.log"
-    benchmark: "benchmarks/{name}.tsv"
+    log: "in/logs/{name}.log"
     params: files=[("of", path) for path in contents], place=f"{Path.cwd()}/here"
     wildcard_constraints: name="|".join(names)
     script: "scripts/copy.py"
@@ -53,7 +54,7 @@ rule after:
 rerun_on_code_changes(workflow.rules, Path("scripts").absolute())
 know_inputs_by_content(contents, ["content-1"], [])
 remove_stale(workflow.rules, ".")
-print(benchmark_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
+print(usage_patterns(workflow.rules), [getattr(rule.params, "code", None) for rule in workflow.rules])
 """
 SCRIPT = "import shutil\nfrom gyriflow.units import ML_PER_MM3\nshutil.copy(snakemake.input[0], snakemake.output[0])\n"
 
@@ -69,7 +70,9 @@ def study(tmp_path):
     done = snakemake(tmp_path / "study", "--config", "names=a b")
     assert done.returncode == 0, done.stderr
     assert done.stdout == Facts(str([None, code_hash(tmp_path / "study" / "scripts" / "copy.py"), "own", None, None]))
-    assert "'copy': r'benchmarks/(?P<name>" in done.stdout.replace("'benchmarks", "r'benchmarks")
+    (pattern,) = ast.literal_eval(done.stdout.partition("}")[0] + "}").values()
+    assert re.fullmatch(pattern, "in/benchmarks/a.tsv")["name"] == "a"
+    assert not re.fullmatch(pattern, "in/logs/a.log")
     return tmp_path / "study"
 
 

@@ -126,7 +126,7 @@ def test_folders_of_results_are_no_names_of_studies():
     paths = [*(path.read_text() for path in sources), log_of("rule", f"{STUDY}/metrics.png")]
     folders = {name for text in paths for name in re.findall(r'(?:{STUDY}|results/study)/([a-z_]+)[/"]', text)}
     assert folders > {"logs", "figures", "calibration", "registration"}
-    # benchmark files are named like logs
+    # records of time and memory are named like logs
     for folder in folders | {"benchmarks"}:
         assert refusal(studies={folder: THICKNESS}) == Facts(f"studies.{folder}:")
     assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts("studies.s:", "s-0.8")

@@ -1,0 +1,117 @@
+"""The names of kept paths: another one for everything that a path is made from, the same for everything else."""
+
+import pytest
+from configurations import touched, write_atlas
+
+from gyriflow.code_hash import code_hash
+from gyriflow.io.origins import origin_key
+from gyriflow.running import path_store
+from gyriflow.study import resolve
+from gyriflow.study.loading import load
+
+WEEKS = (21, 22, 23)
+FILES = ("w{week}.nii.gz", "t2-{week}.nii.gz", "pial-{week}.surf.gii", "white-{week}.surf.gii")
+LABELS = {"files": {"labels": FILES[0], "image": FILES[1]}, "weeks": [*WEEKS], "scheme": "spina-bifida-atlas"}
+SURFACES = {"files": {"pial": FILES[2], "white": FILES[3]}, "weeks": [*WEEKS], "scheme": None}
+START = {"id": "start", "week": 21, "population": "b", "scheme": "spina-bifida-atlas"}
+SCHEME = {"cerebrum": [1, 2, 5], "cortex": [5], "white_matter": [1]}
+
+
+@pytest.fixture
+def keys(tmp_path):
+    """Return a function: the key of the path of an atlas, after changes of its series, the study and its files."""
+    touched(tmp_path, "mine.nii.gz", *(name.format(week=week) for week in WEEKS for name in FILES))
+
+    def key(series=LABELS, changed=None, start=None, atlas=None, missing=(), **settings):
+        write_atlas(tmp_path, series, folder=".")
+        config = {
+            "brains": [START | {"labels": str(tmp_path / "mine.nii.gz")} | (start or {})],
+            "atlas": {"name": str(tmp_path / "atlas.yaml"), "folder": str(tmp_path)} | (atlas or {}),
+            "start": "start",
+            "folding": {"preset": "expected", "end_week": 22},
+        }
+        study = resolve(load(config | settings, tmp_path))
+        contents = {str(path): path.name for path in tmp_path.iterdir() if path.name not in missing}
+        contents |= {str(tmp_path / name): "other" for name in changed or ()}
+        path = study.chains["start", "atlas"].path
+        return origin_key(path_store.path_origin(study, path), contents)
+
+    return key
+
+
+def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys):
+    own = {"schemes": {"own": SCHEME}}
+    labels = [
+        keys(),
+        # files
+        keys(changed=["w22.nii.gz"]),
+        keys(atlas={"images": True}),
+        keys(atlas={"images": True}, changed=["t2-22.nii.gz"]),
+        keys(atlas={"weeks": [21, 22]}),
+        # what they mean
+        keys(LABELS | {"affine_from": "qform"}),
+        keys(LABELS | {"affine_from": "sform"}),
+        keys(LABELS | {"scheme": "own"}, **own),
+        keys(LABELS | {"scheme": "own"}, schemes={"own": SCHEME | {"cortex": [2]}}),
+        keys(LABELS | {"scheme": "feta-7"}),
+        # settings
+        keys(surface={"edge_length_mm": 1.1}),
+        keys(surface={"open_sulci": False}),
+        keys(surface={"max_hole_mm": 2.0}),
+        keys(surface={"asymmetric": True}),
+    ]
+    pial_only = SURFACES | {"files": {"pial": FILES[2]}}
+    unmatched = {"growth": {"matched_surfaces": False}}
+    surfaces = [
+        keys(pial_only, **unmatched),
+        keys(SURFACES, **unmatched),
+        keys(SURFACES, changed=["white-21.surf.gii"], **unmatched),
+        keys(SURFACES | {"coordinates": "ras"}, **unmatched),
+        # the thickness of the only brain with labels fills the surfaces
+        keys(pial_only, changed=["mine.nii.gz"], **unmatched),
+        keys(pial_only, start={"affine_from": "qform"}, **unmatched),
+    ]
+    found = labels + surfaces
+    assert None not in found
+    assert len(set(found)) == len(found)
+
+
+def test_a_path_has_the_same_key_where_nothing_differs_that_it_is_made_from(keys):
+    equal = [
+        keys(),
+        keys(),
+        # another start brain and another end, as in another study
+        keys(changed=["mine.nii.gz"]),
+        keys(start={"week": 22, "affine_from": "qform"}, folding={"preset": "expected", "end_week": 23}),
+        keys(start={"scheme": "feta-7"}),
+        keys(metrics={"spangy_modes": 50}),
+    ]
+    assert len(set(equal)) == 1
+
+
+def test_a_path_has_no_key_until_all_files_of_its_brains_are_there(keys):
+    assert keys(missing=["w22.nii.gz"]) is None
+    # those of other brains need not be there
+    assert keys(missing=["mine.nii.gz"]) == keys()
+
+
+@pytest.mark.parametrize("changed", ["rules/registration.smk", "scripts/filled_labels.py", "scripts/register.py"])
+def test_a_path_has_another_key_after_a_change_of_its_rules_and_scripts(keys, changed, tmp_path, monkeypatch):
+    before = keys()
+    copy = tmp_path / "copy" / "workflow"
+    for name in ("rules", "scripts"):
+        (copy / name).mkdir(parents=True)
+        for file in (path_store.SHIPPED / "workflow" / name).iterdir():
+            (copy / name / file.name).write_bytes(file.read_bytes())
+    monkeypatch.setattr(path_store, "SHIPPED", tmp_path / "copy")
+    assert keys() == before
+    (copy / changed).write_text((copy / changed).read_text() + "# changed\n")
+    assert keys() != before
+
+
+def test_a_path_has_another_key_after_a_change_of_the_code_behind_its_scripts(keys, monkeypatch):
+    before = keys()
+    # of one script
+    changed = {"register.py": "code changed"}
+    monkeypatch.setattr(path_store, "code_hash", lambda script: changed.get(script.name) or code_hash(script))
+    assert keys() != before
