@@ -9,7 +9,7 @@ import re
 import sys
 import sysconfig
 from collections.abc import Iterable, Mapping
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 from ..code_hash import PACKAGE, modules_behind
@@ -34,7 +34,7 @@ def require_for(programs: Mapping[str, Path]) -> None:
         needed = packages_behind(program)
         compiles |= "dolfinx" in needed
         for package in needed:
-            if find_spec(package) is None:
+            if not is_installed(package):
                 missing.setdefault(package, name)
     if missing:
         package, rule = next(iter(missing.items()))
@@ -59,6 +59,12 @@ def packages_behind(program: Path) -> list[str]:
         if source.suffix == ".py":
             imported.update(IMPORT.findall(source.read_text()))
     return [name for name in FOLD_PACKAGES if name in imported]
+
+
+def is_installed(package: str) -> bool:
+    """Return whether a package is installed; `importlib.util.find_spec` would import MPI for dolfinx."""
+    is_blocked = package in sys.modules and sys.modules[package] is None
+    return not is_blocked and PathFinder.find_spec(package) is not None
 
 
 def has_dolfinx_wheels() -> bool:

@@ -28,7 +28,7 @@ def test_simulations_and_registrations_need_the_extra():
 
 
 def test_a_missing_package_is_named_with_its_step_and_extra(monkeypatch):
-    monkeypatch.setattr(requirements, "find_spec", lambda name: None if name == "ipctk" else name)
+    monkeypatch.setattr(requirements, "is_installed", lambda name: name != "ipctk")
     measured = {"measure": SCRIPTS / "measure.py"}
     require_for(measured)
     monkeypatch.setattr(requirements, "has_dolfinx_wheels", lambda: True)
@@ -37,7 +37,7 @@ def test_a_missing_package_is_named_with_its_step_and_extra(monkeypatch):
 
 
 def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
-    monkeypatch.setattr(requirements, "find_spec", lambda name: None)
+    monkeypatch.setattr(requirements, "is_installed", lambda name: False)
     monkeypatch.setattr(requirements, "has_dolfinx_wheels", lambda: False)
     with pytest.raises(InputError, check=Facts("dolfinx", "conda", "envs/gyriflow.yaml")):
         require_for({"simulate": requirements.SOLVER})
@@ -53,7 +53,7 @@ def test_without_a_compiler_only_simulations_are_refused(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(compiler, "_has_ziglang", lambda: False)
-    monkeypatch.setattr(requirements, "find_spec", lambda name: name)
+    monkeypatch.setattr(requirements, "is_installed", lambda name: True)
     monkeypatch.setattr(requirements, "LIBRARIES", {})
     require_for({"measure": SCRIPTS / "measure.py"})
     with pytest.raises(InputError, check=Facts("apt-get install gcc", "pip install ziglang")):
@@ -90,3 +90,16 @@ def test_a_brain_is_measured_where_the_solver_cannot_be_imported():
     done = subprocess.run([sys.executable, "-c", MEASURING], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 0
+
+
+SEARCH = """
+import sys
+from gyriflow.running.requirements import is_installed
+assert is_installed("dolfinx") and not is_installed("no_such_package")
+assert not {"dolfinx", "dolfinx_solver", "mpi4py"} & set(sys.modules)
+"""
+
+
+def test_looking_for_the_solver_starts_no_mpi():
+    done = subprocess.run([sys.executable, "-c", SEARCH], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
