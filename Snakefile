@@ -11,6 +11,7 @@ SOURCE = f"{workflow.basedir}/src" if CHECKED_OUT else str(Path(workflow.basedir
 sys.path.insert(0, SOURCE)
 from gyriflow.code_hash import code_hash
 from gyriflow.running.provenance import folders_in
+from gyriflow.running.requirements import SOLVER, require_for
 from gyriflow.running.snakemake_internals import (
     complete_rules,
     know_inputs_by_content,
@@ -60,9 +61,24 @@ rule all:
 
 # every job runs in the environment, and has a log and a benchmark file
 complete_rules(workflow.rules, ENVIRONMENT)
-rerun_on_code_changes(workflow.rules, Path(workflow.basedir, "workflow", "scripts"))
+SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
+rerun_on_code_changes(workflow.rules, SCRIPTS)
 if workflow.is_main_process:
     AWAITED = [f"/{file}" for file in ATLAS_FILES if f"/{file}" not in CONTENTS]
     know_inputs_by_content(CONTENTS, EARLIER_CONTENTS.values(), folders_in(CONFIG), AWAITED)
 if RUNS and (REFUSED or CONFIG.left_out):
     remove_stale(workflow.rules, STUDY, REPORT)
+
+
+# before the first job
+onstart:
+    programs = {}
+    for rule in {job.rule for job in workflow.dag.needrun_jobs()}:
+        if rule.script:
+            programs[rule.name] = SCRIPTS / Path(rule.script).name
+        elif rule.shellcmd:
+            programs[rule.name] = SOLVER
+    try:
+        require_for(programs)
+    except GyriflowError as error:
+        end_with(error)

@@ -84,7 +84,7 @@ def main() -> None:
     text, _, _ = (ENVIRONMENT / "requirements.txt").read_text().partition("# development")
     direct = re.findall(r"^([\w.-]+)", text, re.MULTILINE)
     found: dict[str, metadata.Distribution] = {}
-    for name in (*direct, "fenics-dolfinx", "petsc4py", "slepc4py", "mpi4py"):
+    for name in (*direct, "fenics-dolfinx", "petsc4py", "mpi4py"):
         required(name, found)
     python = [(found[name].name, found[name].version, stated(found[name])) for name in sorted(found)]
     debian = in_copyright(folder)

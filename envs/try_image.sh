@@ -19,14 +19,14 @@ trap finish EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-# what Docker Hub has under this name: Debian's essential packages and apt
-echo "debian:13 from Debian's packages"
+# what Docker Hub has under this name is nearly this: Debian's essential packages, apt, and Python (there, not Debian's)
+echo "python:3.13-slim from Debian's packages"
 mirror=$(apt-get indextargets --format '$(REPO_URI) $(LABEL)' 'Created-By: Packages' | awk '$2 == "Debian" {print $1; exit}')
-mmdebstrap --quiet --variant=minbase --include=ca-certificates trixie "$work/base.tar" \
+mmdebstrap --quiet --variant=minbase --include=ca-certificates,python3-dev,python3-venv,python-is-python3 trixie "$work/base.tar" \
     "deb ${mirror:-http://deb.debian.org/debian} trixie main"
 base=$(build from scratch)
 build add --quiet "$base" "$work/base.tar" / >/dev/null
-build commit --quiet --rm "$base" localhost/debian:13 >/dev/null
+build commit --quiet --rm "$base" docker.io/library/python:3.13-slim >/dev/null
 rm "$work/base.tar"
 
 # the network of this machine, also where it has its own index of packages and its own certificates

@@ -4,11 +4,12 @@ import logging
 import os
 from pathlib import Path
 
-# pymeshlab brings libraries that keep PETSc from loading after it; in this order both work
-import petsc4py.PETSc  # noqa: F401
 import pytest
 from reliability import Collector
 from xdist.scheduler import LoadScopeScheduling
+
+# dolfinx, PETSc and MPI in the order that their wheels need
+import gyriflow.folding  # noqa: F401
 
 LONGEST_FIRST = ("tests/mpi/", "tests/mpi/test_ranks.py", "tests/workflow/", "tests/")
 """Cases on several ranks come after the same on one, which compile their forms while no other rank waits for them."""

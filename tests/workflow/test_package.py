@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from facts import Facts
 from processes import ran
 
 from .conftest import CHECKOUT
@@ -25,13 +26,21 @@ def wheel(tmp_path_factory):
     return found
 
 
-def installed(wheel, folder):
-    """Return the command of a virtual environment with the wheel and all other packages of this environment."""
+FOLD = "dolfinx dolfinx_solver petsc4py slepc4py mpi4py ipctk SimpleITK picsl_greedy sklearn pytetwild"
+
+
+def installed(wheel, folder, without=""):
+    """Return the command of a virtual environment with the wheel and the packages of this environment.
+
+    Imports of the packages `without` fail.
+    """
     subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder], check=True, timeout=120)
     python = folder / "bin" / "python"
     found = "import sysconfig; print(sysconfig.get_path('purelib'))"
     site = ran(python, "-c", found).stdout.strip()
     (Path(site) / "environment.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    blocked = f"import sys; sys.modules.update(dict.fromkeys({without!r}.split()))"
+    (Path(site) / "blocked.pth").write_text(blocked + "\n")
     plain = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", wheel]
     subprocess.run(install, env=plain, check=True, timeout=120)
@@ -69,3 +78,22 @@ def test_the_command_works_in_an_empty_folder(wheel, tmp_path, tmp_path_factory)
     dry = gyriflow("run", demo, "--dry-run")
     assert dry.returncode == 0
     assert " core hours, " in dry.stdout
+
+
+def test_a_brain_is_measured_without_the_solver(wheel, tmp_path, tmp_path_factory):
+    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
+    python = command.with_name("python")
+    blocked = ran(python, "-c", "import mpi4py", cwd=tmp_path, env=environment)
+    assert blocked.returncode == 1
+    outcome = ran(python, "-P", CHECKOUT / "tests" / "measure_installed.py", cwd=tmp_path, env=environment)
+    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
+    assert outcome.stdout.splitlines()[-1] == "measured"
+
+
+def test_simulating_without_the_solver_names_the_extra_before_the_first_job(wheel, tmp_path, tmp_path_factory):
+    command, environment = installed(wheel, tmp_path_factory.mktemp("installed"), without=FOLD)
+    demo = re.search(r"(\S+/config\.yaml)", ran(command, "run", cwd=tmp_path, env=environment).stderr)[1]
+    outcome = ran(command, "run", demo, "--cores", "1", cwd=tmp_path, env=environment)
+    assert outcome.returncode == 2
+    assert outcome.stderr == Facts("dolfinx", "gyriflow[fold]")
+    assert not list(tmp_path.glob("results/brains/*/surface"))

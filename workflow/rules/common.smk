@@ -47,9 +47,14 @@ def validated_study():
             check_results_belong_to(Path.cwd(), files, found, record=RUNS)
         return study, *input_contents(Path.cwd(), found, study.checksums, record=RUNS)
     except GyriflowError as error:
-        print(f"gyriflow: {error}", file=sys.stderr)
-        record_exit_code(error.exit_code)
-        sys.exit(error.exit_code)
+        end_with(error)
+
+
+def end_with(error):
+    """End with the message and the exit code of an error, before any job."""
+    print(f"gyriflow: {error}", file=sys.stderr)
+    record_exit_code(error.exit_code)
+    sys.exit(error.exit_code)
 
 
 study, CONTENTS, EARLIER_CONTENTS = validated_study()

@@ -6,7 +6,7 @@ import pandas as pd
 
 from gyriflow.compare.calibration import run_score
 from gyriflow.compare.comparison import observed_brain
-from gyriflow.folding.start_regions import folded_surfaces
+from gyriflow.folding.folded_surfaces import folded_surfaces
 from gyriflow.io.files import read_json, read_table, write_table
 from gyriflow.io.frames import read_positions
 from gyriflow.io.surfaces import read_surface

@@ -1,6 +1,6 @@
 """Measure an observed or a simulated brain at a week; of a simulated brain, also write surfaces and thickness."""
 
-from gyriflow.folding.start_regions import folded_surfaces
+from gyriflow.folding.folded_surfaces import folded_surfaces
 from gyriflow.io.files import read_json, write_table
 from gyriflow.io.frames import read_positions
 from gyriflow.io.surfaces import STRUCTURES, read_surface, read_vertex_maps, write_brain, write_vertex_maps

@@ -328,7 +328,7 @@ def scheme_contradictions(layout: Layout, scheme: LabelScheme) -> Iterator[str]:
     if cortex_share < MIN_CORTEX_OUTSIDE:
         yield f"{with_numbers(cortex, 'cortex')} would cover {cortex_share:.0%} of the cerebrum's surface"
     for tissue, name, (low, high) in ((cortex, "cortex", CORTEX), (white, "white matter", WHITE)):
-        if tissue.any() and not low <= (share := layout.count[tissue].sum() / size) <= high:
+        if tissue.any() and not low <= (share := float(layout.count[tissue].sum() / size)) <= high:
             yield f"{with_numbers(tissue, name)} would be {share:.0%} of the cerebrum's tissue"
     for tissue, name, within in ((white, "white matter", cerebrum), (fluid, "ventricles", cerebrum & ~cortex)):
         if tissue.any() and (share := contact_share(tissue, within)) < MIN_INSIDE:

@@ -203,13 +203,13 @@ def clean(
 def pieces(mesh: TriangleMesh) -> list[TriangleMesh]:
     """Return the connected pieces of a surface, the largest area first."""
     component = triangles.face_components(mesh)
-    return [triangles.submesh(mesh, component == number)[0] for number in range(component.max() + 1)]
+    return [triangles.submesh(mesh, component == number)[0] for number in range(int(component.max()) + 1)]
 
 
 def _turn_outward(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, int]:
     """Turn the `count` largest pieces outward if they are closed; return the surface and how many were turned."""
     component = triangles.face_components(mesh)
-    parts = [triangles.submesh(mesh, component == number)[0] for number in range(min(component.max() + 1, count))]
+    parts = [triangles.submesh(mesh, component == number)[0] for number in range(min(int(component.max()) + 1, count))]
     inward = [
         number for number, part in enumerate(parts) if triangles.is_closed(part) and triangles.signed_volume(part) < 0
     ]
@@ -223,7 +223,7 @@ def _drop_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, dict[str, Any]]:
     faces = np.asarray(faces, dtype=np.int64)
     flat = (faces[:, [0, 1, 2]] == faces[:, [1, 2, 0]]).any(axis=1)
     faces = faces[~flat]
-    lowest_first = (np.argmin(faces, axis=1)[:, None] + [0, 1, 2]) % 3
+    lowest_first = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
     _, first = np.unique(np.take_along_axis(faces, lowest_first, axis=1), axis=0, return_index=True)
     distinct = TriangleMesh(vertices, faces[np.sort(first)])
     result, used_vertices = triangles.submesh(distinct, ~_duplicate_opposites(distinct))

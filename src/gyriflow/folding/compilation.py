@@ -16,6 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ..io.locks import lock_file
+from .compiler import set_compiler
 
 # lets the compiler reorder sums, a fifth faster; all of -ffast-math would break checks for NaN
 REORDERED_SUMS = ["-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"]
@@ -37,6 +38,7 @@ def form_compiler(comm: MPI.Comm) -> Iterator[dict]:
     Rank 0 locks the cache during the block, since concurrent runs share it, and removes what a killed compilation has
     left there: later ones would wait for it to finish. Ranks on different processors share code without `NATIVE`.
     """
+    set_compiler()
     processors = sorted(set(comm.allgather(processor())))
     is_mixed = len(processors) > 1
     kind = platform.machine() if is_mixed else hashlib.sha256(processors[0].encode()).hexdigest()[:8]

@@ -1,8 +1,7 @@
 """The distributed mesh of the solver, and the map between its numbering and that of the mesh file.
 
 Every rank also holds the positions of all vertices in the file's order, so that searches on the pial surface give the
-same result on every rank and output needs no further communication. Differences between versions of dolfinx (0.9 to
-0.11), and of the PETSc that comes with them, are handled in this file.
+same result on every rank and output needs no further communication.
 """
 
 import os
@@ -87,7 +86,7 @@ class Domain:
         tets = mesh.tets[:, TO_DOLFINX[self.order]]
         cells = tets if comm.rank == 0 else np.empty((0, tets.shape[1]), dtype=np.int64)
         points = self.positions if comm.rank == 0 else np.empty((0, 3))
-        # keywords, since the order of arguments differs between versions; no ghost cells, the default in all
+        # no ghost cells
         self.mesh = dolfinx.mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
         self.space = dolfinx.fem.functionspace(self.mesh, ("Lagrange", self.order, (3,)))
         nodes_of_cells = self.space.dofmap.list
@@ -95,9 +94,8 @@ class Domain:
         self.n_owned = self.space.dofmap.index_map.size_local
         nodes = self.n_owned + self.space.dofmap.index_map.num_ghosts
         self._geometry_node = np.empty(nodes, dtype=np.int64)
-        # from 0.11 on a list with one array per cell type, and `dofmap` is deprecated
-        by_cell_type = getattr(self.mesh.geometry, "dofmaps", None)
-        geometry_nodes = by_cell_type[0] if isinstance(by_cell_type, list) else self.mesh.geometry.dofmap
+        # one array per cell type
+        (geometry_nodes,) = self.mesh.geometry.dofmaps
         self._geometry_node[nodes_of_cells.ravel()] = geometry_nodes.ravel()
         self.vertex_of_node = self.mesh.geometry.input_global_indices[self._geometry_node]
         self._shared = dolfinx.la.vector(self.space.dofmap.index_map, 3)

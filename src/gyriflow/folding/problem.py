@@ -1,7 +1,4 @@
-"""The discrete problem of one step: energy, residual and tangent on the updated reference.
-
-Differences between versions of dolfinx are handled here, in `domain` and in `tangent`.
-"""
+"""The discrete problem of one step: energy, residual and tangent on the updated reference."""
 
 from functools import cached_property
 from typing import Literal, Protocol

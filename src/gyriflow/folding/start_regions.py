@@ -1,4 +1,4 @@
-"""Zones, tags and fields of a run on its start mesh, and the hemispheres of the folded brain by these tags."""
+"""Zones, tags and fields of a run on its start mesh."""
 
 from collections.abc import Callable
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.tetrahedra import TetrahedralMesh
-from ..geometry.triangles import Floats, TriangleMesh, submesh
+from ..geometry.triangles import TriangleMesh
 from ..io.tetmeshes import Regions
 from ..settings.folding import FoldingParameters, require_maps
-from ..settings.terms import LEFT, REGION_FIELDS
+from ..settings.terms import REGION_FIELDS
 from ..settings.varying import Maps
 from .checks import refuse_impossible
 from .growth import GrowthInputs, StepStart
@@ -48,16 +48,3 @@ def start_regions(
         on_left = np.full(len(zones.facets), parameters.side == "left")
     tags = cell_tags(mesh, zones, fields["cortex_weight"]), facet_tags(zones, on_left)
     return Regions(mesh, zones.facets, fields, *tags)
-
-
-def folded_surfaces(
-    regions: Regions, positions_mm: Floats
-) -> tuple[TriangleMesh, TriangleMesh | None, TriangleMesh | None]:
-    """Return the pial surface of a folded brain and its left and right part, None if it has no such facets.
-
-    `positions_mm` (n, 3) are those of the vertices of the start mesh, whose facets have tags of their hemisphere.
-    """
-    surface = TriangleMesh(positions_mm, regions.facets)
-    on_left = regions.facet_tags["hemisphere"] == LEFT
-    left, right = (submesh(surface, side)[0] if side.any() else None for side in (on_left, ~on_left))
-    return submesh(surface, np.ones(len(on_left), dtype=bool))[0], left, right

@@ -66,12 +66,15 @@ def between_moved(pair: Correspondence, first: Floats, second: Floats) -> Corres
 def carry(deformation: Deformation, points: Floats) -> Floats:
     """Map (n, 3) points of the first brain in mm to the second, A(p + u(p))."""
     index = voxel_index(points, deformation.affine)
-    parts = [map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest") for axis in range(3)]
-    return transform_points(points + np.stack(parts, axis=1).astype(np.float64), deformation.matrix)
+    moved = np.array(points, dtype=np.float64)
+    for axis in range(3):
+        moved[:, axis] += map_coordinates(deformation.displacement[..., axis], index, order=1, mode="nearest")
+    return transform_points(moved, deformation.matrix)
 
 
 def determinants(deformation: Deformation) -> Floats:
     """Return the (i, j, k) local change of volume on the map's grid (central differences); ≤ 0 where it folds."""
-    gradient = np.stack(np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2)), axis=-1)
+    slopes = np.gradient(deformation.displacement.astype(np.float64), axis=(0, 1, 2))
+    gradient = np.stack(list(slopes), axis=-1)
     gradient = gradient @ np.linalg.inv(deformation.affine[:3, :3])
     return np.asarray(np.linalg.det(np.eye(3) + gradient) * np.linalg.det(deformation.matrix[:3, :3]))

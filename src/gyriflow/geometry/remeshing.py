@@ -1,16 +1,10 @@
 """Remeshing of surfaces with even triangles, and removal of self-intersections, by MeshLab's filters."""
 
 import numpy as np
+import pymeshlab
 from numpy.typing import NDArray
-from petsc4py.lib import ImportPETSc
 
 from .triangles import TriangleMesh
-
-# PETSc's libraries are loaded before pymeshlab, but not initialised, which would start MPI: the wheel of pymeshlab has
-# libraries such as OpenSSL under the names of the system's, and PETSc's could not be loaded afterwards.
-ImportPETSc()
-
-import pymeshlab  # noqa: E402
 
 REMESHING_ROUNDS = 5
 UNTANGLING_ROUNDS = 10

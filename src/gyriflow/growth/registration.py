@@ -363,4 +363,6 @@ def require_good(quality: Mapping[str, float], *, pair: str, only_warn: bool = F
 def _dice(earlier: Channels, later: Channels, bit: int, places: Floats) -> float:
     first = (earlier.tissue & bit > 0).ravel()
     second = map_coordinates((later.tissue & bit > 0).astype(np.float32), places, order=1) > 0.5
-    return float(2 * np.count_nonzero(first & second) / max(np.count_nonzero(first) + np.count_nonzero(second), 1))
+    both = int(np.count_nonzero(first & second))
+    total = int(np.count_nonzero(first)) + int(np.count_nonzero(second))
+    return 2 * both / max(total, 1)

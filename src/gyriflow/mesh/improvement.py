@@ -32,7 +32,7 @@ def improve_flat_elements(mesh: TetrahedralMesh) -> TetrahedralMesh:
     vertices = mesh.vertices.copy()
     on_surface = np.zeros(len(vertices), dtype=bool)
     on_surface[boundary_surface(mesh)[1]] = True
-    for element in flat:
+    for element in flat.tolist():
         for _ in range(ROUNDS):
             if _ratios(vertices, mesh.tets[[element]])[0] >= WANTED_RATIO:
                 break

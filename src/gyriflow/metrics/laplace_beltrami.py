@@ -12,10 +12,12 @@ from ..geometry.diffusion import stiffness_matrix
 from ..geometry.triangles import Floats, TriangleMesh, vertex_areas
 from ..settings.terms import MassMatrix
 
-TOLERANCE = 1e-11
-"""Of the residual of a mode, relative to its eigenvalue."""
+RESIDUAL_TOL = 1e-10
+"""Largest residual of a mode, relative to its eigenvalue of the inverted operator."""
 MODES_PER_SLICE = 100
-"""Eigenvalues that SLEPc looks for round each shift; from 60 to 200 it matters little."""
+"""Eigenvalues to find with each shift; from 60 to 200 it matters little."""
+BLOCK = 8
+"""Vectors that are multiplied at once; from 4 to 8 it matters little."""
 SLIVERS = "Remesh the surface: slivers make its spectrum inexact."
 DENSE_VERTICES = 1000
 """Up to this size LAPACK solves the problem as a whole."""
@@ -83,54 +85,79 @@ def lowest_modes(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, count: i
 def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: float, count: int | None = None) -> Modes:
     """Return all modes of K φ = λ M φ with λ below `value` (mm⁻²).
 
-    SLEPc's spectrum slicing with shift-and-invert Krylov-Schur (Campos and Roman 2012, Numer. Algorithms 60, 279-295):
-    the inertia of K − σM at each shift gives the number of eigenvalues between shifts, so that none can be missed.
+    Spectrum slicing with shift and invert: the inertia of K − λM at the ends of a slice gives the number of its
+    eigenvalues, so that none can be missed (Grimes, Lewis and Simon 1994, SIAM J. Matrix Anal. Appl. 15, 228-272).
     `count` is that of `count_below`, if known. SolverError where a mode is missed.
     """
-    size = stiffness.shape[0]
-    count = count_below(stiffness, mass, value) if count is None else count
-    if size <= DENSE_VERTICES:
+    if count is None:
+        count = count_below(stiffness, mass, value)
+    if stiffness.shape[0] <= DENSE_VERTICES:
         return lowest_modes(stiffness, mass, count)
-    # starts MPI, which must not happen before hemispheres are measured in processes of their own
-    from petsc4py import PETSc
-    from slepc4py import SLEPc
 
-    operators = []
-    for rows in (stiffness.tocsr(), mass.tocsr()):
-        csr = rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
-        operators.append(PETSc.Mat().createAIJ(rows.shape, csr=csr, comm=PETSc.COMM_SELF))
-        operators[-1].setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
-    try:
-        solver.setOperators(*operators)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
-        solver.setInterval(-_spacing(mass), value)
-        solver.setTolerances(TOLERANCE)
-        solver.setKrylovSchurDimensions(nev=min(MODES_PER_SLICE, size // 4))
-        transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
-        factors = transform.getKSP()
-        factors.setType(PETSc.KSP.Type.PREONLY)
-        factors.getPC().setType(PETSc.PC.Type.CHOLESKY)
-        factors.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        solver.solve()
-        if (converged := solver.getConverged()) != count:
-            raise SolverError("the number of modes is wrong", found=converged, expected=count, remedy=SLIVERS)
-        vector, _ = operators[0].createVecs()
-        values = np.array([solver.getEigenvalue(i).real for i in range(count)])
-        functions, order = np.empty((size, count), order="F"), np.argsort(values)
-        for column, i in enumerate(order):
-            solver.getEigenvector(int(i), vector)
-            functions[:, column] = vector.getArray()
-        vector.destroy()
-        return Modes(values[order], functions)
-    except PETSc.Error as error:
-        problem = f"the modes up to λ = {value:g} mm⁻² could not be found"
-        raise SolverError(problem, found=f"SLEPc's error {error.ierr}", remedy=SLIVERS) from error
-    finally:
-        for thing in (solver, *operators):
-            thing.destroy()
+    # the eigenvalues of a surface are evenly spaced (Weyl's law)
+    n_slices = max(1, round(count / MODES_PER_SLICE))
+    ends = np.linspace(-_spacing(mass), value, n_slices + 1)
+    counts = [0]
+    for end in ends[1:-1]:
+        counts.append(count_below(stiffness, mass, float(end)))
+    counts.append(count)
+
+    slices = []
+    for i in range(n_slices):
+        slices.append(_modes_between(stiffness, mass, ends[i], ends[i + 1], counts[i + 1] - counts[i]))
+    eigenvalues = np.concatenate([modes.eigenvalues for modes in slices])
+    return Modes(eigenvalues, np.hstack([modes.functions for modes in slices]))
+
+
+def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, count: int) -> Modes:
+    """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M and σ in the middle.
+
+    SolverError where the number of modes found is another one.
+    """
+    shift = 0.5 * (low + high)
+    solve = _factorised(stiffness, mass, shift).solve
+    size = stiffness.shape[0]
+    max_vectors = min(5 * count + 20 * BLOCK, size - size % BLOCK)
+    basis = np.empty((size, max_vectors), order="F")
+    # the operator in the basis: its upper triangle
+    projected = np.zeros((max_vectors, max_vectors))
+
+    block, _ = _orthonormalised(np.random.default_rng(1).standard_normal((size, BLOCK)), mass)
+    next_check = 2 * count + 4 * BLOCK
+    found = 0
+    for used in range(BLOCK, max_vectors + 1, BLOCK):
+        last = slice(used - BLOCK, used)
+        basis[:, last] = block
+        block = solve(mass @ basis[:, last])
+        recent = slice(max(used - 2 * BLOCK, 0), used)
+        projected[recent, last] = basis[:, recent].T @ (mass @ block)
+        block -= basis[:, recent] @ projected[recent, last]
+        # in exact arithmetic the block is orthogonal to the earlier ones by now
+        block -= basis[:, :used] @ (basis[:, :used].T @ (mass @ block))
+        block, coupling = _orthonormalised(block, mass)
+        if used < next_check and used < max_vectors:
+            continue
+
+        next_check = used + 2 * BLOCK
+        inverse, vectors = linalg.eigh(projected[:used, :used], lower=False)
+        eigenvalues = shift + 1.0 / inverse
+        is_inside = (low < eigenvalues) & (eigenvalues < high)
+        residuals = np.linalg.norm(coupling @ vectors[-BLOCK:], axis=0)
+        has_converged = residuals <= RESIDUAL_TOL * np.abs(inverse)
+        found = int(np.count_nonzero(is_inside & has_converged))
+        if found == count == np.count_nonzero(is_inside):
+            order = np.argsort(eigenvalues[is_inside])
+            functions = basis[:, :used] @ vectors[:, is_inside][:, order]
+            # Rayleigh's quotient is more exact than 1/θ where the shift is near an eigenvalue
+            return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
+    raise SolverError("the number of modes is wrong", found=found, expected=count, remedy=SLIVERS)
+
+
+def _orthonormalised(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:
+    """Return M-orthonormal vectors Q (n, b) and R (b, b) with block = Q R."""
+    vectors, first = linalg.qr(block, mode="economic")
+    second = linalg.cholesky(vectors.T @ (mass @ vectors))
+    return linalg.solve_triangular(second, vectors.T, trans="T").T, second @ first
 
 
 def _spacing(mass: sparse.csc_matrix) -> float:
@@ -138,10 +165,13 @@ def _spacing(mass: sparse.csc_matrix) -> float:
 
 
 def _factorised(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, shift: float) -> SuperLU:
+    # this order of columns is not SuperLU's own: its larger panels and relaxed supernodes take ten times as long
     return splu(
         sparse.csc_matrix(stiffness - shift * mass),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
+        relax=1,
+        panel_size=1,
         options={"SymmetricMode": True},
     )
 

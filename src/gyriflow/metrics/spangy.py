@@ -74,7 +74,7 @@ def weyl_number(area_mm2: float, first: float) -> int:
 
 def band_limits(first: float) -> Floats:
     """Return the (7,) limits of the bands B1 to B6 in mm⁻²: Bk holds λ1·4^(k−1) ≤ λ < λ1·4^k."""
-    return first * 4.0 ** np.arange(BANDS + 1)
+    return first * 4.0 ** np.arange(BANDS + 1, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -204,6 +204,8 @@ def full_disk(directory: Path) -> str:
     """Return that the disk of a directory is full and what to do, or "" if it is not."""
     if shutil.disk_usage(directory).free < MIN_FREE_BYTES:
         return "the disk is full. Free some space"
+    if sys.platform == "win32":
+        return ""
     system = os.statvfs(directory)
     # systems without a fixed number of files have 0 of 0
     if system.f_files and system.f_favail < MIN_FREE_FILES:
@@ -257,10 +259,12 @@ def call_snakemake(arguments: Sequence[str]) -> int:
         if len(received_signals) == 1 or number == signal.SIGINT:
             raise KeyboardInterrupt
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        # `nohup` has SIGHUP ignored
-        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, interrupt)
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    # `nohup` has SIGHUP ignored; Windows has none
+    if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    for number in numbers:
+        signal.signal(number, interrupt)
     logger = logging.getLogger("snakemake.logging")
     logger.addFilter(is_shown)
     try:

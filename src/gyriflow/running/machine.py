@@ -1,10 +1,12 @@
 """Cores and memory that a run may use: those of the machine, or less in a container or a Slurm job."""
 
 import os
-import resource
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+
+import psutil
 
 
 def available_cores() -> int:
@@ -17,11 +19,18 @@ def available_cores() -> int:
 
 def available_memory_mib(cgroups: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> float:
     """Return the memory (MiB) that the machine, control groups, a Slurm job and the shell's limit allow."""
-    process, _ = resource.getrlimit(resource.RLIMIT_AS)
-    limits = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"), *_cgroup_limits(cgroups, own)]
+    limits = [psutil.virtual_memory().total, *_cgroup_limits(cgroups, own), _shell_limit()]
     limits += [2**20 * _slurm("MEM_PER_NODE"), 2**20 * _slurm("MEM_PER_CPU") * _slurm("CPUS_ON_NODE")]
-    limits += [process] if process != resource.RLIM_INFINITY else []
     return min(filter(None, limits)) / 2**20
+
+
+def _shell_limit() -> int:
+    if sys.platform == "win32":
+        return 0
+    import resource
+
+    process, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return 0 if process == resource.RLIM_INFINITY else process
 
 
 def _slurm(name: str) -> int:

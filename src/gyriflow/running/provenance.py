@@ -16,7 +16,8 @@ from ..settings.root import Config
 from ..version import commit, version
 
 PACKAGES = (
-    *("fenics-dolfinx", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "slepc4py", "mpi4py", "numpy"),
+    *("fenics-dolfinx", "dolfinx-solver-real", "fenics-basix", "fenics-ffcx", "fenics-ufl", "petsc4py", "mpi4py"),
+    *("mpich", "numpy"),
     *("scipy", "snakemake", "nibabel", "scikit-image", "pymeshlab", "pytetwild", "trimesh", "libigl", "ipctk"),
     *("pandas", "picsl-greedy", "SimpleITK", "pyvista", "vtk", "matplotlib", "h5py", "pydantic"),
 )

@@ -1,0 +1,103 @@
+"""What jobs need besides the base packages: those of the extra `fold`, a C compiler, and libraries of the system.
+
+`python -m gyriflow.running.requirements` prints the Debian packages that this machine lacks; `./run` installs them.
+"""
+
+import ctypes
+import platform
+import re
+import sys
+import sysconfig
+from collections.abc import Iterable, Mapping
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+from ..code_hash import PACKAGE, modules_behind
+from ..errors import InputError
+from ..folding.compiler import has_compiler
+from ..shipped import SHIPPED
+
+FOLD_PACKAGES = ("dolfinx", "ipctk", "picsl_greedy", "pytetwild", "SimpleITK", "sklearn")
+"""The modules of the extra `fold`."""
+LIBRARIES = {"libGL.so.1": "libgl1", "libEGL.so.1": "libegl1", "libOpenGL.so.0": "libopengl0"}
+"""Libraries that pymeshlab and VTK load on Linux, with their Debian packages."""
+SOLVER = PACKAGE / "folding" / "__main__.py"
+CONDA = f"conda env create -f {SHIPPED / 'envs' / 'gyriflow.yaml'}"
+IMPORT = re.compile(r"^[ \t]*(?:import|from)[ \t]+(\w+)", re.MULTILINE)
+
+
+def require_for(programs: Mapping[str, Path]) -> None:
+    """Raise InputError if steps, given by their names and programs, lack a package, a library or a compiler."""
+    missing: dict[str, str] = {}
+    compiles = False
+    for name, program in programs.items():
+        needed = packages_behind(program)
+        compiles |= "dolfinx" in needed
+        for package in needed:
+            if not is_installed(package):
+                missing.setdefault(package, name)
+    if missing:
+        package, rule = next(iter(missing.items()))
+        remedy = 'Install the extra "fold": pip install "gyriflow[fold]"'
+        if "dolfinx" in missing and not has_dolfinx_wheels():
+            remedy = f"PyPI has no dolfinx for this system: use conda, {CONDA}"
+        problem = f"simulations and registrations need packages that are not installed ({', '.join(missing)})"
+        raise InputError(problem, found=f"step {rule}, which imports {package}", remedy=remedy)
+    lacking = missing_libraries()
+    if lacking:
+        names = ", ".join(lacking)
+        raise InputError(f"this system has no {names}", remedy=_install(LIBRARIES[name] for name in lacking))
+    if compiles and not has_compiler():
+        remedy = f"{_install(['gcc', 'libc6-dev'])}, or without root: pip install ziglang"
+        raise InputError("simulations need a C compiler, and there is none", remedy=remedy)
+
+
+def packages_behind(program: Path) -> list[str]:
+    """Return the packages of the extra `fold` that a program or the modules behind it import."""
+    imported: set[str] = set()
+    for source in {program, *modules_behind(program)}:
+        if source.suffix == ".py":
+            imported.update(IMPORT.findall(source.read_text()))
+    return [name for name in FOLD_PACKAGES if name in imported]
+
+
+def is_installed(package: str) -> bool:
+    """Return whether a package is installed; `importlib.util.find_spec` would import MPI for dolfinx."""
+    is_blocked = package in sys.modules and sys.modules[package] is None
+    return not is_blocked and PathFinder.find_spec(package) is not None
+
+
+def has_dolfinx_wheels() -> bool:
+    """Return whether PyPI has dolfinx with PETSc for this system."""
+    return sys.platform == "linux" and platform.machine() == "x86_64"
+
+
+def missing_libraries() -> list[str]:
+    """Return the `LIBRARIES` that this system lacks."""
+    if sys.platform != "linux":
+        return []
+    lacking = []
+    for name in LIBRARIES:
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            lacking.append(name)
+    return lacking
+
+
+def missing_debian_packages() -> list[str]:
+    """Return the Debian packages that this system lacks."""
+    packages = [LIBRARIES[name] for name in missing_libraries()]
+    if not has_compiler():
+        packages += ["gcc", "libc6-dev"]
+    if not Path(sysconfig.get_path("include"), "Python.h").is_file():
+        packages.append("python3-dev")
+    return packages
+
+
+def _install(packages: Iterable[str]) -> str:
+    return f"On Debian or Ubuntu: sudo apt-get install {' '.join(packages)}"
+
+
+if __name__ == "__main__":
+    print(*missing_debian_packages())
