@@ -17,8 +17,6 @@ ENERGY_ROUND_OFF = 1e-12
 """Relative round-off of an energy, a sum over elements."""
 MIN_RESOLVED = 1e-6
 """Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
-MIN_PROGRESS = 1e-6
-"""Relative decrease of the energy above which an iteration does not count towards `max_newton`."""
 MAX_ITERATIONS_FACTOR = 10
 """Iterations allowed in all, as a multiple of `max_newton`."""
 STAGNATION_FACTOR = 10.0
@@ -35,7 +33,8 @@ class NewtonSettings:
     """Tolerances and limits of the iteration.
 
     `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side: see
-    `forcing_term`.
+    `forcing_term`. An iteration that lowers the energy by more than the fraction `min_progress` does not count towards
+    `max_newton`.
     """
 
     newton_tolerance: float = 1e-4
@@ -43,6 +42,7 @@ class NewtonSettings:
     max_newton: int = 20
     max_krylov: int = 1000
     max_backtracks: int = 8
+    min_progress: float = 1e-6
 
 
 @dataclass
@@ -152,7 +152,7 @@ class NewtonSolver:
                     raise
                 tangent = problem.tangent(iterate.residual)
                 iterate = self._iterate(iterate, tangent, min(forcing, tightest), solution, convexify=not stagnates)
-            stalled += iterate.progress < MIN_PROGRESS
+            stalled += iterate.progress < settings.min_progress
             if solution.newton == 1:
                 self._first_left = iterate.residual.norm / norm
             before = norm
