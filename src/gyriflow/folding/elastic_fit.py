@@ -16,13 +16,14 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
-from ..geometry.jacobians import EDGES, SLOPES, inverted_on_the_way, lower_bounds
+from ..geometry.jacobians import EDGES, SLOPES, determinants, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
@@ -46,13 +47,9 @@ compressible body yields more evenly."""
 BARRIER_PA = 1000.0
 """Stiffness of the contact barrier: stiffer than in a simulation, since springs press folds together harder."""
 SPRING_LENGTH_MM = 3.3
-CLOSE_SPRING_LENGTH_MM = 0.2
-"""Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
-depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
-SOFTER = 4.0
-"""Factor by which springs are softened if no solution is found with them."""
-MAX_DRAWS = 2
-"""Attempts to draw the boundary to its goals."""
+CLOSE_SPRING_LENGTHS_MM = (0.2, 0.8)
+"""Shear modulus over the springs' stiffness, on the way to a shape, and close to it in turn: a spring holds as strongly
+as this depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
@@ -66,15 +63,21 @@ MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
+FLATTENING_ROUNDS = 3
+"""Rounds of averaging over neighbours of the strain that an element's own is compared with."""
+MIN_FLATTENING, MAX_FLATTENING = math.log(2.0), math.log(4.0)
+"""Loss of an element's volume (a logarithm), since the start and by comparison with those around it, from which a step
+opens it again, and from which it makes up for all of the difference."""
+MIN_VOLUME_LEFT, MAX_RELAXATIONS = 0.2, 2
+"""Fraction of an element's volume at the start below which a step only opens flat elements, and the largest number of
+these steps."""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
 MAX_LEFT_MM = 3.0
 """Largest distance, as a root mean square, at which a body may stay from a shape: it is warned of, and the way to the
 next shape begins there."""
-MAX_HALVINGS, MAX_DRAW_HALVINGS = 5, 1
-"""Largest number of times that a step which fails is halved, and one that only draws the boundary."""
-SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=4, max_krylov=500)
-"""Loose tolerances and low limits: the next step starts from where the body is, and a failed one is made smaller."""
+SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=2, max_krylov=500, min_progress=0.02)
+"""Loose tolerances and low limits: each iterate is a shape that the body can have, and the next step starts from it."""
 
 
 class Springs:
@@ -127,6 +130,7 @@ class ElasticFit:
         self._moved_straight = False
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
+        self._start_volumes = volumes_between(mesh.vertices, pieces)
         self._surface, self._used = boundary_surface(mesh)
         self._pieces = pieces
         facets = self._used[self._surface.faces]
@@ -139,6 +143,11 @@ class ElasticFit:
         self._problem.contributions += [self._contact, self._springs]
         self._solver = NewtonSolver(self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA))
         self._elements = Elements(domain.cells, domain.vertex_of_node, self._problem.points)
+        cells = self._elements.vertices[domain.cells]
+        corners = mesh.vertices[cells]
+        self._inverse_edges = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+        size, columns = (len(mesh.vertices), len(cells)), np.repeat(np.arange(len(cells)), 4)
+        self._incidence = sparse.csr_array((np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size)
 
     @property
     def boundary(self) -> TriangleMesh:
@@ -168,36 +177,49 @@ class ElasticFit:
             logs = log_stretch(self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH)
             integrals = integrals_at_vertices(self.positions_mm, self._pieces, packed(logs))
             strain = smooth_integrals(self.positions_mm, self._pieces, integrals, SMOOTHING_MM)
-            try:
-                self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
-            except SolverError as error:
-                misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
-                if misfit_mm > MAX_LEFT_MM:
-                    raise
-                log.warning("the body comes within %.2f mm of a shape and no further: %s", misfit_mm, error)
-                break
+            problem = self._step((self.positions_mm + displacement)[self._used], lengths, strain)
+        misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
+        if problem and misfit_mm > MAX_LEFT_MM:
+            raise SolverError(
+                "a shape cannot be reached without turning elements inside out or folds into each other",
+                found=f"{misfit_mm:.1f} mm from it (root mean square): {problem}",
+                expected=f"at most {MAX_LEFT_MM:g} mm",
+                remedy="Look at the labels or surfaces of this week and the one before at that place.",
+            )
         self._straighten()
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats) -> Floats:
-        """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
+        """Draw the boundary towards (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
-        Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is, with a
-        warning.
+        What cannot be drawn further stays where it is. Springs that fold curved elements over are softened; a body
+        that cannot be drawn at all stays as it is, with a warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
-        lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
-        for _ in range(MAX_DRAWS):
+        for length_mm in CLOSE_SPRING_LENGTHS_MM:
+            self._step(transform_points(goals, motion), np.full(len(goals), length_mm), None)
             try:
-                self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
                 self._straighten()
                 return self._move(np.linalg.inv(motion))
             except SolverError as error:
                 self.positions_mm, problem = start, str(error)
-                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
         log.warning("the body is not drawn to a surface: %s", problem)
         return start
+
+    def relax(self) -> Floats:
+        """Open elements that drawing has flattened; return the (n, 3) positions in mm. The boundary hardly moves."""
+        start = self.positions_mm
+        for _ in range(MAX_RELAXATIONS):
+            if (volumes_between(self.positions_mm, self._pieces) > MIN_VOLUME_LEFT * self._start_volumes).all():
+                break
+            self._step(self.boundary.vertices, np.full(len(self._used), CLOSE_SPRING_LENGTHS_MM[0]), None)
+        try:
+            self._straighten()
+        except SolverError as error:
+            log.info("the body is not relaxed: %s", error)
+            self.positions_mm = start
+        return self.positions_mm
 
     def move_to(self, shape: Floats) -> Floats:
         """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n, 3) positions in mm.
@@ -317,7 +339,12 @@ class ElasticFit:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
-    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None, halvings: int) -> None:
+    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None) -> str:
+        """Grow by a strain (n, 6) and draw the boundary to goals (b, 3); return why the step did not converge, or "".
+
+        The body moves as far as the iteration went: each iterate lowers the energy, inverts no element, and crosses no
+        faces.
+        """
         domain, problem, self._moved_straight = self._domain, self._problem, False
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
@@ -328,22 +355,45 @@ class ElasticFit:
             nodal = strain[self._elements.vertices][self._elements.cells]
             inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
         # as one body, also if its parts are not connected
-        problem.set_step(np.full(shape, MODULUS_PA), inverse, part=np.zeros_like(domain.part))
+        one_part = np.zeros_like(domain.part)
+        problem.set_step(np.full(shape, MODULUS_PA), inverse, self._flattening(), part=one_part)
+        reason = ""
         try:
-            solution = self._solver.solve()
+            displacement = self._solver.solve().displacement
         except NotConvergedError as error:
-            if not halvings:
-                raise SolverError(
-                    "a shape cannot be reached without turning elements inside out or folds into each other",
-                    found=f"{error}; {self._solver.worst_places()}",
-                    remedy="Look at the labels or surfaces of this week and the one before at that place.",
-                ) from None
-            half = None if strain is None else strain / 2
-            self._step(0.5 * (goals + self.positions_mm[self._used]), lengths, half, halvings - 1)
-            self._step(goals, lengths, half, halvings - 1)
-            return
-        self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M
+            reason = f"{error}; {self._solver.worst_places()}"
+            displacement = self._solver.last.displacement if self._solver.last else problem.rest()
+        self.positions_mm = self.positions_mm + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
         self._passed.append(self.positions_mm)
+        return reason
+
+    def _flattening(self) -> Floats:
+        """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.
+
+        The strain since the start is compared with that of the elements around. An element that has lost volume, and
+        more than these, is elastic as to the difference, while the body is without stress otherwise.
+        """
+        cells = self._elements.vertices[self._elements.cells]
+        corners = self.positions_mm[cells]
+        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        logs, volumes = log_stretch(edges @ self._inverse_edges, left=True), determinants(edges)
+        around = packed(logs)
+        for _ in range(FLATTENING_ROUNDS):
+            at_vertices = self._incidence @ (volumes[:, None] * around) / (self._incidence @ volumes)[:, None]
+            around = at_vertices[cells].mean(axis=1)
+        excess = logs - unpacked(around)
+        lost = -np.maximum(np.trace(logs, axis1=1, axis2=2), np.trace(excess, axis1=1, axis2=2))
+        flat = np.flatnonzero(lost > MIN_FLATTENING)
+        weight = np.minimum((lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0)
+        stretches = np.tile(np.eye(3), (len(cells), 1, 1, 1))
+        stretches[flat, 0] = exponential(weight[:, None, None] * excess[flat])
+        return stretches
+
+
+def exponential(logs: Floats) -> Floats:
+    """Return exp(L) of symmetric (..., 3, 3) matrices."""
+    values, axes = np.linalg.eigh(logs)
+    return np.asarray((axes * np.exp(values)[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def inverse_exponential(logs: Floats) -> Floats:

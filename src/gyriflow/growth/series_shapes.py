@@ -26,8 +26,9 @@ REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
 """Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
-MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
-"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
+MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
+"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square), or
+where more than this fraction of the distance was left by the last one."""
 MAX_MISFIT_MM = 0.25
 """Mean distance of a body from the surface it is fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
@@ -89,6 +90,7 @@ class FittedBody(Protocol):
     def boundary(self) -> TriangleMesh: ...
     def follow(self, shape: Floats) -> Floats: ...
     def draw(self, goals: Floats) -> Floats: ...
+    def relax(self) -> Floats: ...
     def move_to(self, shape: Floats) -> Floats: ...
     def way_from(self, before: Floats) -> list[tuple[float, Floats]]: ...
 
@@ -139,22 +141,23 @@ def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekSha
 def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints, *, open_sulci: bool) -> None:
     """Let a body follow a shape, and fit its boundary to a target; `used` are the vertices of the boundary.
 
-    With `open_sulci` it is drawn several times, until it is close or stays as it is.
+    With `open_sulci` it is drawn several times, until it is close or hardly comes closer.
     """
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
+        body.relax()
         return
     surface, inner = target
+    gap_mm = np.inf
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
-        before = body.boundary.vertices
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
-        if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
+        last_mm, gap_mm = gap_mm, float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)))
+        if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
-        if np.allclose(body.boundary.vertices, before, atol=1e-6):
-            break
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
+    body.relax()
 
 
 def follow_series(

@@ -78,12 +78,63 @@ def slit_block(low, high):
     return TetrahedralMesh(places[kept], numbers.reshape(-1, 4))
 
 
+UNSOLVABLE = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12, min_progress=1.0)
+"""Tolerances that no step meets."""
+
+
 def test_a_shape_that_cannot_be_reached_is_refused_with_its_place(monkeypatch):
-    settings = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12)
-    monkeypatch.setattr(elastic_fit, "SETTINGS", settings)
-    monkeypatch.setattr(elastic_fit, "MAX_HALVINGS", 1)
+    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
+    monkeypatch.setattr(elastic_fit, "MAX_LEFT_MM", 0.3)
     with pytest.raises(SolverError, check=Facts("det F", "element", "mm")):
         ElasticFit(BODY).follow(BODY.vertices * [1.6, 0.6, 1.0])
     # close to the shape, the body stays where it is
     found = ElasticFit(BODY).follow(BODY.vertices * [1.02, 0.98, 1.0])
     assert (volumes_between(found, BODY.tets) > 0).all()
+
+
+def test_a_step_that_is_not_solved_goes_as_far_as_it_comes(monkeypatch):
+    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
+    goals = waves(0.5, 20.0)[USED]
+    body = ElasticFit(BODY)
+    body.positions_mm = 1.05 * BODY.vertices
+    before = np.linalg.norm(body.positions_mm[USED] - goals, axis=1).mean()
+    found = body.draw(goals)
+    assert np.linalg.norm(found[USED] - goals, axis=1).mean() < 0.3 * before
+    assert (volumes_between(found, BODY.tets) > 0).all()
+
+
+def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
+    mesh = slit_block(np.array([-10.0, -5.0, 0.0]), np.array([10.0, 5.0, 12.0]))
+    surface, used = boundary_surface(mesh)
+    goals = mesh.vertices[used].copy()
+    # the walls of the slit would move through each other
+    depth = np.clip((goals[:, 2] - 4) / 8, 0, 1)
+    goals[:, 0] -= 1.5 * np.sign(goals[:, 0]) * depth
+    bottom = goals[:, 2] == 0
+    goals[bottom, 2] -= 0.5 * np.sin(goals[bottom, 0] / 3)
+    body = ElasticFit(mesh)
+    found = body.draw(goals)[used]
+    assert crossing_faces(TriangleMesh(found, surface.faces)) == 0
+    misfit = np.linalg.norm(found - goals, axis=1)
+    before = np.linalg.norm(mesh.vertices[used] - goals, axis=1)
+    assert misfit[bottom].mean() < 0.3 * before[bottom].mean()
+    assert misfit.mean() < 0.6 * before.mean()
+
+
+def test_flat_elements_inside_are_opened_again():
+    body = ElasticFit(BODY)
+    inside = np.setdiff1d(np.arange(len(BODY.vertices)), USED)
+    vertex = inside[np.argmin(np.linalg.norm(BODY.vertices[inside] - [8, 8, 5], axis=1))]
+    around = (BODY.tets == vertex).any(axis=1)
+    tet = BODY.tets[np.flatnonzero(around)[0]]
+    opposite = BODY.vertices[tet[tet != vertex]].mean(axis=0)
+    places = BODY.vertices.copy()
+    places[vertex] += 0.9 * (opposite - places[vertex])
+    assert 0 < ratios(places).min() < 0.15
+    body.positions_mm = places
+    found = body.draw(places[USED])
+    assert ratios(found).min() > 0.3
+    assert found[USED] == pytest.approx(places[USED], abs=0.05)
+    # nothing moves where the elements are as those around them
+    body.positions_mm = BODY.vertices * [1.2, 1.0, 0.9]
+    assert body.draw(body.positions_mm[USED]) == pytest.approx(BODY.vertices * [1.2, 1.0, 0.9], abs=1e-6)
