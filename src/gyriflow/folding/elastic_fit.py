@@ -23,6 +23,7 @@ from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
+from ..geometry.flat_elements import open_flat_elements
 from ..geometry.jacobians import EDGES, SLOPES, determinants, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
@@ -50,6 +51,9 @@ SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTHS_MM = (0.2, 0.8)
 """Shear modulus over the springs' stiffness, on the way to a shape, and close to it in turn: a spring holds as strongly
 as this depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
+MAX_PULL_MM = 1.0
+"""Largest distance over which close springs draw, if it is more than twice the root mean square: longer ones press
+elements flat, and the next draw draws further."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
@@ -68,15 +72,22 @@ FLATTENING_ROUNDS = 3
 MIN_FLATTENING, MAX_FLATTENING = math.log(2.0), math.log(4.0)
 """Loss of an element's volume (a logarithm), since the start and by comparison with those around it, from which a step
 opens it again, and from which it makes up for all of the difference."""
-MIN_VOLUME_LEFT, MAX_RELAXATIONS = 0.2, 2
-"""Fraction of an element's volume at the start below which a step only opens flat elements, and the largest number of
-these steps."""
+MIN_VOLUME_LEFT, MAX_OUTER_MOVE_MM = 0.2, 0.1
+"""Fraction of their volume at the start below which elements are opened after a step, by moving vertices inside, and
+the largest move of vertices on the boundary for elements that have no others."""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
 MAX_LEFT_MM = 3.0
 """Largest distance, as a root mean square, at which a body may stay from a shape: it is warned of, and the way to the
 next shape begins there."""
-SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=2, max_krylov=500, min_progress=0.02)
+SETTINGS = NewtonSettings(
+    newton_tolerance=2e-2,
+    krylov_tolerance=1e-2,
+    max_newton=2,
+    max_krylov=150,
+    min_progress=0.01,
+    keeps_iterates=True,
+)
 """Loose tolerances and low limits: each iterate is a shape that the body can have, and the next step starts from it."""
 
 
@@ -130,9 +141,12 @@ class ElasticFit:
         self._moved_straight = False
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
-        self._start_volumes = volumes_between(mesh.vertices, pieces)
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces = pieces
+        self._pieces, self._start_volumes = pieces, volumes_between(mesh.vertices, pieces)
+        is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
+        self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
+        self._outer_moves_mm = np.zeros(len(mesh.vertices))
+        self._outer_moves_mm[pieces[is_outer[pieces].all(axis=1)]] = MAX_OUTER_MOVE_MM
         facets = self._used[self._surface.faces]
         whole = np.ones(len(mesh.vertices))
         zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
@@ -197,8 +211,12 @@ class ElasticFit:
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
+        pull = transform_points(goals, motion) - boundary.vertices
+        length = np.linalg.norm(pull, axis=1, keepdims=True)
+        longest_mm = max(MAX_PULL_MM, 2 * math.sqrt(np.mean(length**2)))
+        pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
         for length_mm in CLOSE_SPRING_LENGTHS_MM:
-            self._step(transform_points(goals, motion), np.full(len(goals), length_mm), None)
+            self._step(boundary.vertices + pull, np.full(len(goals), length_mm), None)
             try:
                 self._straighten()
                 return self._move(np.linalg.inv(motion))
@@ -206,20 +224,6 @@ class ElasticFit:
                 self.positions_mm, problem = start, str(error)
         log.warning("the body is not drawn to a surface: %s", problem)
         return start
-
-    def relax(self) -> Floats:
-        """Open elements that drawing has flattened; return the (n, 3) positions in mm. The boundary hardly moves."""
-        start = self.positions_mm
-        for _ in range(MAX_RELAXATIONS):
-            if (volumes_between(self.positions_mm, self._pieces) > MIN_VOLUME_LEFT * self._start_volumes).all():
-                break
-            self._step(self.boundary.vertices, np.full(len(self._used), CLOSE_SPRING_LENGTHS_MM[0]), None)
-        try:
-            self._straighten()
-        except SolverError as error:
-            log.info("the body is not relaxed: %s", error)
-            self.positions_mm = start
-        return self.positions_mm
 
     def move_to(self, shape: Floats) -> Floats:
         """Move the body to a shape (n, 3) in mm that it can nearly have; return its (n, 3) positions in mm.
@@ -359,13 +363,28 @@ class ElasticFit:
         problem.set_step(np.full(shape, MODULUS_PA), inverse, self._flattening(), part=one_part)
         reason = ""
         try:
-            displacement = self._solver.solve().displacement
+            self._solver.solve()
         except NotConvergedError as error:
             reason = f"{error}; {self._solver.worst_places()}"
-            displacement = self._solver.last.displacement if self._solver.last else problem.rest()
-        self.positions_mm = self.positions_mm + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
-        self._passed.append(self.positions_mm)
+        start = self.positions_mm
+        for displacement in self._solver.iterates:
+            self.positions_mm = start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+            self._passed.append(self.positions_mm)
+        self._open_flat_elements()
         return reason
+
+    def _open_flat_elements(self) -> None:
+        """Move vertices inside where elements have become flat: no state is lost, since none is in them."""
+        arguments = self._pieces, self._start_volumes
+        opened = open_flat_elements(self.positions_mm, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT)
+        # elements without a vertex inside need a small move of the boundary
+        moved = open_flat_elements(opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT)
+        if moved is not opened:
+            surface = TriangleMesh(moved[self._used], self._surface.faces)
+            opened = opened if len(faces_that_cross(surface)) else moved
+        if opened is not self.positions_mm:
+            self.positions_mm = opened
+            self._passed.append(opened)
 
     def _flattening(self) -> Floats:
         """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.

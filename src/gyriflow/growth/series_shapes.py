@@ -90,7 +90,6 @@ class FittedBody(Protocol):
     def boundary(self) -> TriangleMesh: ...
     def follow(self, shape: Floats) -> Floats: ...
     def draw(self, goals: Floats) -> Floats: ...
-    def relax(self) -> Floats: ...
     def move_to(self, shape: Floats) -> Floats: ...
     def way_from(self, before: Floats) -> list[tuple[float, Floats]]: ...
 
@@ -146,7 +145,6 @@ def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints,
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
-        body.relax()
         return
     surface, inner = target
     gap_mm = np.inf
@@ -157,7 +155,6 @@ def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints,
             break
         body.draw(goals)
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
-    body.relax()
 
 
 def follow_series(
