@@ -234,7 +234,7 @@ class ElasticFit:
         motion = self._fit(shape, self.positions_mm)
         untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion), UNTANGLING_MM)
         if not len(faults):
-            self.positions_mm, self._moved_straight = untangled, True
+            self.positions_mm, self._moved_straight = self._opened_after(self.positions_mm, untangled), True
             return self._move(np.linalg.inv(motion))
         log.info("%d faults remain on the way to a shape: the body follows it", len(faults))
         self.follow(shape)
@@ -272,6 +272,8 @@ class ElasticFit:
             return []
         motion = self._fit(self.positions_mm, before)
         places, stops = self._stops(before, transform_points(self.positions_mm, motion), passed)
+        # changes around faults flatten elements
+        places = self._opened_after(stops[-1] if stops else before, places)
         self.positions_mm = transform_points(places, self._fit(places, self.positions_mm))
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
@@ -370,21 +372,32 @@ class ElasticFit:
         for displacement in self._solver.iterates:
             self.positions_mm = start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
             self._passed.append(self.positions_mm)
-        self._open_flat_elements()
+        opened = self._opened(self.positions_mm)
+        if opened is not self.positions_mm:
+            self.positions_mm = opened
+            self._passed.append(opened)
         return reason
 
-    def _open_flat_elements(self) -> None:
-        """Move vertices inside where elements have become flat: no state is lost, since none is in them."""
+    def _opened(self, places: Floats) -> Floats:
+        """Return positions (n, 3) at which flat elements are opened, as far as moves inside and small ones outside can.
+
+        No state is lost, since none is in the elements.
+        """
         arguments = self._pieces, self._start_volumes
-        opened = open_flat_elements(self.positions_mm, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT)
+        opened = open_flat_elements(places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT)
         # elements without a vertex inside need a small move of the boundary
         moved = open_flat_elements(opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT)
         if moved is not opened:
             surface = TriangleMesh(moved[self._used], self._surface.faces)
             opened = opened if len(faces_that_cross(surface)) else moved
-        if opened is not self.positions_mm:
-            self.positions_mm = opened
-            self._passed.append(opened)
+        return opened
+
+    def _opened_after(self, before: Floats, places: Floats) -> Floats:
+        """Return the positions of `_opened` if the way there from the shape before has no faults, else those given."""
+        opened = self._opened(places)
+        if opened is places or len(self._faults_between(before, opened)):
+            return places
+        return opened
 
     def _flattening(self) -> Floats:
         """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.

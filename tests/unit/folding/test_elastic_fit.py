@@ -148,3 +148,16 @@ def test_elements_that_a_step_leaves_flat_are_opened(monkeypatch):
     body = ElasticFit(BODY)
     body.positions_mm = flattened()
     assert ratios(body.draw(body.boundary.vertices)).min() == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypatch):
+    body = ElasticFit(BODY)
+    body.positions_mm = BODY.vertices
+    places = flattened()
+    # as if the change had made these
+    monkeypatch.setattr(body, "_untangled", lambda before, after, lengths: (places, np.empty((0, 3))))
+    assert ratios(body.move_to(BODY.vertices)).min() == pytest.approx(0.2, abs=1e-6)
+    assert body.way_from(BODY.vertices) == []
+    body.positions_mm, body._moved_straight = BODY.vertices, False
+    assert body.way_from(BODY.vertices) == []
+    assert ratios(body.positions_mm).min() == pytest.approx(0.2, abs=1e-6)
