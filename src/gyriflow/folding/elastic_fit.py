@@ -56,6 +56,8 @@ MAX_PULL_MM = 1.0
 elements flat, and the next draw draws further."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
+MAX_WAY_HALVINGS = 3
+"""Largest number of times that a way with faults is divided by a stop."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
 an observed brain), and the distance from these, as a multiple of them."""
@@ -265,9 +267,7 @@ class ElasticFit:
         the shape of now around the faults. Else they are states that the body has passed through since this was last
         called; elements and faces with faults between two of them that follow each other are warned of.
         """
-        # where curved elements fold over, their linear pieces may be valid
-        passed = [shape for shape in self._passed if has_volume(shape, self._tets).all()]
-        self._passed = []
+        passed, self._passed = self._passed, []
         if self._moved_straight:
             return []
         motion = self._fit(self.positions_mm, before)
@@ -280,15 +280,18 @@ class ElasticFit:
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
         return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
 
-    def _stops(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
+    def _stops(
+        self, before: Floats, after: Floats, passed: Sequence[Floats], halvings: int = MAX_WAY_HALVINGS
+    ) -> tuple[Floats, list[Floats]]:
         """Return the shape `after`, changed around faults, and the shapes to pass before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
-        if len(faults) and len(passed):
-            ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
-            i = int(np.argmin(ways))
-            stop, first = self._stops(before, transform_points(passed[i], self._fit(passed[i], before)), passed[:i])
+        i = self._halfway(before, after, passed) if len(faults) and halvings else None
+        if i is not None:
             # each shape is fitted to the one before, as on the path
-            last, second = self._stops(stop, transform_points(after, self._fit(after, stop)), passed[i + 1 :])
+            middle = transform_points(passed[i], self._fit(passed[i], before))
+            stop, first = self._stops(before, middle, passed[:i], halvings - 1)
+            end = transform_points(after, self._fit(after, stop))
+            last, second = self._stops(stop, end, passed[i + 1 :], halvings - 1)
             return last, [*first, stop, *second]
         if len(faults):
             # the shape stays as it is: it is valid, and a changed one may not be
@@ -297,6 +300,15 @@ class ElasticFit:
             text = "%d elements or faces are inverted or cross near %s mm on the way"
             log.warning(text, len(faults), np.round(faults[0], 1).tolist())
         return untangled, []
+
+    def _halfway(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> int | None:
+        """Return the number of the valid state that is nearest to the middle between two shapes; None without any."""
+        ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
+        for number in np.argsort(ways):
+            # where curved elements fold over, their linear pieces may be valid
+            if has_volume(passed[number], self._tets).all():
+                return int(number)
+        return None
 
     def _faults_between(self, before: Floats, after: Floats, least: float = 0.0) -> Floats:
         """Return the (k, 3) places before, of elements that are inverted and faces that cross on the straight way."""

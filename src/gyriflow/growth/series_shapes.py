@@ -194,6 +194,8 @@ def follow_series(
     extend = harmonic_continuation(mesh.vertices, pieces, used)
     shapes = earlier.by_week() if earlier else [WeekShape(weeks[0], mesh.vertices)]
     n_done = sum(not shape.is_stop for shape in shapes) - 1
+    if earlier:
+        log.info("going on after GW %g", shapes[-1].week)
     if body is not None:
         body.positions_mm = shapes[-1].positions
     carried = _carried(boundary, used, shapes, pairs, surfaces, open_sulci)
