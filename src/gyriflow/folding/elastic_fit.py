@@ -74,6 +74,8 @@ FLATTENING_ROUNDS = 3
 MIN_FLATTENING, MAX_FLATTENING = math.log(2.0), math.log(4.0)
 """Loss of an element's volume (a logarithm), since the start and by comparison with those around it, from which a step
 opens it again, and from which it makes up for all of the difference."""
+MAX_OPENING = 0.5
+"""Largest principal Hencky strain that a step takes back: with more stress the tangent cannot be made definite."""
 MIN_VOLUME_LEFT, MAX_OUTER_MOVE_MM = 0.2, 0.1
 """Fraction of their volume at the start below which elements are opened after a step, by moving vertices inside, and
 the largest move of vertices on the boundary for elements that have no others."""
@@ -374,12 +376,17 @@ class ElasticFit:
             inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
         # as one body, also if its parts are not connected
         one_part = np.zeros_like(domain.part)
-        problem.set_step(np.full(shape, MODULUS_PA), inverse, self._flattening(), part=one_part)
-        reason = ""
-        try:
-            self._solver.solve()
-        except NotConvergedError as error:
-            reason = f"{error}; {self._solver.worst_places()}"
+        moduli, reason = np.full(shape, MODULUS_PA), ""
+        # where the stress of flat elements prevents any iteration, without it
+        for stretches in (self._flattening(), None):
+            problem.set_step(moduli, inverse, stretches, part=one_part)
+            try:
+                self._solver.solve()
+                reason = ""
+            except NotConvergedError as error:
+                reason = f"{error}; {self._solver.worst_places()}"
+            if not reason or self._solver.iterates:
+                break
         start = self.positions_mm
         for displacement in self._solver.iterates:
             self.positions_mm = start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
@@ -430,14 +437,15 @@ class ElasticFit:
         flat = np.flatnonzero(lost > MIN_FLATTENING)
         weight = np.minimum((lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0)
         stretches = np.tile(np.eye(3), (len(cells), 1, 1, 1))
-        stretches[flat, 0] = exponential(weight[:, None, None] * excess[flat])
+        stretches[flat, 0] = exponential(weight[:, None, None] * excess[flat], MAX_OPENING)
         return stretches
 
 
-def exponential(logs: Floats) -> Floats:
-    """Return exp(L) of symmetric (..., 3, 3) matrices."""
+def exponential(logs: Floats, limit: float) -> Floats:
+    """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the limit count as this."""
     values, axes = np.linalg.eigh(logs)
-    return np.asarray((axes * np.exp(values)[..., None, :]) @ axes.swapaxes(-1, -2))
+    values = np.exp(np.clip(values, -limit, limit))
+    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def inverse_exponential(logs: Floats) -> Floats:
