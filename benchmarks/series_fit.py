@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import petsc4py
 from common import print_rows
 
 from gyriflow.folding.elastic_fit import ElasticFit
@@ -106,6 +107,8 @@ def main() -> None:
         state = unfinished(arguments.earlier, before).read()
         assert state, f"{arguments.earlier} has no state of {before:g} GW"
         earlier = SeriesShapes(*state)
+    # reading surfaces loads PETSc without initialising it
+    petsc4py.init()
     body = ElasticFit(mesh)
     later = dict(zip(arguments.weeks[1:], surfaces, strict=True))
     measured = Measurement(mesh, later, arguments.states)

@@ -412,11 +412,12 @@ class ElasticFit:
         return opened
 
     def _opened_after(self, before: Floats, places: Floats) -> Floats:
-        """Return the positions of `_opened` if the way there from the shape before has no faults, else those given."""
+        """Return the positions of `_opened`, or those given where these have fewer faults on the way from before."""
         opened = self._opened(places)
-        if opened is places or len(self._faults_between(before, opened)):
+        if opened is places:
             return places
-        return opened
+        is_worse = len(self._faults_between(before, opened)) > len(self._faults_between(before, places))
+        return places if is_worse else opened
 
     def _flattening(self) -> Floats:
         """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.
