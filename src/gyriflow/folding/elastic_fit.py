@@ -287,7 +287,9 @@ class ElasticFit:
     ) -> tuple[Floats, list[Floats]]:
         """Return the shape `after`, changed around faults, and the shapes to pass before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
-        i = self._halfway(before, after, passed) if len(faults) and halvings else None
+        # a change that flattens elements is the last resort
+        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(after)
+        i = self._halfway(before, after, passed) if needs_stop and halvings else None
         if i is not None:
             # each shape is fitted to the one before, as on the path
             middle = transform_points(passed[i], self._fit(passed[i], before))
@@ -302,6 +304,10 @@ class ElasticFit:
             text = "%d elements or faces are inverted or cross near %s mm on the way"
             log.warning(text, len(faults), np.round(faults[0], 1).tolist())
         return untangled, []
+
+    def _flat_count(self, places: Floats) -> int:
+        volumes = volumes_between(places, self._pieces)
+        return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
 
     def _halfway(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> int | None:
         """Return the number of the valid state that is nearest to the middle between two shapes; None without any."""
