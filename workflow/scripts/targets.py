@@ -9,12 +9,13 @@ import numpy as np
 from gyriflow.errors import StorageError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.geometry.deformations import between_moved
-from gyriflow.growth.series_shapes import follow_series, sizes_of
+from gyriflow.growth.series_shapes import SeriesShapes, follow_series, sizes_of
 from gyriflow.io.files import read_json
 from gyriflow.io.origins import present_key
 from gyriflow.io.registrations import WeeklyShapes, read_correspondence, stored_name, write_weekly_shapes
 from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
+from gyriflow.io.unfinished import unfinished_series
 from gyriflow.step import step
 
 files, params = snakemake.input, snakemake.params
@@ -33,7 +34,20 @@ with step(snakemake.log[0]):
     # labels whose sulci stay fused have none to open; given surfaces count as open
     opened = [read_json(path).get("sulci", {"sheets": 1}).get("sheets") for path in files.reports]
     open_sulci = params.opens_sulci and any(opened)
-    found = follow_series(mesh, params.weeks, pairs, surfaces, ElasticFit(mesh), open_sulci=open_sulci)
+    made_from = [files.mesh, files.data, files.report, *files.correspondences, *files.surfaces, *files.reports]
+    settings = [params.weeks, params.posed, open_sulci, params.code]
+    unfinished = unfinished_series(snakemake.output[0], made_from, settings)
+    state = unfinished.read()
+    found = follow_series(
+        mesh,
+        params.weeks,
+        pairs,
+        surfaces,
+        ElasticFit(mesh),
+        open_sulci=open_sulci,
+        earlier=SeriesShapes(*state) if state else None,
+        after_week=lambda shapes: unfinished.write(shapes.weeks, shapes.positions, shapes.stops),
+    )
     sizes = sizes_of(mesh, found.positions)
     key = ""
     if params.origin:
@@ -45,3 +59,4 @@ with step(snakemake.log[0]):
     if params.store and key:
         with suppress(StorageError):
             write_weekly_shapes(Path(params.store, stored_name(snakemake.wildcards.brain, key)), shapes)
+    unfinished.remove()

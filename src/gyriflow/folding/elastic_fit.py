@@ -16,13 +16,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from ..errors import SolverError
 from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
-from ..geometry.jacobians import SLOPES, inverted_on_the_way, lower_bounds
+from ..geometry.flat_elements import open_flat_elements
+from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
 from ..geometry.straightening import straightened
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
@@ -47,15 +49,16 @@ compressible body yields more evenly."""
 BARRIER_PA = 1000.0
 """Stiffness of the contact barrier: stiffer than in a simulation, since springs press folds together harder."""
 SPRING_LENGTH_MM = 3.3
-CLOSE_SPRING_LENGTH_MM = 0.2
-"""Shear modulus over the springs' stiffness, on the way to a shape and close to it: a spring holds as strongly as this
-depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
-SOFTER = 4.0
-"""Factor by which springs are softened if no solution is found with them."""
-MAX_DRAWS = 2
-"""Attempts to draw the boundary to its goals."""
+CLOSE_SPRING_LENGTHS_MM = (0.2, 0.8)
+"""Shear modulus over the springs' stiffness, on the way to a shape, and close to it in turn: a spring holds as strongly
+as this depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
+MAX_PULL_MM = 1.0
+"""Largest distance over which close springs draw, if it is more than twice the root mean square: longer ones press
+elements flat, and the next draw draws further."""
 PARTS_OF_WAY = (1 / 3, 2 / 3, 1.0)
 """Fractions of a straight way at which faces are checked for crossings."""
+MAX_WAY_HALVINGS = 3
+"""Largest number of times that a way with faults is divided by a stop."""
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
 an observed brain), and the distance from these, as a multiple of them."""
@@ -65,15 +68,30 @@ MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
 """Smoothing (SD, mm) of the stretch that the body grows by."""
+FLATTENING_ROUNDS = 3
+"""Rounds of averaging over neighbours of the strain that an element's own is compared with."""
+MIN_FLATTENING, MAX_FLATTENING = math.log(2.0), math.log(4.0)
+"""Loss of an element's volume (a logarithm), since the start and by comparison with those around it, from which a step
+opens it again, and from which it makes up for all of the difference."""
+MAX_OPENING = 0.5
+"""Largest principal Hencky strain that a step takes back: with more stress the tangent cannot be made definite."""
+MIN_VOLUME_LEFT, MAX_OUTER_MOVE_MM = 0.2, 0.1
+"""Fraction of their volume at the start below which elements are opened after a step, by moving vertices inside, and
+the largest move of vertices on the boundary for elements that have no others."""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
 MAX_LEFT_MM = 3.0
 """Largest distance, as a root mean square, at which a body may stay from a shape: it is warned of, and the way to the
 next shape begins there."""
-MAX_HALVINGS, MAX_DRAW_HALVINGS = 5, 1
-"""Largest number of times that a step which fails is halved, and one that only draws the boundary."""
-SETTINGS = NewtonSettings(newton_tolerance=1e-2, krylov_tolerance=1e-2, max_newton=4, max_krylov=500)
-"""Loose tolerances and low limits: the next step starts from where the body is, and a failed one is made smaller."""
+SETTINGS = NewtonSettings(
+    newton_tolerance=2e-2,
+    krylov_tolerance=1e-2,
+    max_newton=2,
+    max_krylov=150,
+    min_progress=0.01,
+    keeps_iterates=True,
+)
+"""Loose tolerances and low limits: each iterate is a shape that the body can have, and the next step starts from it."""
 
 
 class Springs:
@@ -127,7 +145,11 @@ class ElasticFit:
         mesh = TetrahedralMesh(mesh.vertices, pieces)
         self.positions_mm: Floats = mesh.vertices
         self._surface, self._used = boundary_surface(mesh)
-        self._pieces = pieces
+        self._pieces, self._start_volumes = pieces, volumes_between(mesh.vertices, pieces)
+        is_outer = np.isin(np.arange(len(mesh.vertices)), self._used)
+        self._inner_moves_mm = np.where(is_outer, 0.0, np.inf)
+        self._outer_moves_mm = np.zeros(len(mesh.vertices))
+        self._outer_moves_mm[pieces[is_outer[pieces].all(axis=1)]] = MAX_OUTER_MOVE_MM
         facets = self._used[self._surface.faces]
         whole = np.ones(len(mesh.vertices))
         zones = Zones(facets, np.full(len(facets), FREE), whole, 0.0, (-math.inf, math.inf), free=True)
@@ -138,6 +160,11 @@ class ElasticFit:
         self._problem.contributions += [self._contact, self._springs]
         self._solver = NewtonSolver(self._problem, SETTINGS, residual_floor(mesh, MODULUS_PA))
         self._elements = Elements(domain.cells, domain.vertex_of_node, self._problem.points)
+        cells = self._elements.vertices[domain.cells]
+        corners = mesh.vertices[cells]
+        self._inverse_edges = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+        size, columns = (len(mesh.vertices), len(cells)), np.repeat(np.arange(len(cells)), 4)
+        self._incidence = sparse.csr_array((np.ones(4 * len(cells)), (cells.ravel(), columns)), shape=size)
 
     @property
     def boundary(self) -> TriangleMesh:
@@ -167,34 +194,37 @@ class ElasticFit:
             logs = log_stretch(self._gradients(self.positions_mm + displacement), limit=MAX_LOG_STRETCH)
             integrals = integrals_at_vertices(self.positions_mm, self._pieces, packed(logs))
             strain = smooth_integrals(self.positions_mm, self._pieces, integrals, SMOOTHING_MM)
-            try:
-                self._step((self.positions_mm + displacement)[self._used], lengths, strain, MAX_HALVINGS)
-            except SolverError as error:
-                misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
-                if misfit_mm > MAX_LEFT_MM:
-                    raise
-                log.warning("the body comes within %.2f mm of a shape and no further: %s", misfit_mm, error)
-                break
+            problem = self._step((self.positions_mm + displacement)[self._used], lengths, strain)
+        misfit_mm = math.sqrt(3 * np.mean((goal - self.positions_mm)[self._used] ** 2))
+        if problem and misfit_mm > MAX_LEFT_MM:
+            raise SolverError(
+                "a shape cannot be reached without turning elements inside out or folds into each other",
+                found=f"{misfit_mm:.1f} mm from it (root mean square): {problem}",
+                expected=f"at most {MAX_LEFT_MM:g} mm",
+                remedy="Look at the labels or surfaces of this week and the one before at that place.",
+            )
         self._straighten()
         return self._move(np.linalg.inv(motion))
 
     def draw(self, goals: Floats) -> Floats:
-        """Draw the boundary to (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
+        """Draw the boundary towards (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
-        Springs with which no solution is found are softened; a body that cannot be drawn at all stays as it is, with a
-        warning.
+        What cannot be drawn further stays where it is. Springs that fold curved elements over are softened; a body
+        that cannot be drawn at all stays as it is, with a warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
-        lengths: Floats = np.full(len(goals), CLOSE_SPRING_LENGTH_MM)
-        for _ in range(MAX_DRAWS):
+        pull = transform_points(goals, motion) - boundary.vertices
+        length = np.linalg.norm(pull, axis=1, keepdims=True)
+        longest_mm = max(MAX_PULL_MM, 2 * math.sqrt(np.mean(length**2)))
+        pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
+        for length_mm in CLOSE_SPRING_LENGTHS_MM:
+            self._step(boundary.vertices + pull, np.full(len(goals), length_mm), None)
             try:
-                self._step(transform_points(goals, motion), lengths, None, MAX_DRAW_HALVINGS)
                 self._straighten()
                 return self._move(np.linalg.inv(motion))
             except SolverError as error:
                 self.positions_mm, problem = start, str(error)
-                lengths = np.minimum(SOFTER * lengths, SPRING_LENGTH_MM)
         log.warning("the body is not drawn to a surface: %s", problem)
         return start
 
@@ -207,7 +237,7 @@ class ElasticFit:
         motion = self._fit(shape, self.positions_mm)
         untangled, faults = self._untangled(self.positions_mm, transform_points(shape, motion), UNTANGLING_MM)
         if not len(faults):
-            self.positions_mm, self._moved_straight = untangled, True
+            self.positions_mm, self._moved_straight = self._opened_after(self.positions_mm, untangled), True
             return self._move(np.linalg.inv(motion))
         log.info("%d faults remain on the way to a shape: the body follows it", len(faults))
         self.follow(shape)
@@ -238,28 +268,33 @@ class ElasticFit:
         the shape of now around the faults. Else they are states that the body has passed through since this was last
         called; elements and faces with faults between two of them that follow each other are warned of.
         """
-        # where curved elements fold over, their linear pieces may be valid
-        passed = [shape for shape in self._passed if has_volume(shape, self._tets).all()]
-        self._passed = []
+        passed, self._passed = self._passed, []
         if self._moved_straight:
             return []
         motion = self._fit(self.positions_mm, before)
         places, stops = self._stops(before, transform_points(self.positions_mm, motion), passed)
+        # changes around faults flatten elements
+        places = self._opened_after(stops[-1] if stops else before, places)
         self.positions_mm = transform_points(places, self._fit(places, self.positions_mm))
         chain = [before, *stops, places]
         lengths = [self._distance(first, second) for first, second in pairwise(chain)]
         parts = np.cumsum(lengths) / max(sum(lengths), 1e-12)
         return [(float(part), shape) for part, shape in zip(parts, stops, strict=False)]
 
-    def _stops(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> tuple[Floats, list[Floats]]:
+    def _stops(
+        self, before: Floats, after: Floats, passed: Sequence[Floats], halvings: int = MAX_WAY_HALVINGS
+    ) -> tuple[Floats, list[Floats]]:
         """Return the shape `after`, changed around faults, and the shapes to pass before it."""
         untangled, faults = self._untangled(before, after, UNTANGLING_MM[:2])
-        if len(faults) and len(passed):
-            ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
-            i = int(np.argmin(ways))
-            stop, first = self._stops(before, transform_points(passed[i], self._fit(passed[i], before)), passed[:i])
+        # a change that flattens elements is the last resort
+        needs_stop = len(faults) > 0 or self._flat_count(untangled) > self._flat_count(after)
+        i = self._halfway(before, after, passed) if needs_stop and halvings else None
+        if i is not None:
             # each shape is fitted to the one before, as on the path
-            last, second = self._stops(stop, transform_points(after, self._fit(after, stop)), passed[i + 1 :])
+            middle = transform_points(passed[i], self._fit(passed[i], before))
+            stop, first = self._stops(before, middle, passed[:i], halvings - 1)
+            end = transform_points(after, self._fit(after, stop))
+            last, second = self._stops(stop, end, passed[i + 1 :], halvings - 1)
             return last, [*first, stop, *second]
         if len(faults):
             # the shape stays as it is: it is valid, and a changed one may not be
@@ -268,6 +303,19 @@ class ElasticFit:
             text = "%d elements or faces are inverted or cross near %s mm on the way"
             log.warning(text, len(faults), np.round(faults[0], 1).tolist())
         return untangled, []
+
+    def _flat_count(self, places: Floats) -> int:
+        volumes = volumes_between(places, self._pieces)
+        return int((volumes < MIN_VOLUME_LEFT / 2 * self._start_volumes).sum())
+
+    def _halfway(self, before: Floats, after: Floats, passed: Sequence[Floats]) -> int | None:
+        """Return the number of the valid state that is nearest to the middle between two shapes; None without any."""
+        ways = [abs(self._distance(before, shape) - self._distance(shape, after)) for shape in passed]
+        for number in np.argsort(ways):
+            # where curved elements fold over, their linear pieces may be valid
+            if has_volume(passed[number], self._tets).all():
+                return int(number)
+        return None
 
     def _faults_between(self, before: Floats, after: Floats, least: float = 0.0) -> Floats:
         """Return the (k, 3) places before, of elements that are inverted and faces that cross on the straight way."""
@@ -308,7 +356,12 @@ class ElasticFit:
         self.positions_mm = transform_points(self.positions_mm, motion)
         return self.positions_mm
 
-    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None, halvings: int) -> None:
+    def _step(self, goals: Floats, lengths: Floats, strain: Floats | None) -> str:
+        """Grow by a strain (n, 6) and draw the boundary to goals (b, 3); return why the step did not converge, or "".
+
+        The body moves as far as the iteration went: each iterate lowers the energy, inverts no element, and crosses no
+        faces.
+        """
         domain, problem, self._moved_straight = self._domain, self._problem, False
         domain.place(self.positions_mm * M_PER_MM)
         self._contact.begin_step()
@@ -319,22 +372,78 @@ class ElasticFit:
             nodal = strain[self._elements.vertices][self._elements.cells]
             inverse = inverse_exponential(unpacked(problem.points.interpolation @ nodal))
         # as one body, also if its parts are not connected
-        problem.set_step(np.full(shape, MODULUS_PA), inverse, part=np.zeros_like(domain.part))
-        try:
-            solution = self._solver.solve()
-        except NotConvergedError as error:
-            if not halvings:
-                raise SolverError(
-                    "a shape cannot be reached without turning elements inside out or folds into each other",
-                    found=f"{error}; {self._solver.worst_places()}",
-                    remedy="Look at the labels or surfaces of this week and the one before at that place.",
-                ) from None
-            half = None if strain is None else strain / 2
-            self._step(0.5 * (goals + self.positions_mm[self._used]), lengths, half, halvings - 1)
-            self._step(goals, lengths, half, halvings - 1)
-            return
-        self.positions_mm = self.positions_mm + domain.gather(solution.displacement[: domain.n_owned]) * MM_PER_M
-        self._passed.append(self.positions_mm)
+        one_part = np.zeros_like(domain.part)
+        moduli, reason = np.full(shape, MODULUS_PA), ""
+        # where the stress of flat elements prevents any iteration, without it
+        for stretches in (self._flattening(), None):
+            problem.set_step(moduli, inverse, stretches, part=one_part)
+            try:
+                self._solver.solve()
+                reason = ""
+            except NotConvergedError as error:
+                reason = f"{error}; {self._solver.worst_places()}"
+            if not reason or self._solver.iterates:
+                break
+        start = self.positions_mm
+        for displacement in self._solver.iterates:
+            self.positions_mm = start + domain.gather(displacement[: domain.n_owned]) * MM_PER_M
+            self._passed.append(self.positions_mm)
+        opened = self._opened(self.positions_mm)
+        if opened is not self.positions_mm:
+            self.positions_mm = opened
+            self._passed.append(opened)
+        return reason
+
+    def _opened(self, places: Floats) -> Floats:
+        """Return positions (n, 3) at which flat elements are opened, as far as moves inside and small ones outside can.
+
+        No state is lost, since none is in the elements.
+        """
+        arguments = self._pieces, self._start_volumes
+        opened = open_flat_elements(places, *arguments, self._inner_moves_mm, MIN_VOLUME_LEFT)
+        # elements without a vertex inside need a small move of the boundary
+        moved = open_flat_elements(opened, *arguments, self._outer_moves_mm, MIN_VOLUME_LEFT)
+        if moved is not opened:
+            surface = TriangleMesh(moved[self._used], self._surface.faces)
+            opened = opened if len(faces_that_cross(surface)) else moved
+        return opened
+
+    def _opened_after(self, before: Floats, places: Floats) -> Floats:
+        """Return the positions of `_opened`, or those given where these have fewer faults on the way from before."""
+        opened = self._opened(places)
+        if opened is places:
+            return places
+        is_worse = len(self._faults_between(before, opened)) > len(self._faults_between(before, places))
+        return places if is_worse else opened
+
+    def _flattening(self) -> Floats:
+        """Return the (c, 1, 3, 3) stretches of flat elements, beyond that around them, which a step takes back.
+
+        The strain since the start is compared with that of the elements around. An element that has lost volume, and
+        more than these, is elastic as to the difference, while the body is without stress otherwise.
+        """
+        cells = self._elements.vertices[self._elements.cells]
+        corners = self.positions_mm[cells]
+        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        logs, volumes = log_stretch(edges @ self._inverse_edges, left=True), determinants(edges)
+        around = packed(logs)
+        for _ in range(FLATTENING_ROUNDS):
+            at_vertices = self._incidence @ (volumes[:, None] * around) / (self._incidence @ volumes)[:, None]
+            around = at_vertices[cells].mean(axis=1)
+        excess = logs - unpacked(around)
+        lost = -np.maximum(np.trace(logs, axis1=1, axis2=2), np.trace(excess, axis1=1, axis2=2))
+        flat = np.flatnonzero(lost > MIN_FLATTENING)
+        weight = np.minimum((lost[flat] - MIN_FLATTENING) / (MAX_FLATTENING - MIN_FLATTENING), 1.0)
+        stretches = np.tile(np.eye(3), (len(cells), 1, 1, 1))
+        stretches[flat, 0] = exponential(weight[:, None, None] * excess[flat], MAX_OPENING)
+        return stretches
+
+
+def exponential(logs: Floats, limit: float) -> Floats:
+    """Return exp(L) of symmetric (..., 3, 3) matrices; principal values beyond the limit count as this."""
+    values, axes = np.linalg.eigh(logs)
+    values = np.exp(np.clip(values, -limit, limit))
+    return np.asarray((axes * values[..., None, :]) @ axes.swapaxes(-1, -2))
 
 
 def inverse_exponential(logs: Floats) -> Floats:

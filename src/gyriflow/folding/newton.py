@@ -17,8 +17,6 @@ ENERGY_ROUND_OFF = 1e-12
 """Relative round-off of an energy, a sum over elements."""
 MIN_RESOLVED = 1e-6
 """Relative change below which energies cannot be compared: round-off at strains of a ten-thousandth."""
-MIN_PROGRESS = 1e-6
-"""Relative decrease of the energy above which an iteration does not count towards `max_newton`."""
 MAX_ITERATIONS_FACTOR = 10
 """Iterations allowed in all, as a multiple of `max_newton`."""
 STAGNATION_FACTOR = 10.0
@@ -35,7 +33,8 @@ class NewtonSettings:
     """Tolerances and limits of the iteration.
 
     `newton_tolerance` is relative to the residual at u = 0, `krylov_tolerance` to the linear right-hand side: see
-    `forcing_term`.
+    `forcing_term`. An iteration that lowers the energy by more than the fraction `min_progress` does not count towards
+    `max_newton`. `keeps_iterates` is for those who need the way to a solution.
     """
 
     newton_tolerance: float = 1e-4
@@ -43,6 +42,8 @@ class NewtonSettings:
     max_newton: int = 20
     max_krylov: int = 1000
     max_backtracks: int = 8
+    min_progress: float = 1e-6
+    keeps_iterates: bool = False
 
 
 @dataclass
@@ -104,7 +105,8 @@ class NewtonSolver:
 
     A residual below `residual_floor`, in N, counts as solved even if that at zero displacement is hardly larger. `last`
     is the residual of the current step's last iterate, even if the solve failed. `inverted` is det F (c, p) of the
-    local elements in its last trial that inverted an element, None if there was none.
+    local elements in its last trial that inverted an element, None if there was none. `iterates` are the displacements
+    (k, 3) of the current step's iterates, if they are kept.
     """
 
     def __init__(self, problem: NonlinearProblem, settings: NewtonSettings, residual_floor: float) -> None:
@@ -115,6 +117,7 @@ class NewtonSolver:
         self._first_left = 0.0  # fraction of the residual after the first iteration of the last step
         self.last: Residual | None = None
         self.inverted: Floats | None = None
+        self.iterates: list[Floats] = []
 
     def solve(self, *guesses: Floats) -> Solution:
         """Return the displacement of the step, starting from the first useful one of the guesses (k, 3) in m.
@@ -122,7 +125,7 @@ class NewtonSolver:
         NotConvergedError if the residual does not fall below the tolerance.
         """
         problem, settings = self.problem, self.settings
-        self.inverted = None
+        self.inverted, self.iterates = None, []
         self.last = at_rest = problem.residual(problem.rest())
         if not np.isfinite(at_rest.norm):
             raise NotConvergedError("the forces at zero displacement are not finite")
@@ -152,7 +155,9 @@ class NewtonSolver:
                     raise
                 tangent = problem.tangent(iterate.residual)
                 iterate = self._iterate(iterate, tangent, min(forcing, tightest), solution, convexify=not stagnates)
-            stalled += iterate.progress < MIN_PROGRESS
+            stalled += iterate.progress < settings.min_progress
+            if settings.keeps_iterates:
+                self.iterates.append(iterate.residual.displacement)
             if solution.newton == 1:
                 self._first_left = iterate.residual.norm / norm
             before = norm

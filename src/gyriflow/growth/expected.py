@@ -14,7 +14,7 @@ from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_piec
 from ..geometry.triangles import Floats, TriangleMesh
 from ..settings.growth import BEFORE_GW
 from .atlas_path import MIN_AGE_SPACING_GW, AtlasAges, AtlasPath, positions_at, resample_by_size
-from .series_shapes import FittedBody, SeriesShapes, fit_body, fit_onto_surface, tissue_below, with_stops
+from .series_shapes import FittedBody, SeriesShapes, WeekShape, fit_body, fit_onto_surface, tissue_below, with_stops
 
 DIFFERENCE_SMOOTHING_MM = 8.0
 """Smoothing (SD, mm) of the individual difference. Differences finer than a gyrus do not predict later folds."""
@@ -147,10 +147,10 @@ def predict_shapes(
     individual = {"smoothing_mm": smoothing_mm, "fading_gw": fading_gw}
     expected = expected_positions(mesh, start_week, grown, at, later, **individual)
     body = make_body(mesh)
-    shapes: list[tuple[float, Floats, bool]] = [(start_week, mesh.vertices, False)]
+    shapes = [WeekShape(start_week, mesh.vertices)]
     for week, shape in zip(later, expected[1:], strict=True):
         body.move_to(shape)
-        shapes += with_stops(shapes[-1][:2], week, body)
+        shapes += with_stops(shapes[-1], week, body)
     found = SeriesShapes.of(shapes)
     way = path_through(found.weeks, found.positions, mesh, stops=found.stops)
     between = sorted({*further_weeks} - {*found.weeks})

@@ -1,7 +1,7 @@
 """Shapes of a mesh through the weeks of its own series: carried from brain to brain, and fitted to each surface."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,8 +26,9 @@ REACH_MM, REACH_BY_TISSUE_MM = 4.0, 8.0
 """Largest distance over which a surface pulls: to points matched by normals, and by the tissue below."""
 FINAL_PULL_MM, OPENING_PULL_MM = (0.5,), (0.6,)
 """Smoothing (SD, mm) of the pull for the last draw of a body, and for the draws before it with open sulci."""
-MAX_OPENING_DRAWS, OPENED_MM = 6, 0.06
-"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square)."""
+MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
+"""Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square), or
+where more than this fraction of the distance was left by the last one."""
 MAX_MISFIT_MM = 0.25
 """Mean distance of a body from the surface it is fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
@@ -94,6 +95,15 @@ class FittedBody(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class WeekShape:
+    """The (n, 3) positions in mm of a mesh at a week, of an observed brain or of a stop on the way to it."""
+
+    week: float
+    positions: Floats
+    is_stop: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class SeriesShapes:
     """The (w, n, 3) positions in mm of a mesh at w weeks; `stops` are those of the weeks without an observed brain."""
 
@@ -102,38 +112,48 @@ class SeriesShapes:
     stops: list[float]
 
     @classmethod
-    def of(cls, shapes: Sequence[tuple[float, Floats, bool]]) -> "SeriesShapes":
-        """Return the shapes from ascending weeks with positions, and whether each is a stop."""
-        weeks = [week for week, _, _ in shapes]
-        stops = [week for week, _, is_stop in shapes if is_stop]
-        return cls(weeks, np.stack([positions for _, positions, _ in shapes]), stops)
+    def of(cls, shapes: Sequence[WeekShape]) -> "SeriesShapes":
+        """Return the shapes from those of ascending weeks."""
+        weeks = [shape.week for shape in shapes]
+        stops = [shape.week for shape in shapes if shape.is_stop]
+        return cls(weeks, np.stack([shape.positions for shape in shapes]), stops)
+
+    def by_week(self) -> list[WeekShape]:
+        """Return the shape of each week."""
+        shapes = []
+        for week, positions in zip(self.weeks, self.positions, strict=True):
+            shapes.append(WeekShape(week, positions, is_stop=week in self.stops))
+        return shapes
 
 
-def with_stops(before: tuple[float, Floats], week: float, body: FittedBody) -> list[tuple[float, Floats, bool]]:
-    """Return the shape of a body at a week, after the stops on its way from the week and shape before."""
-    way = [(round(before[0] + part * (week - before[0]), 2), shape) for part, shape in body.way_from(before[1])]
-    stops = {at: shape for at, shape in way if before[0] < at < week}
-    return [*((at, shape, True) for at, shape in stops.items()), (week, body.positions_mm, False)]
+def with_stops(before: WeekShape, week: float, body: FittedBody) -> list[WeekShape]:
+    """Return the shape of a body at a week, after the stops on its way from the shape before."""
+    stops = {}
+    for fraction, positions in body.way_from(before.positions):
+        stop_week = round(before.week + fraction * (week - before.week), 2)
+        # a stop that rounds to one of the two weeks is that week's shape itself
+        if before.week < stop_week < week:
+            stops[stop_week] = WeekShape(stop_week, positions, is_stop=True)
+    return [*stops.values(), WeekShape(week, body.positions_mm)]
 
 
 def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints, *, open_sulci: bool) -> None:
     """Let a body follow a shape, and fit its boundary to a target; `used` are the vertices of the boundary.
 
-    With `open_sulci` it is drawn several times, until it is close or stays as it is.
+    With `open_sulci` it is drawn several times, until it is close or hardly comes closer.
     """
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
         return
     surface, inner = target
+    gap_mm = np.inf
     for _ in range(MAX_OPENING_DRAWS if open_sulci else 0):
-        before = body.boundary.vertices
         goals = fit_onto_surface(body.boundary, surface, OPENING_PULL_MM, inner)
-        if np.sqrt(3 * np.mean((goals - before) ** 2)) < OPENED_MM:
+        last_mm, gap_mm = gap_mm, float(np.sqrt(3 * np.mean((goals - body.boundary.vertices) ** 2)))
+        if gap_mm < OPENED_MM or gap_mm > MAX_GAP_LEFT * last_mm:
             break
         body.draw(goals)
-        if np.allclose(body.boundary.vertices, before, atol=1e-6):
-            break
     body.draw(fit_onto_surface(body.boundary, surface, FINAL_PULL_MM, inner))
 
 
@@ -145,6 +165,8 @@ def follow_series(
     body: FittedBody | None = None,
     *,
     open_sulci: bool = False,
+    earlier: SeriesShapes | None = None,
+    after_week: Callable[[SeriesShapes], None] | None = None,
 ) -> SeriesShapes:
     """Carry a mesh's vertices through the brains of its series with its boundary fitted to theirs.
 
@@ -162,48 +184,59 @@ def follow_series(
     by matched surfaces, and `surfaces` are the pial surfaces of the later brains, all in the spaces of these
     correspondences.
 
+    `after_week` gets all shapes so far whenever one of a week is made. With such shapes as `earlier` an interrupted
+    series goes on.
+
     InputError if points leave the grid of a registration, or if the boundary is far from matched surfaces.
     """
     boundary, used = boundary_surface(mesh)
     pieces = linear_pieces(mesh)
     extend = harmonic_continuation(mesh.vertices, pieces, used)
-    shapes: list[tuple[float, Floats, bool]] = [(weeks[0], mesh.vertices, False)]
-    for week, (places, goals, target) in zip(
-        weeks[1:], _carried(boundary, used, shapes, pairs, surfaces, open_sulci), strict=False
-    ):
+    shapes = earlier.by_week() if earlier else [WeekShape(weeks[0], mesh.vertices)]
+    n_done = sum(not shape.is_stop for shape in shapes) - 1
+    if earlier:
+        log.info("going on after GW %g", shapes[-1].week)
+    if body is not None:
+        body.positions_mm = shapes[-1].positions
+    carried = _carried(boundary, used, shapes, pairs, surfaces, open_sulci)
+    for week in weeks[n_done + 1 :]:
+        places, goals, target = next(carried)
         before = shapes[-1]
         if target is not None:
             goals = fit_onto_surface(TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1])
         if body is not None:
             # on the shape of the week before, which has no inverted elements
-            extend = harmonic_continuation(before[1], pieces, used, CONTINUATION_TOL)
+            extend = harmonic_continuation(before.positions, pieces, used, CONTINUATION_TOL)
         shape = places + extend(goals - places[used])
         if body is None:
-            shapes.append((week, shape, False))
-            continue
-        fit_body(body, shape, target, used, open_sulci=open_sulci and target is not None)
-        if target is not None:
-            warn_of_misfit(body.boundary, target[0], week)
-        shapes += with_stops(before[:2], week, body)
+            shapes.append(WeekShape(week, shape))
+        else:
+            fit_body(body, shape, target, used, open_sulci=open_sulci and target is not None)
+            if target is not None:
+                warn_of_misfit(body.boundary, target[0], week)
+            shapes += with_stops(before, week, body)
+        if after_week:
+            after_week(SeriesShapes.of(shapes))
     return SeriesShapes.of(shapes)
 
 
 def _carried(
     boundary: TriangleMesh,
     used: Ints,
-    shapes: Sequence[tuple[float, Floats, bool]],
+    shapes: Sequence[WeekShape],
     pairs: Sequence[Correspondence],
     surfaces: Sequence[TriangleMesh],
     open_sulci: bool,
 ) -> Iterator[tuple[Floats, Floats, Target | None]]:
-    """Yield after each pair the (n, 3) places of the last of the shapes, the boundary's there, and its target."""
+    """Yield for each week that has no shape yet the (n, 3) places of the last shape, the boundary's, and its target."""
+    first = sum(not shape.is_stop for shape in shapes) - 1
     if matched := [pair for pair in pairs if isinstance(pair, MatchedSurfaces)]:
-        for moved in follow_surfaces(boundary, matched)[1:]:
-            yield shapes[-1][1], moved, None
+        for moved in follow_surfaces(boundary, matched)[first + 1 :]:
+            yield shapes[-1].positions, moved, None
         return
-    for number, pair in enumerate(pairs):
+    for number in range(first, len(pairs)):
+        pair, now = pairs[number], shapes[-1].positions
         assert isinstance(pair, Deformation)
-        now = shapes[-1][1]
         places = carry_over_weeks(now, [pair])[-1]
         before = TriangleMesh(now[used], boundary.faces)
         # below the observed surface: with the body's normals its roughness would add up from week to week
@@ -216,10 +249,15 @@ def tissue_below(boundary: TriangleMesh, observed: TriangleMesh, pair: Deformati
     return carry(pair, values_at(match_surface(boundary, observed), points_below(observed)))
 
 
+def misfit_mm(boundary: TriangleMesh, surface: TriangleMesh) -> tuple[float, float]:
+    """Return the mean distance of a boundary and a surface, and the larger quantile at 95 % of both ways."""
+    ways = ((boundary, surface), (surface, boundary))
+    return surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
+
+
 def warn_of_misfit(boundary: TriangleMesh, surface: TriangleMesh, week: float) -> None:
     """Log the distance of a body's boundary from the surface that it is fitted to, as a warning if it is large."""
-    ways = ((boundary, surface), (surface, boundary))
-    mean, far = surface_distance((nearest_on(first.vertices, second)[0], vertex_areas(first)) for first, second in ways)
+    mean, far = misfit_mm(boundary, surface)
     log.info("GW %g: %.3f mm from the observed surface on average, 95 %% below %.2f mm", week, mean, far)
     if mean > MAX_MISFIT_MM:
         text = "the shape at GW %g stays %.2f mm from the observed surface on average (95 %% below %.2f mm): the body "

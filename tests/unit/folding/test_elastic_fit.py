@@ -10,6 +10,7 @@ from shapes import box_mesh, ellipsoid_mesh, rigid
 from gyriflow.errors import SolverError
 from gyriflow.folding import elastic_fit
 from gyriflow.folding.elastic_fit import ElasticFit
+from gyriflow.folding.linear_solver import NotConvergedError
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.matching import crossing_faces
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces, volumes_between
@@ -91,12 +92,109 @@ def slit_block(low, high):
     return TetrahedralMesh(places[kept], numbers.reshape(-1, 4))
 
 
+UNSOLVABLE = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12, min_progress=1.0)
+"""Tolerances that no step meets."""
+
+
 def test_a_shape_that_cannot_be_reached_is_refused_with_its_place(monkeypatch):
-    settings = replace(elastic_fit.SETTINGS, max_newton=1, newton_tolerance=1e-12)
-    monkeypatch.setattr(elastic_fit, "SETTINGS", settings)
-    monkeypatch.setattr(elastic_fit, "MAX_HALVINGS", 1)
+    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
+    monkeypatch.setattr(elastic_fit, "MAX_LEFT_MM", 0.3)
     with pytest.raises(SolverError, check=Facts("det F", "element", "mm")):
         ElasticFit(BODY).follow(BODY.vertices * [1.6, 0.6, 1.0])
     # close to the shape, the body stays where it is
     found = ElasticFit(BODY).follow(BODY.vertices * [1.02, 0.98, 1.0])
     assert (volumes_between(found, BODY.tets) > 0).all()
+
+
+def test_a_step_that_is_not_solved_goes_as_far_as_it_comes(monkeypatch):
+    monkeypatch.setattr(elastic_fit, "SETTINGS", UNSOLVABLE)
+    goals = waves(0.5, 20.0)[USED]
+    body = ElasticFit(BODY)
+    body.positions_mm = 1.05 * BODY.vertices
+    before = np.linalg.norm(body.positions_mm[USED] - goals, axis=1).mean()
+    found = body.draw(goals)
+    assert np.linalg.norm(found[USED] - goals, axis=1).mean() < 0.3 * before
+    assert (volumes_between(found, BODY.tets) > 0).all()
+
+
+def test_what_cannot_be_drawn_is_held_and_the_rest_is_drawn():
+    mesh = slit_block(np.array([-10.0, -5.0, 0.0]), np.array([10.0, 5.0, 12.0]))
+    surface, used = boundary_surface(mesh)
+    goals = mesh.vertices[used].copy()
+    # the walls of the slit would move through each other
+    depth = np.clip((goals[:, 2] - 4) / 8, 0, 1)
+    goals[:, 0] -= 1.5 * np.sign(goals[:, 0]) * depth
+    bottom = goals[:, 2] == 0
+    goals[bottom, 2] -= 0.5 * np.sin(goals[bottom, 0] / 3)
+    body = ElasticFit(mesh)
+    found = body.draw(goals)[used]
+    assert crossing_faces(TriangleMesh(found, surface.faces)) == 0
+    misfit = np.linalg.norm(found - goals, axis=1)
+    before = np.linalg.norm(mesh.vertices[used] - goals, axis=1)
+    assert misfit[bottom].mean() < 0.3 * before[bottom].mean()
+    assert misfit.mean() < 0.6 * before.mean()
+
+
+def flattened():
+    """Return places at which a vertex inside has gone most of the way to the opposite face of one of its elements."""
+    inside = np.setdiff1d(np.arange(len(BODY.vertices)), USED)
+    vertex = inside[np.argmin(np.linalg.norm(BODY.vertices[inside] - [8, 8, 5], axis=1))]
+    tet = BODY.tets[(BODY.tets == vertex).any(axis=1)][0]
+    places = BODY.vertices.copy()
+    places[vertex] += 0.9 * (places[tet[tet != vertex]].mean(axis=0) - places[vertex])
+    assert 0 < ratios(places).min() < 0.15
+    return places
+
+
+def test_flat_elements_are_elastic_and_open_in_the_next_steps():
+    body = ElasticFit(BODY)
+    body.positions_mm = flattened()
+    for _ in range(3):
+        found = body.draw(body.boundary.vertices)
+    assert ratios(found).min() > 0.25
+    assert found[USED] == pytest.approx(BODY.vertices[USED], abs=0.05)
+    # nothing moves where the elements are as those around them
+    body.positions_mm = BODY.vertices * [1.2, 1.0, 0.9]
+    assert body.draw(body.positions_mm[USED]) == pytest.approx(BODY.vertices * [1.2, 1.0, 0.9], abs=1e-6)
+
+
+def test_a_step_that_flat_elements_prevent_is_made_without_their_stress(monkeypatch):
+    body = ElasticFit(BODY)
+    solver, stretches = body._solver, []
+    solve, set_step = solver.solve, body._problem.set_step
+
+    def set_and_note(mu, G_inverse, V, part):
+        stretches.append(V)
+        set_step(mu, G_inverse, V, part)
+
+    def fail_with_stress():
+        if stretches[-1] is None:
+            return solve()
+        solver.iterates = []
+        raise NotConvergedError("no descent direction")
+
+    monkeypatch.setattr(body._problem, "set_step", set_and_note)
+    monkeypatch.setattr(solver, "solve", fail_with_stress)
+    goals = waves(0.0, 20.0)[USED] + [0.0, 0.0, 0.5] * np.sin(BODY.vertices[USED, :1] / 5)
+    before = np.linalg.norm(body.boundary.vertices - goals, axis=1).mean()
+    assert np.linalg.norm(body.draw(goals)[USED] - goals, axis=1).mean() < 0.3 * before
+
+
+def test_elements_that_a_step_leaves_flat_are_opened(monkeypatch):
+    monkeypatch.setattr(ElasticFit, "_flattening", lambda self: None)
+    body = ElasticFit(BODY)
+    body.positions_mm = flattened()
+    assert ratios(body.draw(body.boundary.vertices)).min() == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypatch):
+    body = ElasticFit(BODY)
+    body.positions_mm = BODY.vertices
+    places = flattened()
+    # as if the change had made these
+    monkeypatch.setattr(body, "_untangled", lambda before, after, lengths: (places, np.empty((0, 3))))
+    assert ratios(body.move_to(BODY.vertices)).min() == pytest.approx(0.2, abs=1e-6)
+    assert body.way_from(BODY.vertices) == []
+    body.positions_mm, body._moved_straight = BODY.vertices, False
+    assert body.way_from(BODY.vertices) == []
+    assert ratios(body.positions_mm).min() == pytest.approx(0.2, abs=1e-6)

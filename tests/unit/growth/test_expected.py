@@ -104,6 +104,30 @@ def test_a_run_of_matched_surfaces_is_followed_from_its_first():
     assert positions[2] == pytest.approx(BALL.vertices, abs=1e-6)
 
 
+def test_an_interrupted_series_goes_on_from_its_last_week():
+    surfaces = [wavy(height_mm) for height_mm in (0.3, 0.6)]
+    states = []
+    whole = follow_series(BALL, WEEKS, [shift_map(1.0)] * 2, surfaces, ElasticFit(BALL), after_week=states.append)
+    first = states[0]
+    assert [state.weeks for state in states] == [[22.0, 23.0], WEEKS]
+    # the first registration is not used again
+    pairs = [None, shift_map(1.0)]
+    again = follow_series(BALL, WEEKS, pairs, surfaces, ElasticFit(BALL), earlier=first)
+    assert again.weeks == whole.weeks
+    assert np.array_equal(again.positions[:2], first.positions)
+    assert again.positions[2] == pytest.approx(whole.positions[2], abs=0.05)
+    assert np.abs(whole.positions[2] - whole.positions[1]).max() > 0.2
+
+
+def test_matched_surfaces_go_on_from_the_last_week():
+    pairs = [MatchedSurfaces(sphere(19.5), 1.1 * sphere(19.5).vertices)]
+    pairs.append(MatchedSurfaces(TriangleMesh(pairs[0].second, sphere(19.5).faces), 1.3 * sphere(19.5).vertices))
+    states = []
+    whole = follow_series(BALL, WEEKS, pairs, [], after_week=states.append)
+    again = follow_series(BALL, WEEKS, pairs, [], earlier=states[0])
+    assert again.positions == pytest.approx(whole.positions)
+
+
 def atlas_of(places, weeks=WEEKS):
     """Return an atlas that grows unevenly, at (n, 3) places, in a pose of its own each week."""
 
