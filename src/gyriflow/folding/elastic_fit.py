@@ -26,7 +26,7 @@ from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex
 from ..geometry.flat_elements import open_flat_elements
 from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way, lower_bounds
 from ..geometry.matching import faces_that_cross
-from ..geometry.straightening import straightened
+from ..geometry.straightening import straighten_sides
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
@@ -342,7 +342,7 @@ class ElasticFit:
         """Straighten the edges of curved elements that fold over; SolverError where that does not make them valid."""
         if self._tets is self._pieces:
             return
-        places = straightened(self.positions_mm, self._tets)
+        places = straighten_sides(self.positions_mm, self._tets)
         bad = lower_bounds(places, self._tets) <= 0
         if bad.any() or (volumes_between(places, self._pieces) <= 0).any():
             raise SolverError(

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from ..errors import SolverError
 from ..geometry.jacobians import EDGES
-from ..geometry.straightening import straightened_inside
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_faces
+from ..geometry.straightening import InnerSides
+from ..geometry.tetrahedra import TetrahedralMesh
 from ..geometry.triangles import Floats
 from ..mechanics.materials import MATERIALS
 from ..settings.folding import FoldingParameters, require_maps
@@ -91,9 +91,8 @@ class Folding:
         self.elements = Elements(self.domain.cells, self.domain.vertex_of_node, self.problem.points)
         self._pial = np.unique(zones.cortex_facets)
         # with stress memory, or growth that is recorded by element, tissue must stay in its element
-        self._has_free_nodes = mesh.order == 2 and not p.keeps_stretch and not p.targets
-        self._is_on_surface = np.zeros(len(mesh.vertices), dtype=bool)
-        self._is_on_surface[boundary_faces(mesh)[0]] = True
+        has_free_nodes = mesh.order == 2 and not p.keeps_stretch and not p.targets
+        self._inner_sides = InnerSides.of(mesh) if has_free_nodes else None
 
     def step(self, state: State, step_s: float) -> State:
         """Return the state after a step of a given length, with a new row of the step table.
@@ -128,18 +127,20 @@ class Folding:
         self.solved = SolvedStep(u, step_s, growth)
         grown = self.grown(state, growth)
         after = state.after(displacement, step_s, row, stretch, growth.correction(size), grown)
-        if self._has_free_nodes:
-            after = replace(after, positions=self.with_straight_sides(after.positions))
+        if self._inner_sides is not None:
+            after = replace(after, positions=self.straighten(after.positions))
         row["seconds"] = time.monotonic() - began
         return after
 
-    def with_straight_sides(self, positions: Floats) -> Floats:
-        """Return (n, 3) positions in m with straight inner sides of elements that are about to fold over.
+    def straighten(self, positions: Floats) -> Floats:
+        """Return (n, 3) positions in m with straighter inner sides of elements that are about to fold over.
 
         Nothing pulls the inner nodes of tissue without stress back, so that sides bow until a corner of their element
         turns over.
         """
-        straight = straightened_inside(positions, self.inputs.mesh.tets, MIN_STRAIGHTNESS, self._is_on_surface)
+        straight = None
+        if self.domain.comm.rank == 0 and self._inner_sides is not None:
+            straight = self._inner_sides.straighten(positions, MIN_STRAIGHTNESS)
         # from rank 0, since other processors may round differently
         return self.domain.comm.bcast(straight, root=0)
 

@@ -1,54 +1,91 @@
 """Straighten the sides of curved tetrahedra that fold over, or are about to."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .jacobians import EDGES, lower_bounds
-from .tetrahedra import volumes_between
-from .triangles import Floats
+from .tetrahedra import TetrahedralMesh, boundary_faces, volumes_between
+from .triangles import Floats, Ints
 
 ROUNDS = 6
-"""Number of rounds; each moves nodes halfway to the middle of their side, the last one fully."""
+"""Number of rounds in which nodes are moved."""
+PARTS = (1.0, 0.5, 0.25)
+"""Parts of the way to the middle of its side that an inner node may move in a round."""
+MIN_GAIN = 1e-3
+"""Least gain of straightness for which a node moves."""
 
 
-def straightened(
-    positions: Floats, tets: NDArray[np.integer], least: float = 0.0, fixed: NDArray[np.bool_] | None = None
-) -> Floats:
-    """Return (n, 3) positions with straighter sides of (m, 10) elements whose `straightness` is at most `least`.
+def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
+    """Return (n, 3) positions with straighter sides of (m, 10) elements that may fold over.
 
-    Nodes in the middle of their sides move towards the straight side, except `fixed` ones (n,). Elements may remain
-    below, and neighbours may get there.
+    In each round the nodes of their sides move halfway to the middle of the side, in the last one fully. Elements with
+    inverted corners still fold over.
     """
     places = positions.copy()
     for rounds_left in reversed(range(ROUNDS)):
-        bent = tets[straightness(places, tets) <= least]
+        bent = tets[lower_bounds(places, tets) <= 0]
         if not len(bent):
             break
         middles = bent[:, 4:]
         straight = places[bent[:, EDGES]].mean(axis=2)
-        target = straight if rounds_left == 0 else (straight + places[middles]) / 2
-        is_free = np.ones(middles.shape, dtype=bool) if fixed is None else ~fixed[middles]
-        places[middles[is_free]] = target[is_free]
+        places[middles] = straight if rounds_left == 0 else (straight + places[middles]) / 2
     return places
 
 
-def straightened_inside(
-    positions: Floats, tets: NDArray[np.integer], least: float, is_on_surface: NDArray[np.bool_]
-) -> Floats:
-    """Return (n, 3) positions with straighter inner sides of (m, 10) elements whose `straightness` is at most `least`.
+@dataclass(frozen=True, eq=False)
+class InnerSides:
+    """The sides of a mesh's (m, 10) elements that are not on its surface.
 
-    Nodes on the surface (n,) stay. Where that bends an element more, since its sides on the surface are bowed as well,
-    the inner sides of this element stay, too.
+    `ends` (n, 2) are the ends of the side in whose middle a node lies, -1 for corners and on the surface; `around`
+    (n, m) has the elements around each node.
     """
-    fixed = is_on_surface.copy()
-    before = straightness(positions, tets)
-    while True:
-        places = straightened(positions, tets, least, fixed)
-        after = straightness(places, tets)
-        is_worse = (after < before) & (after <= least)
-        if not is_worse.any():
-            return places
-        fixed[tets[is_worse, 4:]] = True
+
+    tets: Ints
+    ends: Ints
+    around: sparse.csr_array
+
+    @classmethod
+    def of(cls, mesh: TetrahedralMesh) -> "InnerSides":
+        """Return the inner sides of a mesh of quadratic elements."""
+        ends = np.full((len(mesh.vertices), 2), -1)
+        ends[mesh.tets[:, 4:]] = mesh.tets[:, EDGES]
+        ends[boundary_faces(mesh)[0]] = -1
+        elements = np.repeat(np.arange(len(mesh.tets)), mesh.tets.shape[1])
+        shape = len(mesh.vertices), len(mesh.tets)
+        around = sparse.coo_array((np.ones(len(elements), dtype=bool), (mesh.tets.ravel(), elements)), shape=shape)
+        return cls(mesh.tets, ends, around.tocsr())
+
+    def straighten(self, positions: Floats, least: float) -> Floats:
+        """Return (n, 3) positions with straighter inner sides of elements whose `straightness` is at most `least`.
+
+        A node moves only as far as this makes the least straight of the elements around it straighter: where the
+        surface is bowed, straight sides inside may be worse.
+        """
+        places = positions.copy()
+        for _ in range(ROUNDS):
+            bent = straightness(places, self.tets) <= least
+            nodes = np.unique(self.tets[bent])
+            moved = [self._move(places, node) for node in nodes[self.ends[nodes, 0] >= 0]]
+            if not any(moved):
+                break
+        return places
+
+    def _move(self, places: Floats, node: int) -> bool:
+        """Move a node towards the middle of its side if that straightens the elements around; return whether it did."""
+        start = places[node].copy()
+        way = places[self.ends[node]].mean(axis=0) - start
+        elements = self.tets[self.around.indices[self.around.indptr[node] : self.around.indptr[node + 1]]]
+        best, best_part = straightness(places, elements).min(), 0.0
+        for part in PARTS:
+            places[node] = start + part * way
+            least = straightness(places, elements).min()
+            if least > best + MIN_GAIN:
+                best, best_part = least, part
+        places[node] = start + best_part * way
+        return best_part > 0
 
 
 def straightness(positions: Floats, tets: NDArray[np.integer]) -> Floats:
