@@ -59,7 +59,7 @@ rule all:
         rules.report.input,
 
 
-# every job runs in the environment, and has a log and a benchmark file
+# every job runs in the environment, and has a log
 complete_rules(workflow.rules, ENVIRONMENT)
 SCRIPTS = Path(workflow.basedir, "workflow", "scripts")
 rerun_on_code_changes(workflow.rules, SCRIPTS)
@@ -79,6 +79,8 @@ onstart:
         elif rule.shellcmd:
             programs[rule.name] = SOLVER
     try:
-        require_for(programs)
+        # with conda or containers jobs have environments of their own
+        if not workflow.deployment_settings.deployment_method:
+            require_for(programs)
     except GyriflowError as error:
         end_with(error)

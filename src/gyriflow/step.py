@@ -5,7 +5,6 @@
 
 import logging
 import os
-import resource
 import sys
 import time
 import traceback
@@ -56,13 +55,19 @@ USAGE_COLUMNS = ("wall_s", "cpu_s", "memory_MiB")
 
 
 def usage() -> Usage:
-    """Return what this program has used, as the system counts it."""
+    """Return what this program has used, as the system counts it; on Windows without its children."""
+    wall_s = time.time() - psutil.Process().create_time()
+    if sys.platform == "win32":
+        memory = psutil.Process().memory_info().peak_wset
+        return Usage(wall_s, time.process_time(), memory / 2**20)
+    import resource
+
     own, children = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu_s = own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
     # macOS counts bytes, Linux KiB
     per_mib = 2**20 if sys.platform == "darwin" else 2**10
     memory_mib = max(own.ru_maxrss, children.ru_maxrss) / per_mib
-    return Usage(time.time() - psutil.Process().create_time(), cpu_s, memory_mib)
+    return Usage(wall_s, cpu_s, memory_mib)
 
 
 def record_usage(log: str | Path, used: Usage) -> None:

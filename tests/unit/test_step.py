@@ -93,7 +93,7 @@ def test_a_step_records_the_processor_time_of_itself_and_its_children_next_to_it
         resource.RUSAGE_SELF: SimpleNamespace(ru_utime=2.0, ru_stime=0.5, ru_maxrss=2**20),
         resource.RUSAGE_CHILDREN: SimpleNamespace(ru_utime=10.0, ru_stime=0.25, ru_maxrss=3 * 2**20),
     }
-    monkeypatch.setattr(step_module.resource, "getrusage", counted.get)
+    monkeypatch.setattr(resource, "getrusage", counted.get)
     monkeypatch.setattr(step_module.sys, "platform", "linux")
     (tmp_path / "a" / "logs").mkdir(parents=True)
     with step(str(tmp_path / "a" / "logs" / "one.week-21.00.log")):

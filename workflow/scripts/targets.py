@@ -38,6 +38,12 @@ with step(snakemake.log[0]):
     settings = [params.weeks, params.posed, open_sulci, params.code]
     unfinished = unfinished_series(snakemake.output[0], made_from, settings)
     state = unfinished.read()
+
+    def keep(shapes: SeriesShapes) -> None:
+        # a fit does not end for a checkpoint that cannot be written
+        with suppress(StorageError):
+            unfinished.write(shapes.weeks, shapes.positions, shapes.stops)
+
     found = follow_series(
         mesh,
         params.weeks,
@@ -46,7 +52,7 @@ with step(snakemake.log[0]):
         ElasticFit(mesh),
         open_sulci=open_sulci,
         earlier=SeriesShapes(*state) if state else None,
-        after_week=lambda shapes: unfinished.write(shapes.weeks, shapes.positions, shapes.stops),
+        after_week=keep,
     )
     sizes = sizes_of(mesh, found.positions)
     key = ""

@@ -115,7 +115,7 @@ class ContactSearch:
         pairs = ipctk.NormalCollisions()
         pairs.use_area_weighting = True
         pairs.build(candidates, mesh, at, self._distance)
-        pairs = without_parallel_edges(pairs, part.edges, at)
+        pairs = drop_parallel_edges(pairs, part.edges, at)
         return NearPairs(positions, part, mesh, at, part.owned_pairs(pairs))
 
     def collision_free_step(self, start: NearPairs, displacement: Floats) -> float:
@@ -131,15 +131,18 @@ class ContactSearch:
             # the initial guess of a step is close to its solution, so the whole step needs no other search
             part, mesh, candidates = self._search(first, last)
         ends = part.restrict(first), part.restrict(last)
-        if candidates is not None:
+        if candidates is None:
+            step = ipctk.compute_collision_free_stepsize(
+                mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=CCD
+            )
+        else:
             step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
-            if step < MIN_STEP:
-                candidates = without_distant_parallel_edges(candidates, part.edges, *ends)
-                step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
-            return float(step)
-        return float(
-            ipctk.compute_collision_free_stepsize(mesh, *ends, broad_phase=self._broad_phase, narrow_phase_ccd=CCD)
-        )
+        if step < MIN_STEP:
+            if candidates is None:
+                part, mesh, candidates = self._search(first, last)
+            candidates = drop_distant_parallel_edges(candidates, part.edges, *ends)
+            step = candidates.compute_collision_free_stepsize(mesh, *ends, narrow_phase_ccd=CCD)
+        return float(step)
 
     def part_at(self, *positions: Floats) -> tuple[SurfacePart, ipctk.CollisionMesh]:
         """Return a part of the surface with all pairs of the rank, at each of the given (s, 3) positions in mm."""
@@ -170,7 +173,7 @@ class ContactSearch:
         return part, mesh, candidates
 
 
-def without_parallel_edges(
+def drop_parallel_edges(
     pairs: ipctk.NormalCollisions, edges: NDArray[np.integer], positions: Floats
 ) -> ipctk.NormalCollisions:
     """Return the pairs without those of two edges (e, 2) that are parallel, at positions (p, 3) of their vertices.
@@ -192,7 +195,7 @@ def without_parallel_edges(
     return result
 
 
-def without_distant_parallel_edges(
+def drop_distant_parallel_edges(
     candidates: ipctk.Candidates, edges: NDArray[np.integer], first: Floats, last: Floats
 ) -> ipctk.Candidates:
     """Return the candidates without those of parallel edges that cannot meet between positions `first` and `last`.

@@ -81,8 +81,8 @@ the largest move of vertices on the boundary for elements that have no others.""
 STRAIN_PER_STEP = 0.1
 """Largest mean linear strain per step; more steps than one take longer and press elements flatter."""
 MAX_LEFT_MM = 3.0
-"""Largest distance, as a root mean square, at which a body may stay from a shape: it is warned of, and the way to the
-next shape begins there."""
+"""Largest distance, as a root mean square, at which a body may stay from a shape: the way to the next shape begins
+there."""
 SETTINGS = NewtonSettings(
     newton_tolerance=2e-2,
     krylov_tolerance=1e-2,
@@ -174,9 +174,9 @@ class ElasticFit:
     def follow(self, shape: Floats) -> Floats:
         """Move the body to near a shape (n, 3) in mm, which may have inverted elements; return its (n, 3) positions.
 
-        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. Where it
-        cannot go on it stays, with a warning, or SolverError with the place if its boundary is still more than
-        `MAX_LEFT_MM` from that of the shape (root mean square).
+        The body grows by the shape's smoothed stretch while springs draw its boundary to that of the shape. It stays
+        where it cannot go on; SolverError with the place if its boundary is still more than `MAX_LEFT_MM` from that of
+        the shape (root mean square).
         """
         boundary = self.boundary
         motion = rigid_fit(shape[self._used], boundary.vertices, vertex_areas(boundary))
@@ -209,8 +209,8 @@ class ElasticFit:
     def draw(self, goals: Floats) -> Floats:
         """Draw the boundary towards (b, 3) goals in mm close to it, without growth; return the (n, 3) positions in mm.
 
-        What cannot be drawn further stays where it is. Springs that fold curved elements over are softened; a body
-        that cannot be drawn at all stays as it is, with a warning.
+        What cannot be drawn further stays where it is. Springs that fold curved elements over are softened; where soft
+        ones do, too, the body stays as it is, with a warning.
         """
         boundary, start = self.boundary, self.positions_mm
         motion = rigid_fit(goals, boundary.vertices, vertex_areas(boundary))
@@ -218,6 +218,7 @@ class ElasticFit:
         length = np.linalg.norm(pull, axis=1, keepdims=True)
         longest_mm = max(MAX_PULL_MM, 2 * math.sqrt(np.mean(length**2)))
         pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
+        n_passed = len(self._passed)
         for length_mm in CLOSE_SPRING_LENGTHS_MM:
             self._step(boundary.vertices + pull, np.full(len(goals), length_mm), None)
             try:
@@ -225,6 +226,7 @@ class ElasticFit:
                 return self._move(np.linalg.inv(motion))
             except SolverError as error:
                 self.positions_mm, problem = start, str(error)
+                del self._passed[n_passed:]
         log.warning("the body is not drawn to a surface: %s", problem)
         return start
 

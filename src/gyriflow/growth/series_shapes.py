@@ -30,7 +30,7 @@ MAX_OPENING_DRAWS, OPENED_MM, MAX_GAP_LEFT = 6, 0.06, 0.9
 """Largest number of these draws; they end when the boundary is closer than this to its goals (root mean square), or
 where more than this fraction of the distance was left by the last one."""
 MAX_MISFIT_MM = 0.25
-"""Mean distance of a body from the surface it is fitted to above which a warning is logged."""
+"""Mean distance of a body from the surface or shape it is fitted to above which a warning is logged."""
 CONTINUATION_TOL = 1e-4
 """Relative tolerance of the harmonic continuation that a body follows."""
 Target = tuple[TriangleMesh, Floats | None]
@@ -145,6 +145,9 @@ def fit_body(body: FittedBody, shape: Floats, target: Target | None, used: Ints,
     body.follow(shape)
     if target is None:
         body.draw(shape[used])
+        left_mm = float(np.sqrt(3 * np.mean((body.boundary.vertices - shape[used]) ** 2)))
+        if left_mm > MAX_MISFIT_MM:
+            log.warning("a body stays %.2f mm (root mean square) from a shape that it cannot reach", left_mm)
         return
     surface, inner = target
     gap_mm = np.inf
@@ -199,8 +202,7 @@ def follow_series(
     if body is not None:
         body.positions_mm = shapes[-1].positions
     carried = _carried(boundary, used, shapes, pairs, surfaces, open_sulci)
-    for week in weeks[n_done + 1 :]:
-        places, goals, target = next(carried)
+    for week, (places, goals, target) in zip(weeks[n_done + 1 :], carried, strict=True):
         before = shapes[-1]
         if target is not None:
             goals = fit_onto_surface(TriangleMesh(goals, boundary.faces), target[0], PULL_MM, target[1])

@@ -1,4 +1,4 @@
-"""What a file that studies share was made from: a description that names files, and a key of it with their contents."""
+"""The origin of a file that studies share: a description that names files, and a key of it with their contents."""
 
 import hashlib
 import json

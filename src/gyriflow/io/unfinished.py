@@ -66,8 +66,10 @@ def unfinished_series(result: AnyPath, inputs: Iterable[AnyPath], settings: Any)
     """
     made_from = [sha256_of(path) for path in inputs]
     key = hashlib.sha256(json.dumps([made_from, settings]).encode()).hexdigest()[:12]
-    folder = Path(result).parent / f"checkpoint-{key}"
-    for other in folder.parent.glob("checkpoint-*"):
+    # results of several origins may be in one folder
+    name = f"{Path(result).stem}-checkpoint"
+    folder = Path(result).parent / f"{name}-{key}"
+    for other in folder.parent.glob(f"{name}-*"):
         if other != folder:
             shutil.rmtree(other, ignore_errors=True)
     return UnfinishedSeries(folder)

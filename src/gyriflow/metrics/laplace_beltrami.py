@@ -104,7 +104,12 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
 
     slices = []
     for i in range(n_slices):
-        slices.append(_modes_between(stiffness, mass, ends[i], ends[i + 1], counts[i + 1] - counts[i]))
+        low, high = ends[i], ends[i + 1]
+        try:
+            slices.append(_modes_between(stiffness, mass, low, high, counts[i + 1] - counts[i]))
+        except (linalg.LinAlgError, RuntimeError) as error:
+            problem = f"the modes with λ from {low:g} to {high:g} mm⁻² could not be found"
+            raise SolverError(problem, found=str(error), remedy=SLIVERS) from error
     eigenvalues = np.concatenate([modes.eigenvalues for modes in slices])
     return Modes(eigenvalues, np.hstack([modes.functions for modes in slices]))
 
@@ -112,7 +117,7 @@ def modes_below(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, value: fl
 def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: float, high: float, count: int) -> Modes:
     """Return the `count` modes with low < λ < high, by block Lanczos with (K − σM)⁻¹ M and σ in the middle.
 
-    SolverError where the number of modes found is another one.
+    SolverError where not all are found.
     """
     shift = 0.5 * (low + high)
     solve = _factorised(stiffness, mass, shift).solve
@@ -150,7 +155,8 @@ def _modes_between(stiffness: sparse.csc_matrix, mass: sparse.csc_matrix, low: f
             functions = basis[:, :used] @ vectors[:, is_inside][:, order]
             # Rayleigh's quotient is more exact than 1/θ where the shift is near an eigenvalue
             return Modes(np.sum(functions * (stiffness @ functions), axis=0), functions)
-    raise SolverError("the number of modes is wrong", found=found, expected=count, remedy=SLIVERS)
+    problem = f"not all modes with λ from {low:g} to {high:g} mm⁻² were found"
+    raise SolverError(problem, found=found, expected=count, remedy=SLIVERS)
 
 
 def _orthonormalised(block: Floats, mass: sparse.csc_matrix) -> tuple[Floats, Floats]:

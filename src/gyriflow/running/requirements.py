@@ -1,4 +1,4 @@
-"""What jobs need besides the base packages: those of the extra `fold`, a C compiler, and libraries of the system.
+"""Requirements of jobs besides the base packages: the extra `fold`, a C compiler, and libraries of the system.
 
 `python -m gyriflow.running.requirements` prints the Debian packages that this machine lacks; `./run` installs them.
 """
