@@ -14,14 +14,17 @@ OF_PARTS = [str(FOLDER / f"{name}_cases.py") for name in ("growth", "linear_solv
 """Whose answers hang on how many neighbours a rank's part of the mesh has: with three there are two of them."""
 
 
+RUNS = [(2, case) for case in CASES]
 # more ranks than this machine may have cores take long
-THREE = pytest.param(3, OF_PARTS, marks=pytest.mark.extended)
+RUNS += [pytest.param(3, case, marks=pytest.mark.extended) for case in OF_PARTS]
 
 
-@pytest.mark.parametrize(("ranks", "cases"), [(2, CASES), THREE], ids=["2", "3"])
-def test_cases_hold_on(ranks, cases):
+# a file each, since MPICH has at most 2048 communicators in a process, and what cases leave behind has some
+@pytest.mark.parametrize(("ranks", "case"), RUNS)
+def test_cases_hold_on(ranks, case):
     program = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
-    command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", *cases]
+    command = ["mpiexec", "-n", str(ranks), *program, "-m", "not one_rank", case]
     done = ran(*command, timeout_s=1200)
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
-    assert done.stdout.count(" passed") == ranks, done.stdout
+    # 5: all cases of the file are for one rank
+    assert done.returncode in (0, 5), done.stdout[-6000:] + done.stderr[-2000:]
+    assert done.stdout.count(" passed") == (ranks if done.returncode == 0 else 0), done.stdout
