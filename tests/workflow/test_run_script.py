@@ -52,7 +52,7 @@ SHIM = """#!/bin/sh
 echo "pyenv: $(basename "$0"): command not found" >&2
 exit 127
 """
-OLD_GLIBC = "#!/bin/sh\necho glibc 2.28\n"
+OLD_GLIBC = "#!/bin/sh\necho glibc 2.34\n"
 
 
 def write_program(folder, name, text):
@@ -156,11 +156,17 @@ def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
     assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
 
 
+def test_a_python_with_wheels_goes_before_3_14(outside, tmp_path):
+    for name in ("python3", "python3.14"):
+        write_program(tmp_path / "programs", name, PYTHON.replace("from the environment", "from 3.14"))
+    assert run("tool", "1", env=outside).stdout == "from the environment: 1\n"
+
+
 def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
     write_program(tmp_path / "programs", "uname", '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n')
     done = run("tool", env=outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"})
     assert done.returncode == 2
-    assert done.stderr == Facts("3.12", "2.34", "envs/gyriflow.yaml")
+    assert done.stderr == Facts("3.12", "2.35", "envs/gyriflow.yaml")
 
 
 @pytest.mark.parametrize(
