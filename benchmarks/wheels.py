@@ -3,9 +3,9 @@
     pip install uv
     ./run python benchmarks/wheels.py
 
-uv resolves the requirements of `pyproject.toml`, and what they need in turn, with the wheels that the package index has
-for each system and version of Python. `measuring` are the dependencies alone, `fold` those with the extra, whose markers
-are ignored. The last line is one JSON object.
+uv resolves the requirements of `pyproject.toml`, and what they need in turn, with the wheels that the package index
+has for each system and version of Python. `measuring` are the dependencies alone, `fold` those with the extra, whose
+markers are ignored. The last line is one JSON object.
 """
 
 import re

@@ -3,9 +3,9 @@
     python3 -m venv plain && plain/bin/pip install .
     ./run python benchmarks/without_solver.py plain/bin/gyriflow --data ../shared/data --out FOLDER
 
-DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and `hemispheres/fetal.week21.{left,right}.pial.surf.gii`. Each
-brain is a study of its own, measured on one core to the report. The last line is one JSON object: for each brain the CPU
-seconds of all processes, the memory of the largest one, and the largest relative difference of the results, as
+DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and `hemispheres/fetal.week21.{left,right}.pial.surf.gii`.
+Each brain is a study of its own, measured on one core to the report. The last line is one JSON object: for each brain
+the CPU seconds of all processes, the memory of the largest one, and the largest relative difference of the results, as
 `same_results.py` compares them. The exit code is 1 if one is above 1e-6 or a file is missing.
 """
 

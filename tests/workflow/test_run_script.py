@@ -252,7 +252,7 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
     assert process.wait(20) == code
     if number != signal.SIGKILL:
         assert process.stderr.read() == Facts("gyriflow:")
-        assert not running(OWN)
+        assert wait_until(lambda: not running(OWN))
     # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
     for orphan in running(OWN):
         os.kill(orphan, signal.SIGTERM)
