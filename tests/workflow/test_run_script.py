@@ -188,6 +188,11 @@ def test_conda_environment_is_made_once_and_activated(with_conda, tmp_path, name
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
 
 
+def test_bytecode_is_kept_which_every_process_would_make_again(outside):
+    done = run("printenv", "PYTHONDONTWRITEBYTECODE", env=outside | {"PYTHONDONTWRITEBYTECODE": "1"})
+    assert (done.stdout, done.returncode) == ("", 1)
+
+
 def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(outside, tmp_path):
     write_program(tmp_path / "programs", "getent", f"#!/bin/sh\necho me:x:0:0::{tmp_path}/home:/bin/sh\n")
     env = {name: value for name, value in outside.items() if name not in ("GYRIFLOW_CACHE", "XDG_CACHE_HOME")}
