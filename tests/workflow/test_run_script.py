@@ -52,7 +52,7 @@ SHIM = """#!/bin/sh
 echo "pyenv: $(basename "$0"): command not found" >&2
 exit 127
 """
-OLD_GLIBC = "#!/bin/sh\necho glibc 2.28\n"
+OLD_GLIBC = "#!/bin/sh\necho glibc 2.34\n"
 
 
 def write_program(folder, name, text):
@@ -156,11 +156,17 @@ def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
     assert run("tool", "1", env=env).stdout == "from the environment: 1\n"
 
 
+def test_a_python_with_wheels_goes_before_3_14(outside, tmp_path):
+    for name in ("python3", "python3.14"):
+        write_program(tmp_path / "programs", name, PYTHON.replace("from the environment", "from 3.14"))
+    assert run("tool", "1", env=outside).stdout == "from the environment: 1\n"
+
+
 def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
     write_program(tmp_path / "programs", "uname", '#!/bin/sh\n[ "$1" = -m ] && echo aarch64 || echo Linux\n')
     done = run("tool", env=outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"})
     assert done.returncode == 2
-    assert done.stderr == Facts("3.12", "2.34", "envs/gyriflow.yaml")
+    assert done.stderr == Facts("3.12", "2.35", "envs/gyriflow.yaml")
 
 
 @pytest.mark.parametrize(
@@ -180,6 +186,11 @@ def test_conda_environment_is_made_once_and_activated(with_conda, tmp_path, name
 
     made = f"{create} -p {prefix} -f {ROOT}/envs/gyriflow.yaml"
     assert (tmp_path / "record").read_text().splitlines() == [made, hook, hook]
+
+
+def test_bytecode_is_kept_which_every_process_would_make_again(outside):
+    done = run("printenv", "PYTHONDONTWRITEBYTECODE", env=outside | {"PYTHONDONTWRITEBYTECODE": "1"})
+    assert (done.stdout, done.returncode) == ("", 1)
 
 
 def test_an_empty_home_is_that_of_the_user_not_the_root_of_the_system(outside, tmp_path):
@@ -246,7 +257,7 @@ def test_interrupted_set_up_leaves_nothing_running_and_is_redone(outside, tmp_pa
     assert process.wait(20) == code
     if number != signal.SIGKILL:
         assert process.stderr.read() == Facts("gyriflow:")
-        assert not running(OWN)
+        assert wait_until(lambda: not running(OWN))
     # after SIGKILL the stand-in is gone, yet not what it had started: the next run waits for that
     for orphan in running(OWN):
         os.kill(orphan, signal.SIGTERM)
