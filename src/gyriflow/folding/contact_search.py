@@ -221,10 +221,14 @@ def drop_distant_parallel_edges(
 def parallel_edges(pairs: Sequence[EdgePair], edges: NDArray[np.integer], positions: Floats) -> NDArray[np.bool_]:
     """Return for each pair whether its two edges (e, 2) are parallel at (p, 3) positions of their vertices."""
     numbers = np.array([(pair.edge0_id, pair.edge1_id) for pair in pairs], dtype=np.int64).reshape(-1, 2)
-    directions = positions[edges[:, 1]] - positions[edges[:, 0]]
-    first, second = directions[numbers[:, 0]], directions[numbers[:, 1]]
+    # of the edges in pairs only, which are few: this is called at each evaluation of forces
+    ends = positions[edges[numbers]]
+    directions = ends[:, :, 1] - ends[:, :, 0]
+    first = directions[:, 0]
+    second = directions[:, 1]
+    crosses = np.linalg.norm(np.cross(first, second), axis=1)
     lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
-    return np.asarray(np.linalg.norm(np.cross(first, second), axis=1) < PARALLEL_TOL * lengths)
+    return np.asarray(crosses < PARALLEL_TOL * lengths)
 
 
 def can_meet(first: Floats, last: Floats) -> bool:
