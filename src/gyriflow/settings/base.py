@@ -31,15 +31,6 @@ from ..errors import InputError
 PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
 
-REMOVED_KEYS = {
-    ("Contact", "distance_mm"): "contact begins at a fifth of the mean edge, or at the smallest gap of the start",
-    ("Contact", "gap_mm"): "the planes follow the fissure of the start brain",
-    ("Solver", "max_newton"): "a step is halved after 20 Newton iterations without progress",
-    ("MeshSettings", "min_radius_ratio"): "elements with a radius ratio below 0.001 are refused",
-    ("GrowthSettings", "atlas_ages"): "atlas brains have the ages at which the curve of their volumes has their size",
-}
-"""What holds instead of keys that earlier versions had, by class of settings and key."""
-
 
 @dataclass(frozen=True)
 class KeyProblem:
@@ -165,15 +156,14 @@ def _message(details: ErrorDetails, kind: type[BaseModel]) -> tuple[Key, str]:
 
 
 def unknown_key(kind: Any, path: Key) -> str:
-    """Return the message for a key that settings of a kind do not have: that it was removed, or the nearest keys.
+    """Return the message for a key that settings of a kind do not have, with the nearest keys.
 
     It is empty where there is such a key, or where no settings are.
     """
     settings, key = settings_at(kind, path[:-1]), str(path[-1])
     if settings is None or key in settings.model_fields:
         return ""
-    removed = REMOVED_KEYS.get((settings.__name__, key))
-    return f"was removed; {removed}" if removed else f"unknown key; {did_you_mean(key, settings.model_fields)}"
+    return f"unknown key; {did_you_mean(key, settings.model_fields)}"
 
 
 def settings_at(kind: Any, path: Key) -> type[Settings] | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationInfo, field_validator
 
 from ..errors import InputError
-from .base import KeyProblem, Settings, line, refused, validated
+from .base import KeyProblem, Settings, line, validated
 from .ensemble import Ensemble
 from .growth import Growth
 from .terms import FieldName, MaterialName, Side
@@ -144,13 +144,6 @@ class FoldingSettings(Settings):
         for key in GROWTH_RATES:
             if key not in self.growth.definition.rates and self.is_set(key):
                 yield KeyProblem(f"is not used by the growth model {self.growth.model}; remove it", (key,))
-
-    @field_validator("support", mode="before")
-    @classmethod
-    def _no_box(cls, value: Any) -> Any:
-        if value == "box":
-            raise refused("found box, which was removed; expected ellipsoid or free")
-        return value
 
     @field_validator("*")
     @classmethod

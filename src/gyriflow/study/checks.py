@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
 from ..quantities import METRICS
-from ..settings.base import Key, KeyProblem, did_you_mean, messages, unknown_key
+from ..settings.base import Key, KeyProblem, did_you_mean, messages
 from ..settings.folding import VARYING, value_problems
 from ..settings.root import Config
 from ..settings.runs import (
@@ -46,6 +46,7 @@ RESERVED_STUDIES = (
     *("benchmarks", "calibration", "figures", "growth", "logs", "matched", "registration", "tables", "validation"),
 )
 """Names that sweeps may not have, since other results of the study have folders of these names."""
+NO_FOLDING_KEY = "is not a key of folding"
 
 
 def problems_between(config: Config) -> list[KeyProblem]:
@@ -269,7 +270,7 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
         try:
             settings = changed(base, study.changes(combination))
         except KeyError as error:
-            yield KeyProblem(_no_key(error.args[0]), places[error.args[0]])
+            yield KeyProblem(NO_FOLDING_KEY, places[error.args[0]])
             return
         except ValidationError as error:
             for path, text in messages(error, Run):
@@ -278,11 +279,6 @@ def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyP
         else:
             for problem in value_problems(settings, settings.end_week - 1e-9, {}):
                 yield KeyProblem(problem.text, (*key, "vary", *problem.key))
-
-
-def _no_key(key: str) -> str:
-    text = unknown_key(Run, tuple(key.split(".")))
-    return text if text.startswith("was removed") else "is not a key of folding"
 
 
 def _comparison_problems(settings: ComparisonSettings, config: Config, key: Key) -> Iterator[KeyProblem]:
@@ -328,7 +324,7 @@ def _parameter_problems(key: str, bounds: Sequence[float], base: Run) -> Iterato
             try:
                 changed(base, {key: bound})
             except KeyError:
-                yield _no_key(key)
+                yield NO_FOLDING_KEY
                 return
             except ValidationError as error:
                 yield from dict.fromkeys(text for _, text in messages(error, Run))

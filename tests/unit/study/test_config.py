@@ -153,20 +153,3 @@ def test_editors_find_the_schema_of_each_example_and_it_holds(path):
     assert (path.parent / named).resolve() == CONFIG / "schema.json"
     content = json.loads(json.dumps(read_yaml(path)))  # keys of JSON are texts
     jsonschema.validate(content, SCHEMA)
-
-
-@pytest.mark.parametrize(
-    ("section", "keys"),
-    [
-        ({"mesh": {"min_radius_ratio": 0.02}}, "mesh.min_radius_ratio"),
-        ({"growth": {"atlas_ages": "stated"}}, "growth.atlas_ages"),
-        ({"folding": {"end_week": 24, "contact": {"distance_mm": 0.2}}}, "folding.contact.distance_mm"),
-        ({"runs": {"x": {"contact": {"gap_mm": 2.5}}}}, "runs.x.contact.gap_mm"),
-        ({"runs": {"x": {"solver": {"max_newton": 30}}}}, "runs.x.solver.max_newton"),
-        ({"folding": {"end_week": 24, "support": "box"}}, "folding.support"),
-        ({"studies": {"s": {"base": "reference", "vary": {"contact.gap_mm": [2, 3]}, "compare_week": 22.5}}},
-         "studies.s.vary.contact.gap_mm"),
-    ],
-)  # fmt: skip
-def test_of_removed_keys_and_values_it_is_said_that_they_were_removed(section, keys):
-    assert problems(study(**section)) == [Facts(f"{keys}:", "was removed")]
