@@ -50,6 +50,8 @@ rule pial:
         f"{BRAIN}/logs/pial.log",
     wildcard_constraints:
         brain=brains_with(*SIDES, has_thickness=False),
+    # before measuring: simulations wait for surfaces, and brains that cannot be read are known early
+    priority: 1
     resources:
         mem_mb=surface_memory,
     params:
