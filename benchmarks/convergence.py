@@ -1,6 +1,7 @@
 """Measure how the folds of a brain depend on the mesh, the order of the elements and the time step.
 
     ./run python benchmarks/convergence.py --folder FOLDER
+    ./run python benchmarks/convergence.py --folder FOLDER --only quadratic-1.41-1-days --end-week 32
 
 The left half of the shipped atlas brain of 21 GW is folded with the paper's thickness, stiffness and growth, the same
 everywhere, free and in contact with itself, until its gyrification index is 1.3. Resolution is the number of node
@@ -10,12 +11,15 @@ is measured and compared with that of the finest run at the same material points
 
 Runs are done one after another on one rank; finished runs in FOLDER are not repeated. Each run prints a JSON line. The
 last line is one JSON object with `runs`, the values of the finest one and the differences from it (`against_finest`).
+With `--only` some runs are done and nothing is compared: to another `--end-week`, or with another rate of growth of the
+core (`--core-growth`). Give such runs a folder of their own.
 """
 
 import argparse
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -45,6 +49,7 @@ from gyriflow.shipped import ATLASES
 
 LABELS = ATLASES / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
 START_WEEK, END_WEEK, OUTPUTS_A_WEEK = 21.0, 30.0, 2
+CORE_GROWTH_PER_S = 0.8e-7
 END_GI = 1.3
 """Gyrification index of the finest run at which all runs are compared."""
 SURFACE_EDGE_MM = 0.6
@@ -58,15 +63,12 @@ THICKNESS_MM = 1.5
 DAY_S = 86400.0
 PARAMETERS = {
     "start_week": START_WEEK,
-    "end_week": END_WEEK,
-    "output_weeks": np.linspace(START_WEEK, END_WEEK, int((END_WEEK - START_WEEK) * OUTPUTS_A_WEEK) + 1).tolist(),
     "thickness_mm": THICKNESS_MM,
     "shear_modulus_cortex_pa": 1500.0,
     "shear_modulus_core_pa": 300.0,
     "contact": {"kind": "global"},
     "fissure_x_mm": 0.0,
     "growth_rate_per_s": 2.0e-7,
-    "core_growth_rate_per_s": 0.8e-7,
     "support": "free",
     "no_growth": {"kind": "none"},
     "fields": ["displacement"],
@@ -176,12 +178,23 @@ def fold(mesh: Path, out: Path, parameters: dict[str, Any]) -> dict[str, Any]:
     return read_json(out / "summary.json")
 
 
-def runs_of_cases(folder: Path) -> list[dict[str, Any]]:
+def parameters_until(end_week: float, core_growth_per_s: float) -> dict[str, Any]:
+    """Return the parameters of runs to a week, with the growth of the core, without a time step."""
+    n_outputs = int((end_week - START_WEEK) * OUTPUTS_A_WEEK) + 1
+    weeks = np.linspace(START_WEEK, end_week, n_outputs).tolist()
+    return PARAMETERS | {
+        "end_week": end_week,
+        "output_weeks": weeks,
+        "core_growth_rate_per_s": core_growth_per_s,
+    }
+
+
+def runs_of_cases(folder: Path, cases: Sequence[Case], parameters: dict[str, Any]) -> list[dict[str, Any]]:
     """Fold all cases, and return the size and cost of each run."""
     rows = []
-    for case in CASES:
+    for case in cases:
         mesh = mesh_file(folder / "meshes", case)
-        summary = fold(mesh, folder / "runs" / case.name, PARAMETERS | {"step_s": case.step_days * DAY_S})
+        summary = fold(mesh, folder / "runs" / case.name, parameters | {"step_s": case.step_days * DAY_S})
         nodes = len(read_tetrahedral_mesh(mesh).vertices)
         rows.append({"run": case.name, "nodes": nodes, **{key: summary[key] for key in summary if key != "weeks"}})
         print(json.dumps(rows[-1]), flush=True)
@@ -229,8 +242,17 @@ def against_finest(folder: Path) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--folder", type=Path, required=True, help="folder of meshes and runs")
-    folder = parser.parse_args().folder
-    runs = runs_of_cases(folder)
+    parser.add_argument("--only", nargs="+", choices=[case.name for case in CASES], help="runs that are done")
+    parser.add_argument("--end-week", type=float, default=END_WEEK)
+    parser.add_argument("--core-growth", type=float, default=CORE_GROWTH_PER_S, help="rate (1/s)")
+    arguments = parser.parse_args()
+    folder = arguments.folder
+    parameters = parameters_until(arguments.end_week, arguments.core_growth)
+    if arguments.only:
+        cases = [case for case in CASES if case.name in arguments.only]
+        runs_of_cases(folder, cases, parameters)
+        return
+    runs = runs_of_cases(folder, CASES, parameters)
     print(json.dumps({"runs": runs, **against_finest(folder)}), flush=True)
 
 
