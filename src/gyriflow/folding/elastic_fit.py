@@ -28,7 +28,7 @@ from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way, lowe
 from ..geometry.matching import faces_that_cross
 from ..geometry.straightening import straighten_sides
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
-from ..geometry.triangles import Floats, Ints, TriangleMesh, signed_volume, vertex_areas
+from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
 from ..settings.terms import FREE
 from ..units import M_PER_MM, MM_PER_M
@@ -52,6 +52,8 @@ SPRING_LENGTH_MM = 3.3
 CLOSE_SPRING_LENGTHS_MM = (0.2, 0.8)
 """Shear modulus over the springs' stiffness, on the way to a shape, and close to it in turn: a spring holds as strongly
 as this depth of tissue. Stiff springs over the whole way take more iterations and press elements flat."""
+FREED_SPRING_LENGTH_MM = 20.0
+"""The same for springs around flat elements, which open while the rest is drawn."""
 MAX_PULL_MM = 1.0
 """Largest distance over which close springs draw, if it is more than twice the root mean square: longer ones press
 elements flat, and the next draw draws further."""
@@ -62,8 +64,11 @@ MAX_WAY_HALVINGS = 3
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
 an observed brain), and the distance from these, as a multiple of them."""
-MIN_VOLUME_ON_WAY = 0.2
-"""Fraction of an element's volume that it should keep on the way from one shape to the next."""
+MAX_REACHES = 3.0
+"""Multiple of this distance beyond which a displacement stays as it is."""
+MIN_VOLUME_ON_WAY, MIN_VOLUME_KEPT = 0.2, 0.9
+"""Fractions of its volume that an element should keep on the way from one shape to the next, and that a flat one
+should."""
 MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
@@ -220,7 +225,9 @@ class ElasticFit:
         pull *= np.minimum(1.0, longest_mm / np.maximum(length, 1e-9))
         n_passed = len(self._passed)
         for length_mm in CLOSE_SPRING_LENGTHS_MM:
-            self._step(boundary.vertices + pull, np.full(len(goals), length_mm), None)
+            lengths = np.full(len(goals), length_mm)
+            lengths[self._near_flat_elements()] = FREED_SPRING_LENGTH_MM
+            self._step(boundary.vertices + pull, lengths, None)
             try:
                 self._straighten()
                 return self._move(np.linalg.inv(motion))
@@ -305,6 +312,14 @@ class ElasticFit:
             text = "%d elements or faces are inverted or cross near %s mm on the way"
             log.warning(text, len(faults), np.round(faults[0], 1).tolist())
         return untangled, []
+
+    def _near_flat_elements(self) -> Mask:
+        """Return (b,) whether a vertex of the boundary is a corner of a flat element or of one that touches it."""
+        is_flat = volumes_between(self.positions_mm, self._pieces) < MIN_VOLUME_LEFT * self._start_volumes
+        is_near = np.zeros(len(self.positions_mm), dtype=bool)
+        is_near[self._pieces[is_flat]] = True
+        is_near[self._pieces[is_near[self._pieces].any(axis=1)]] = True
+        return is_near[self._used]
 
     def _flat_count(self, places: Floats) -> int:
         volumes = volumes_between(places, self._pieces)
