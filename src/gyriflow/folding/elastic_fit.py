@@ -64,11 +64,8 @@ MAX_WAY_HALVINGS = 3
 UNTANGLING_MM, UNTANGLING_REACH = (1.0, 2.0, 4.0, 8.0), 2.0
 """Lengths over which a displacement is smoothed around faults, round by round (the first two where the shape is that of
 an observed brain), and the distance from these, as a multiple of them."""
-MAX_REACHES = 3.0
-"""Multiple of this distance beyond which a displacement stays as it is."""
-MIN_VOLUME_ON_WAY, MIN_VOLUME_KEPT = 0.2, 0.9
-"""Fractions of its volume that an element should keep on the way from one shape to the next, and that a flat one
-should."""
+MIN_VOLUME_ON_WAY = 0.2
+"""Fraction of an element's volume that it should keep on the way from one shape to the next."""
 MAX_LOG_STRETCH = 0.3
 """Largest principal Hencky strain of a shape that is followed; larger ones, as of inverted elements, count as this."""
 SMOOTHING_MM = 1.5
