@@ -198,3 +198,28 @@ def test_a_shape_whose_change_around_faults_flattens_elements_is_opened(monkeypa
     body.positions_mm, body._moved_straight = BODY.vertices, False
     assert body.way_from(BODY.vertices) == []
     assert ratios(body.positions_mm).min() == pytest.approx(0.2, abs=1e-6)
+
+
+def test_springs_around_flat_elements_hardly_draw(monkeypatch):
+    body = ElasticFit(BODY)
+    goals = BODY.vertices[USED]
+    # a corner of an element with no vertex inside goes most of the way to the opposite face
+    tet = PIECES[np.isin(PIECES, USED).all(axis=1)][0]
+    places = BODY.vertices.copy()
+    places[tet[0]] += 0.85 * (places[tet[1:]].mean(axis=0) - places[tet[0]])
+    assert 0 < ratios(places).min() < 0.2
+    body.positions_mm = places
+    lengths = []
+    draw_to = body._springs.draw_to
+
+    def note_lengths(goals, areas, lengths_mm):
+        lengths.append(lengths_mm)
+        draw_to(goals, areas, lengths_mm)
+
+    monkeypatch.setattr(body._springs, "draw_to", note_lengths)
+    body.draw(goals)
+    is_corner = np.isin(USED, tet)
+    assert (lengths[0][is_corner] == elastic_fit.FREED_SPRING_LENGTH_MM).all()
+    far = np.linalg.norm(goals - places[tet[0]], axis=1) > 15
+    assert far.any()
+    assert (lengths[0][far] == elastic_fit.CLOSE_SPRING_LENGTHS_MM[0]).all()
