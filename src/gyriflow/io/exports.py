@@ -3,7 +3,7 @@
 import re
 import shutil
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
+from ..names import bids_label, bids_subject, folder_name, merged_names
 from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
@@ -111,10 +112,11 @@ def export_bids(
 
     Brains of no named session have their week's, where a subject has several. Surfaces lie in the world of the brain's
     volumes, unless its sides were posed separately. `tables` have the columns subject, run and week; `columns` has
-    description and unit of each in `metrics_wide`. InputError where two brains have one name.
+    description and unit of each in `metrics_wide`. InputError where two subjects, runs or brains would have one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]
+    require_bids_names([brain.subject for brain in observed], [brain.run for brain in brains])
     names = _subjects_and_sessions(observed)
     space, reference = _template(observed, names)
     places = _places(folder, brains, names)
@@ -158,21 +160,40 @@ def labels_file(folder: AnyPath, brain: ExportedBrain, brains: Sequence[Exported
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> list[Place]:
-    taken: dict[Place, ExportedBrain] = {}
+    taken: dict[tuple[str, str], ExportedBrain] = {}
     places = []
     for brain in brains:
         subject, session = names[brain.brain]
         stem = "_".join(filter(None, (subject, session)))
-        simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
+        simulated = f"_desc-{bids_label(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
-        if subject == "sub-":
-            raise InputError("a subject has no BIDS name", found=brain.subject, expected="letters or digits")
         places.append(place)
-        if (first := taken.setdefault(place, brain)) is not brain:
+        on_disk = folder_name(stem), folder_name(place[1])
+        if (first := taken.setdefault(on_disk, brain)) is not brain:
             brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
             expected = "ids and runs that differ in their letters and digits"
             raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
     return places
+
+
+def require_bids_names(subjects: Iterable[str], runs: Iterable[str] = ()) -> None:
+    """Raise InputError where a subject or a run has no BIDS label, or two have the same one, with both names."""
+    _require_labels("subject", subjects, bids_subject)
+    _require_labels("run", runs, bids_label)
+
+
+def _require_labels(kind: str, names: Iterable[str], label: Callable[[str], str]) -> None:
+    names = list(names)
+    for name in names:
+        if label(name) == label(""):
+            raise InputError(f"a {kind} has no BIDS label", found=name, expected="letters or digits")
+    for first, second in merged_names(names, lambda name: folder_name(label(name))):
+        raise InputError(
+            f"two {kind}s have the same BIDS label, {label(first)}",
+            found=f"{first} and {second}",
+            expected=f"{kind}s that differ in their letters and digits",
+            remedy="Rename one of them.",
+        )
 
 
 def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[Place]) -> dict[str, str]:
@@ -230,7 +251,7 @@ def _template(observed: Sequence[ExportedBrain], names: BidsNames) -> tuple[str,
     stem = "_".join(filter(None, names[template.brain]))
     place = "/".join(filter(None, (*names[template.brain], "anat", stem)))
     surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in template.surfaces}
-    return f"space-{_alphanumeric(stem)}", {"SpatialReference": surfaces}
+    return f"space-{bids_label(stem)}", {"SpatialReference": surfaces}
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
@@ -273,9 +294,8 @@ def publish_derivatives(
 
 
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
-    subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
+    subjects = {brain.brain: bids_subject(brain.subject) for brain in brains}
     sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
-    # subjects whose names differ only in other characters are noticed by their equal sessions
     several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(sessions.values())
     week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
     return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}
@@ -304,10 +324,6 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
 def bids_unit(unit: str) -> str:
     """Return a unit as BIDS writes it: powers with ^, and "arbitrary" for none."""
     return "arbitrary" if unit == "1" else re.sub(r"([cm]m)(\d)", r"\1^\2", unit)
-
-
-def _alphanumeric(text: str) -> str:
-    return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:
