@@ -2,8 +2,8 @@
 
     ./run python benchmarks/sides.py [--left LEFT --right RIGHT]
 
-LEFT and RIGHT are closed pial surfaces in RAS+ mm; default: those of the shipped atlas' brain of 24 GW, cut at x = 0. Half
-of the axes mirror. The coordinates of the configuration are `auto`, `ras` and `lps`. The answers are
+LEFT and RIGHT are closed pial surfaces in RAS+ mm; default: those of the shipped atlas' brain of 24 GW, cut at x = 0.
+Half of the axes mirror. The coordinates of the configuration are `auto`, `ras` and `lps`. The answers are
 
 - right: the surfaces are accepted, the left hemisphere as the left one;
 - refused: exchanged files and mirrored coordinates are both named, or mirrored ones alone, or wrong coordinates;

@@ -17,6 +17,11 @@ def folder_name(name: str) -> str:
     return name.casefold()
 
 
+def column_part(name: str) -> str:
+    """Return a name as it stands in the names of columns, with hyphens in place of spaces."""
+    return name.replace(" ", "-")
+
+
 def bids_label(name: str) -> str:
     """Return the ASCII letters and digits of a name, of which labels of BIDS consist."""
     return "".join(letter for letter in name if letter.isascii() and letter.isalnum())

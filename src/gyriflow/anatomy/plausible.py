@@ -82,15 +82,13 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
 
 
 def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
-    """Raise InputError, with the units that it may have, if the median of the positive values is not a cortical thickness."""
+    """Raise InputError, with probable units, if the median of the positive values is not a cortical thickness."""
     known = values[np.isfinite(values) & (values > 0)]
     median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
     if low <= median <= high:
         return
     units = " or ".join(unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high)
-    remedy = (
-        f"The map seems to be in {units}: give it in mm." if units else "Check the quantity and the unit of the map."
-    )
+    remedy = f"The map seems to be in {units}: give it in mm." if units else "Check its quantity and unit."
     problem = "does not contain cortical thickness"
     raise InputError(
         problem, path=path, found=f"a median of {median:.4g}", expected=f"{low:g} to {high:g} mm", remedy=remedy

@@ -54,6 +54,8 @@ PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
 }
+OWN_COLUMNS = ("participant_id", "session_id", "gestational_age", "brain")
+"""The columns of the tables of people that are not covariates."""
 COLUMNS = {
     "brain": PEOPLE["brain"],
     "run": {"Description": f"Run of the simulation; {MEASURED}: the observed brain"},
@@ -138,11 +140,11 @@ def export_bids(
     _write_people(folder, observed, names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
-        table = table.rename(columns={"subject": "brain"})
+        table = table.rename(columns=_column_of_input).rename(columns={"subject": "brain"})
         table.insert(0, "participant_id", [subject for subject, _ in ids])
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
-    wide = dict.fromkeys(map(str, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
+    wide = dict.fromkeys(map(_column_of_input, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
     wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
     wide.pop("subject", None)
     write_json(folder / "metrics_wide.json", wide)
@@ -303,9 +305,10 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
 
 def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> None:
     # covariates that differ between a subject's brains are those of sessions
-    first = ["participant_id", "session_id", "gestational_age", "brain"]
+    first = list(OWN_COLUMNS)
     people = pd.DataFrame(
-        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True)) | dict(brain.covariates)
+        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True))
+        | {_column_of_input(name): text for name, text in brain.covariates.items()}
         for brain in brains
     ).sort_values(first[:2])
     most = people.groupby("participant_id").nunique(dropna=False).max()
@@ -319,6 +322,11 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
     for name, table in tables.items():
         columns = {str(key): PEOPLE.get(str(key), OF_INPUT) for key in table if key not in first[:2]}
         write_json(folder / f"{name}.json", columns)
+
+
+def _column_of_input(name: str) -> str:
+    """Return the column of a covariate, which may be named like a column of the export itself."""
+    return f"{name}_of_input" if name in OWN_COLUMNS else name
 
 
 def bids_unit(unit: str) -> str:

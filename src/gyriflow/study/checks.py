@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
-from ..names import folder_name, merged_names
+from ..names import column_part, folder_name, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, did_you_mean, messages, unknown_key
 from ..settings.folding import VARYING, value_problems
@@ -39,7 +39,7 @@ from .atlases import used_atlases
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Ids that brains may not have, since they have another meaning in results, tables or settings."""
 RESULT_COLUMNS = re.compile(
-    "subject|run|week|(whole|left|right)_(.+_)?("
+    "subject|run|week|(participant_id|session_id|gestational_age|brain)_of_input|(whole|left|right)_(.+_)?("
     + "|".join(f"{metric.name}_{metric.unit.replace('/', '_per_')}".removesuffix("_1") for metric in METRICS.values())
     + ")"
 )
@@ -243,6 +243,10 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
         )
     with_regions = settings.regions if isinstance(settings.regions, dict) else {}
     yield from _unknown(with_regions, config, ("metrics", "regions"))
+    names = [name for given in with_regions.values() for name in given.names.values()]
+    for first, second in merged_names(names, column_part):
+        text = f"found {first!r} and {second!r}, which are one column of metrics_wide.csv; rename one"
+        yield KeyProblem(text, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # regions are carried, and their asymmetry measured, on both hemispheres together
     if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:

@@ -171,6 +171,19 @@ def test_runs_of_one_bids_label_are_refused_at_any_brains_and_weeks(tmp_path, br
         export_bids(tmp_path / "bids", [brain, other, *folded], {}, "1", {})
 
 
+def test_covariates_named_as_columns_of_the_export_stand_beside_these(tmp_path, brain):
+    # a table often has the age at birth beside that at the scan
+    covariates = {"gestational_age": "39.1", "brain": "left", "session_id": "b"}
+    wide = pd.DataFrame({"subject": ["case_1"], "week": [22.43], **{key: [text] for key, text in covariates.items()}})
+    export_bids(tmp_path, [brain._replace(covariates=covariates)], {"metrics_wide": wide}, "1", {})
+    (row,) = pd.read_csv(tmp_path / "participants.tsv", sep="\t", dtype=str).to_dict("records")
+    assert row == {"participant_id": "sub-case1", "gestational_age": "22.43", "brain": "case_1"} | {
+        f"{key}_of_input": text for key, text in covariates.items()
+    }
+    (row,) = pd.read_csv(tmp_path / "metrics_wide.tsv", sep="\t").to_dict("records")
+    assert (row["brain"], row["brain_of_input"], row["gestational_age_of_input"]) == ("case_1", "left", 39.1)
+
+
 @pytest.mark.parametrize("kind", ["subject", "run"])
 def test_a_name_without_letters_and_digits_has_no_label(tmp_path, brain, kind):
     with pytest.raises(InputError, check=Facts(kind, "--")):

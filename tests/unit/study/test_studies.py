@@ -117,6 +117,37 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
     assert refusal(studies={"s": THICKNESS | change}) == Facts(1, f"studies.s.{key}:", *facts)
 
 
+def test_values_that_agree_in_six_digits_are_runs_of_their_own():
+    study = THICKNESS | {"vary": {"thickness_mm": [1.0, 1.0000001, 1.0000002]}}
+    found = resolved(studies={"s": study}).sweeps["s"].members
+    assert [(member.run, values["thickness_mm"]) for member, values in found] == [
+        ("s-1", 1.0),
+        ("s-1.0000001", 1.0000001),
+        ("s-1.0000002", 1.0000002),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "facts"),
+    [
+        ({"studies": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}}, "studies.s", ["s-0.8", "S-0.8", "runs"]),
+        (
+            {
+                "studies": {
+                    "s": THICKNESS | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}},
+                    "s-1": THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}},
+                }
+            },
+            "studies.s-1",
+            ["s-1-0.3", "study s", "study s-1"],
+        ),
+        ({"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}}, "runs.Calibration-01", ["calibration-01"]),
+    ],
+)
+def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
+    assert refusal(**changes) == Facts(1, f"{key}:", *facts)
+
+
 def test_folders_of_results_are_no_names_of_studies():
     sources = [
         ROOT / "workflow/figures.yaml",
@@ -129,6 +160,7 @@ def test_folders_of_results_are_no_names_of_studies():
     # records of time and memory are named like logs
     for folder in folders | {"benchmarks"}:
         assert refusal(studies={folder: THICKNESS}) == Facts(f"studies.{folder}:")
+        assert refusal(studies={folder.upper(): THICKNESS}) == Facts(f"studies.{folder.upper()}:")
     assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts("studies.s:", "s-0.8")
 
 
