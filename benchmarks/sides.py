@@ -1,9 +1,10 @@
 """Give a pair of hemispheres in all 48 axes of files, named rightly and exchanged, and list what each gets.
 
-    ./run python benchmarks/sides.py [--left LEFT --right RIGHT]
+    ./run python benchmarks/sides.py [--left LEFT --right RIGHT] [--coordinates auto]
 
 LEFT and RIGHT are closed pial surfaces in RAS+ mm; default: those of the shipped atlas' brain of 24 GW, cut at x = 0.
-Half of the axes mirror. The coordinates of the configuration are `auto`, `ras` and `lps`. The answers are
+Half of the axes mirror. The coordinates of the configuration are `auto`, `ras` and `lps`, or those given. The answers
+are
 
 - right: the surfaces are accepted, the left hemisphere as the left one;
 - refused: exchanged files and mirrored coordinates are both named, or mirrored ones alone, or wrong coordinates;
@@ -73,6 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--left")
     parser.add_argument("--right")
+    parser.add_argument("--coordinates", nargs="+", default=["auto", *CONVENTIONS])
     files = parser.parse_args()
     if files.left and files.right:
         halves = [read_surface(files.left), read_surface(files.right)]
@@ -84,7 +86,7 @@ def main() -> None:
         pair = [transformed(half, motion(axes)) for half in halves]
         for is_exchanged in (False, True):
             files_given = pair[::-1] if is_exchanged else pair
-            for coordinates in ("auto", *CONVENTIONS):
+            for coordinates in files.coordinates:
                 got, has_warnings = answer(*files_given, coordinates, is_exchanged)
                 key = (coordinates, is_exchanged, is_mirrored, got, has_warnings)
                 counts[key].append(axes_of_file(axes.T))

@@ -26,7 +26,7 @@ ARROWS = {
     "units": set(),
     "quantities": set(),
     "formats": set(),
-    "names": set(),
+    "names": {"errors"},
     "splines": set(),
     "code_hash": set(),
     "shipped": set(),

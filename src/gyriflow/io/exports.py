@@ -3,7 +3,7 @@
 import re
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
-from ..names import bids_label, bids_subject, folder_name, merged_names
+from ..names import bids_label, bids_subject, folder_name, require_bids_names
 from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
@@ -176,26 +176,6 @@ def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> 
             expected = "ids and runs that differ in their letters and digits"
             raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
     return places
-
-
-def require_bids_names(subjects: Iterable[str], runs: Iterable[str] = ()) -> None:
-    """Raise InputError where a subject or a run has no BIDS label, or two have the same one, with both names."""
-    _require_labels("subject", subjects, bids_subject)
-    _require_labels("run", runs, bids_label)
-
-
-def _require_labels(kind: str, names: Iterable[str], label: Callable[[str], str]) -> None:
-    names = list(names)
-    for name in names:
-        if label(name) == label(""):
-            raise InputError(f"a {kind} has no BIDS label", found=name, expected="letters or digits")
-    for first, second in merged_names(names, lambda name: folder_name(label(name))):
-        raise InputError(
-            f"two {kind}s have the same BIDS label, {label(first)}",
-            found=f"{first} and {second}",
-            expected=f"{kind}s that differ in their letters and digits",
-            remedy="Rename one of them.",
-        )
 
 
 def _descriptions(brains: Sequence[ExportedBrain], places: Sequence[Place]) -> dict[str, str]:

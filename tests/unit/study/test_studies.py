@@ -8,7 +8,7 @@ from configurations import LABELLED
 from facts import Facts
 
 from gyriflow.errors import InputError
-from gyriflow.study import resolve
+from gyriflow.study import paths, resolve
 from gyriflow.study.loading import load
 from gyriflow.study.paths import STUDY, log_of
 
@@ -189,9 +189,27 @@ def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
     [
         ("results/brains/{brain}/mesh/targets.{origin}.h5", "results/brains/{brain}/logs/rule.{origin}.log"),
         ("results/study/{study}/members/{run}.csv", "results/study/{study}/logs/rule.{run}.log"),
-        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier}.{later}.log"),
+        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier},{later}.log"),
         ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
     ],
 )
 def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(pattern, log):
     assert log_of("rule", pattern) == log
+
+
+@pytest.mark.parametrize(
+    "patterns",
+    [
+        (paths.COMPARED_MEMBER, paths.MEMBER_COEFFICIENTS),
+        (paths.REGISTERED, paths.VARIED_REGISTRATION),
+        (log_of("rule", paths.MATCHED),),
+    ],
+)
+def test_ids_with_the_marks_of_file_names_have_files_of_their_own(patterns):
+    names = ("a", "a.b", "b", "b.c", "c", "a.coefficients", "b.smoothing-1.seed-2")
+    files = []
+    for first in names:
+        for second in names:
+            values = {"study": "s", "run": first, "brain": second, "earlier": first, "later": second}
+            files += [pattern.format(**values, smoothing="1", seed="2") for pattern in patterns]
+    assert len(set(files)) == len(files)
