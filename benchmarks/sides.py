@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from common import print_rows
 
+from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.extraction import isosurface, make_simple, smooth_mask
 from gyriflow.anatomy.plausible import require_left_and_right
 from gyriflow.anatomy.pose import axes_of_file, hemisphere_warnings, pose_of_pair
@@ -56,6 +57,21 @@ def every_axes() -> Iterator[Floats]:
             yield np.diag(signs) @ np.eye(3)[list(order)]
 
 
+def remember_shapes() -> None:
+    """Let the pose of each hemisphere in each axes be found once: pairs and mirror images have the same ones."""
+    found: dict[bytes, posing.PosedShape] = {}
+    by_shape = posing.hemisphere_by_shape
+
+    def once(mesh: TriangleMesh) -> posing.PosedShape:
+        # without negative zeros
+        key = (mesh.vertices.round(6) + 0.0).tobytes()
+        if key not in found:
+            found[key] = by_shape(mesh)
+        return found[key]
+
+    posing.hemisphere_by_shape = once
+
+
 def answer(left: TriangleMesh, right: TriangleMesh, coordinates: str, is_exchanged: bool) -> tuple[str, bool]:
     """Return what two files get, and whether with warnings."""
     try:
@@ -80,6 +96,7 @@ def main() -> None:
         halves = [read_surface(files.left), read_surface(files.right)]
     else:
         halves = hemispheres_of_atlas()
+    remember_shapes()
     counts: dict[tuple[Any, ...], list[str]] = defaultdict(list)
     for axes in every_axes():
         is_mirrored = bool(np.linalg.det(axes) < 0)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
-from ..errors import GyriflowError
+from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys

@@ -74,11 +74,13 @@ def names(config: Config) -> Iterator[KeyProblem]:
     for first, second in merged_names(config.studies, folder_name):
         text = f"differs from the study {first} only in case, so some disks mix up their folders; rename one"
         yield KeyProblem(text, ("studies", second))
-    reserved = {"runs": (MEASURED,), "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
+    reserved = {"runs": (MEASURED,), "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
-        for name in sorted(getattr(config, section)):
-            if folder_name(name) in taken:
-                yield KeyProblem("the name is taken; choose another", (section, name))
+        for name in sorted(set(getattr(config, section)) & set(taken)):
+            yield KeyProblem("the name is taken; choose another", (section, name))
+    for name in config.studies:
+        if folder_name(name) in RESERVED_STUDIES:
+            yield KeyProblem("the name is taken; choose another", ("studies", name))
     covariates = {name: number for number, brain in reversed([*enumerate(config.brains)]) for name in brain.covariates}
     for name, number in covariates.items():
         if RESULT_COLUMNS.fullmatch(name):
