@@ -18,7 +18,7 @@ from gyriflow.version import RELEASE
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-GROUND = {"errors", "units", "quantities", "formats", "splines"}
+GROUND = {"errors", "units", "quantities", "formats", "names", "splines"}
 PLAIN = GROUND | {"geometry", "settings"}
 """What every room may import: errors, units, quantities, formats of files, plain geometry and typed settings."""
 ARROWS = {
@@ -26,6 +26,7 @@ ARROWS = {
     "units": set(),
     "quantities": set(),
     "formats": set(),
+    "names": {"errors"},
     "splines": set(),
     "code_hash": set(),
     "shipped": set(),

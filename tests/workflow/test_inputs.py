@@ -99,7 +99,7 @@ def test_members_of_a_study_are_gathered_with_the_run_that_equals_one(jobs):
     summaries = [f"results/runs/{run}/b21/folding/summary.json" for run in ("reference", "thick-2")]
     assert [file for file in files if file.endswith("summary.json")] == summaries
     # what has been solved already is compared at the week of the study
-    compared = jobs["results/study/thick/members/reference/b21.csv"]
+    compared = jobs["results/study/thick/members/reference/b21/comparison.csv"]
     tables = [file for file in compared if file.endswith("metrics.csv")]
     assert tables == [f"{RUN}/week-23.00/metrics.csv", "results/brains/b23/metrics/metrics.csv"]
     assert surface("b23") in compared

@@ -136,8 +136,9 @@ def cerebrum_mask(labels: Labels, scheme: LabelScheme) -> Mask:
             f"the label volume has labels that are not in the scheme {scheme.name!r}",
             found=f"{_listed(unknown)} among {_listed(sorted(present))}",
             expected=_listed(scheme.labels, scheme),
-            remedy=f"Choose another scheme ({', '.join(SCHEME_FILES)}), or write one under schemes. Is this an "
-            "image? gyriflow does not segment.",
+            remedy="Name the scheme that the labels were made with, since another one with these numbers gives wrong "
+            f"tissues. There are {', '.join(SCHEME_FILES)}; write others under schemes. Is this an image? gyriflow "
+            "does not segment.",
         )
     if not present & set(scheme.cerebrum):
         raise InputError(

@@ -155,7 +155,8 @@ def _read_volume(
         brain.warn(scheme_contradictions(layout_of(labels), scheme))
         if len(sides) == 1:
             problem = f"the volume has labels of the {sides[0]} hemisphere only"
-            remedy = "Choose a scheme without left and right, or give the hemisphere under `hemisphere`, with its side."
+            remedy = "If there is one hemisphere, give it under `hemisphere`, with its side. If both have these "
+            remedy += "labels, name their scheme, which is without left and right."
             raise InputError(problem, expected="labels of both hemispheres", remedy=remedy)
         field = extraction.smooth_mask(cerebrum.mask)
         # parts that are removed below because of their size do not count

@@ -38,6 +38,12 @@ MAX_USUAL_SHIFT = 0.08
 MAX_WEEKLY_RATIO, MAX_THICKNESS_RATIO = 1.25, 1.5
 # shortest over longest extent: 0.61 or more in whole cerebra, 0.46 or less in single hemispheres
 MIN_NARROWNESS, MIN_USUAL_NARROWNESS = 0.5, 0.56
+# a mirrored brain has the shape of one whose sides are exchanged, so only its owner can find out which it is
+EXCHANGED_OR_MIRRORED = (
+    "Find out which side is which, for example by a marker in the MRI that the surfaces were made from, and change "
+    "nothing before. If the files are exchanged, swap `left` and `right`. If the coordinates are mirrored (an axis "
+    "reversed, or two exchanged), export the surfaces in RAS or LPS and do not swap"
+)
 
 
 def logged(warnings: Iterable[str]) -> list[str]:
@@ -76,13 +82,13 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
 
 
 def require_plausible_thickness(values: NDArray, factor_mm: float, path: str) -> None:
-    """Raise InputError, with a guess of the unit, if the median of the positive values is not a cortical thickness."""
+    """Raise InputError, with probable units, if the median of the positive values is not a cortical thickness."""
     known = values[np.isfinite(values) & (values > 0)]
     median, (low, high) = factor_mm * float(np.median(known)) if len(known) else 0.0, THICKNESSES_MM
     if low <= median <= high:
         return
-    unit = next((unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high), None)
-    remedy = f"The map seems to be in {unit}: give it in mm." if unit else "Check the quantity and the unit of the map."
+    units = " or ".join(unit for unit, mm in UNITS_MM.items() if low <= median * mm <= high)
+    remedy = f"The map seems to be in {units}: give it in mm." if units else "Check its quantity and unit."
     problem = "does not contain cortical thickness"
     raise InputError(
         problem, path=path, found=f"a median of {median:.4g}", expected=f"{low:g} to {high:g} mm", remedy=remedy
@@ -146,14 +152,21 @@ def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> lis
 
 
 def require_left_and_right(left: TriangleMesh, right: TriangleMesh, coordinates: str) -> None:
-    """Raise InputError if the left of two surfaces in RAS+ is not at the smaller x; `coordinates` are named."""
+    """Raise InputError if the left of two surfaces in RAS+ is not at the smaller x.
+
+    `coordinates` are those of the configuration. With "auto", the pose is that of the shape.
+    """
     x_left, x_right = left.vertices[:, 0].mean(), right.vertices[:, 0].mean()
     if x_left >= x_right:
+        # the shape tells wrong coordinates from wrong sides, which would be changed for nothing
+        by_shape = (
+            "Set coordinates: auto, which shows whether other coordinates fit, and do not swap `left` and `right`"
+        )
         raise InputError(
             "the left hemisphere lies to the right of the right one",
             found=f"centroids at x = {x_left:.1f} (left) and {x_right:.1f} mm (right) in coordinates {coordinates}",
             expected="left at the smaller x (RAS+)",
-            remedy="Swap `left` and `right`, or set the other coordinates; not both: that exchanges front and back.",
+            remedy=EXCHANGED_OR_MIRRORED if coordinates == "auto" else f"{by_shape} before.",
         )
 
 

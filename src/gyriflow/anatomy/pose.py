@@ -17,6 +17,7 @@ from ..geometry.triangles import Floats, TriangleMesh, transformed, unit
 from ..settings.schemes import LabelScheme
 from ..settings.terms import SIDES
 from . import template
+from .plausible import EXCHANGED_OR_MIRRORED
 from .template import PointCloud
 
 # a pose is clear if the next best one fits worse by this factor (1.01 in ellipsoids, 1.3 and more in hemispheres of
@@ -28,6 +29,8 @@ MIN_SIDE_RATIO = 1.07
 CONVENTION_DEG = 35.0
 # tolerances for agreement of the shape with the axes of the file: tilt of the mid-plane, and pitch
 TILT_TOL_DEG, PITCH_TOL_DEG = 10.0, 15.0
+# of the axes of RAS+, down and up
+DIRECTIONS = ("LR", "PA", "IS")
 # two files share their coordinates if their poses differ by less; distances are in sizes
 COMMON_DEG, COMMON_OFFSET, COMMON_DISTANCE = 5.0, 0.08, 0.15
 # the same for files that name one coordinate system
@@ -47,10 +50,8 @@ MIN_TURN_DEG = 60.0
 # rotations between this and MIN_TURN_DEG are left with a warning
 DOUBTFUL_TURN_DEG = 15.0
 PITCH_KEPT = "its mid-plane is set upright, its pitch is kept; check the file's axes"
-# without labelled sides a rotated brain cannot be distinguished from a mirrored one
-MIRROR_WARNING = (
-    "if an axis of its array is reversed instead, or two are exchanged, left and right are wrong now: check them"
-)
+# without known sides a rotated brain cannot be distinguished from a mirrored one
+MIRROR_WARNING = "if an axis is reversed instead, or two are exchanged, left and right are wrong now: check them"
 # two directions closer than this (radians) do not determine the rotation about them
 MIN_SPREAD = 0.06
 # a rotation this close to quarter turns is taken for quarter turns, as caused by wrong axis codes
@@ -62,7 +63,8 @@ class PosedShape:
     """A right hemisphere, a mirrored left one, or a brain, by its `kind`, with the pose estimated from its shape.
 
     `rotation` (3, 3) leads to RAS+, where the medial wall faces −x at `wall_mm` from the centre of volume. `residual`
-    is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape.
+    is in sizes; `confidence` is that of the next best pose over it, `side_ratio` that of the mirrored shape, which
+    `mirrored_rotation` leads to RAS+.
     """
 
     kind: Literal["hemisphere", "brain"]
@@ -72,6 +74,7 @@ class PosedShape:
     residual: float
     confidence: float
     side_ratio: float
+    mirrored_rotation: Floats
 
     @property
     def is_clear(self) -> bool:
@@ -88,7 +91,7 @@ def hemisphere_by_shape(mesh: TriangleMesh) -> PosedShape:
     turn, _ = Rotation.align_vectors([[-1.0, 0.0, 0.0]], [fit.rotation @ normal])
     side_ratio = mirrored.residual / fit.residual
     rotation, wall_mm = turn.as_matrix() @ fit.rotation, -offset * shape.size_mm
-    return PosedShape("hemisphere", shape, rotation, wall_mm, fit.residual, confidence, side_ratio)
+    return PosedShape("hemisphere", shape, rotation, wall_mm, fit.residual, confidence, side_ratio, mirrored.rotation)
 
 
 def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = False) -> Pose:
@@ -133,6 +136,8 @@ def pose_of_pair(left: TriangleMesh, right: TriangleMesh, *, declared: bool = Fa
             f"the medial walls do not face each other in the files' coordinates: {np.linalg.norm(shift):.1f} mm and "
             f"{angle:.0f}° off: each was posed by its own shape. Are both files in one space?"
         )
+    if together and not frame and (axes := axes_of_file(motions[0][:3, :3])):
+        doubts.append(f"the files have the axes {axes} according to the shape; {MIRROR_WARNING}")
     if _mean_side_ratio(shapes) < MIN_SIDE_RATIO:
         doubts.append("left and right are those of the configuration: the shapes do not show if the files are swapped")
     # volumes of the brain are in RAS+
@@ -154,14 +159,61 @@ def _require_sides(shapes: list[PosedShape]) -> None:
     ratios = [shape.side_ratio for shape in shapes]
     found = f"{ratios[0]:.2f} (left) and {ratios[1]:.2f} (right) times the distance from the other side's template"
     if min(ratios) < 1 / MIN_SIDE_RATIO and max(ratios) > MIN_SIDE_RATIO:
-        raise InputError("both hemispheres seem to be of one side", found=found, expected="more than 1 for both")
-    if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
         raise InputError(
-            "the hemispheres seem to be swapped",
+            "both hemispheres seem to be of one side",
             found=found,
-            expected="more than 1",
-            remedy="Swap `left` and `right`; or, if they are right, pose the files yourself and set coordinates: ras.",
+            expected="more than 1 for both",
+            remedy="Give one file of each hemisphere, both in the same coordinates.",
         )
+    if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
+        raise _wrong_sides(shapes, found)
+
+
+def _wrong_sides(shapes: list[PosedShape], found: str) -> InputError:
+    """Return the error of hemispheres that each have the shape of the other side: exchanged, or mirrored.
+
+    A mirrored hemisphere has the shape of the other one, so both explain any such pair. Only the axes of the files
+    speak for one of them: exchanged files are most likely in RAS or LPS, as other files are.
+    """
+    mirrored_left, own_right = shapes
+    mirror = MIRROR[:3, :3]
+    # from the coordinates of the files to RAS+, if these are exchanged
+    rotations = [mirrored_left.mirrored_rotation, mirror @ own_right.mirrored_rotation @ mirror]
+    exchanged = {axes_of_file(rotation) for rotation in rotations}
+    mirrored = {axes_of_file(mirror @ rotation) for rotation in rotations}
+    axes = exchanged.pop() if len(exchanged) == 1 else ""
+    mirrored_axes = mirrored.pop() if len(mirrored) == 1 else ""
+    if axes and axes.lower() not in CONVENTIONS:
+        return InputError(
+            "the coordinates of the hemispheres seem to be mirrored",
+            found=f"the axes {mirrored_axes} (or {axes}, and exchanged files); {found}",
+            expected="the axes RAS or LPS, and more than 1",
+            remedy="Export the surfaces in RAS or LPS. Do not swap `left` and `right`: the left hemisphere would be "
+            "measured as the right one.",
+        )
+    if axes:
+        found += f"; the axes {axes} if they are exchanged, {mirrored_axes} if mirrored"
+    known = "If both the sides and the axes are known to be right, set coordinates: ras or lps."
+    return InputError(
+        "the hemispheres are exchanged, or their coordinates mirrored; their shapes do not show which",
+        found=found,
+        expected="more than 1",
+        remedy=f"{EXCHANGED_OR_MIRRORED}. {known}",
+    )
+
+
+def axes_of_file(to_ras: Floats) -> str:
+    """Return the directions of a file's axes, such as RAS or LPI, or "" if they are oblique.
+
+    `to_ras` is the (3, 3) rotation, or rotation and reflection, from the coordinates of the file to RAS+.
+    """
+    columns = to_ras.T
+    along = np.abs(columns).argmax(axis=1)
+    is_oblique = np.abs(columns).max(axis=1) < np.cos(np.radians(CONVENTION_DEG))
+    if is_oblique.any() or len(set(along)) < len(along):
+        return ""
+    signs = columns[range(3), along] > 0
+    return "".join(DIRECTIONS[axis][int(sign)] for axis, sign in zip(along, signs, strict=True))
 
 
 def _pose_as_ras(shape: PosedShape, name: str) -> Pose:
@@ -231,9 +283,9 @@ def hemisphere_warnings(left: TriangleMesh, right: TriangleMesh, coordinates: st
     """Return warnings if the shapes of two hemispheres contradict their sides or the coordinates, "ras" or "lps"."""
     shapes = [hemisphere_by_shape(mesh) for mesh in (transformed(left, MIRROR), right)]
     if _mean_side_ratio(shapes) < 1 / MIN_SIDE_RATIO:
-        named = coordinates.upper()
-        swapped = f"are left and right swapped, and the coordinates not {named}? Check both, or set coordinates: auto"
-        return [f"the shapes fit the other sides better: {swapped}"]
+        exchanged = f"left and right are exchanged and the coordinates are not {coordinates.upper()}"
+        check = "set coordinates: auto, and do not swap before"
+        return [f"the shapes fit the other sides better: {exchanged}, or these are mirrored: {check}"]
     turns = [angle_deg(shape.rotation) for shape in shapes]
     if all(shape.is_clear for shape in shapes) and min(turns) > MIN_TURN_DEG:
         return [_contradiction(coordinates, "hemispheres are", float(np.mean(turns)))]
@@ -244,7 +296,7 @@ def pose_of_surface(mesh: TriangleMesh, coordinates: str) -> Pose:
     """Return the pose of a brain's surface in coordinates "ras", "lps" or "auto"; InputError if this is unclear."""
     shape = template.shape_of(mesh, max_depth=template.MAX_DEPTH)
     fit, confidence = template.register_from_all_sides(shape, template.template_shapes("brain"))
-    brain = PosedShape("brain", shape, fit.rotation, 0.0, fit.residual, confidence, 1.0)
+    brain = PosedShape("brain", shape, fit.rotation, 0.0, fit.residual, confidence, 1.0, fit.rotation)
     return _choose_pose(brain, brain.rotation, coordinates)
 
 
@@ -271,15 +323,20 @@ def pose_of_hemisphere(mesh: TriangleMesh, side: str, coordinates: str, *, of_vo
     mirror = MIRROR if side == "left" else np.eye(4)
     hemisphere = hemisphere_by_shape(transformed(mesh, mirror))
     rotation = mirror[:3, :3] @ hemisphere.rotation @ mirror[:3, :3]
-    side_ratio = hemisphere.side_ratio
+    side_ratio, other = hemisphere.side_ratio, "right" if side == "left" else "left"
     if coordinates == "auto" and hemisphere.is_clear and side_ratio < 1 / MIN_SIDE_RATIO:
         raise InputError(
-            f"the hemisphere seems to be the {'right' if side == 'left' else 'left'} one",
+            f"the hemisphere seems to be the {other} one, or mirrored; its shape does not show which",
             found=f"{side_ratio:.2f} times the distance from the other side's template",
             expected="more than 1",
+            remedy=f"Find out which. If it is the {other} one, set side: {other}. If an axis is reversed, or two are "
+            "exchanged, export it in its true orientation (RAS or LPS) and keep the side.",
         )
     pose = _choose_pose(hemisphere, rotation, coordinates, of_volume=of_volume)
-    if side_ratio < MIN_SIDE_RATIO:
+    if side_ratio < 1 / MIN_SIDE_RATIO:
+        doubt = f"the shape fits the {other} side better than the {side} one: is the side wrong, or an axis reversed?"
+        pose = replace(pose, warnings=(doubt, *pose.warnings))
+    elif side_ratio < MIN_SIDE_RATIO:
         doubt = f"the side, {side}, is that of the configuration: it cannot be determined from the shape"
         pose = replace(pose, warnings=(doubt, *pose.warnings))
     return replace(pose, evidence={"confidence": hemisphere.confidence, "side_ratio": side_ratio})
@@ -296,20 +353,20 @@ def _choose_pose(shape: PosedShape, rotation: Floats, coordinates: str, *, of_vo
         return _pose_as_ras(shape, shape.kind)
     nearest = min(angles, key=lambda name: angles[name])
     if angles[nearest] >= CONVENTION_DEG:
-        return turned(
-            rotation, "shape", "ras", f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its shape"
-        )
+        moved = f"the {shape.kind} was rotated by {angles['ras']:.0f}° according to its shape"
+        return turned(rotation, "shape", "ras", f"{moved}; {MIRROR_WARNING}")
     axes = CONVENTIONS[nearest][:3, :3]
     notes = [] if nearest == "ras" else [f"the coordinates are {nearest.upper()} according to the shape"]
     if shape.kind == "brain":
-        return turned(axes, "shape", nearest, *notes)
+        # a single hemisphere shows by its shape whether it is mirrored
+        return turned(axes, "shape", nearest, *(f"{note}; {MIRROR_WARNING}" for note in notes))
     # the smallest rotation that sets the medial wall upright
     upright, _ = Rotation.align_vectors([[1.0, 0.0, 0.0]], [axes @ rotation.T @ np.array([1.0, 0.0, 0.0])])
     return turned(upright.as_matrix() @ axes, "file", "ras" if of_volume else nearest, *notes)
 
 
 def _contradiction(coordinates: str, what: str, angle: float) -> str:
-    check = "check them, or set coordinates: auto"
+    check = "check them, and whether an axis is reversed; or set coordinates: auto"
     return f"according to the shape the {what} rotated by {angle:.0f}° from the coordinates {coordinates}: {check}"
 
 

@@ -197,7 +197,8 @@ def thickness_from_white(
                 f"the white surface ({side}) lies in the other hemisphere",
                 found=f"its middle at x = {middle:.1f} mm, the fissure at {fissure_x_mm:.1f} mm",
                 expected=f"{'<' if side == 'left' else '>'} {fissure_x_mm:.1f} mm (RAS+)",
-                remedy="Give each side its own white surface: they are swapped, or both are of one side.",
+                remedy="Give each side its own white surface, in the coordinates of its pial one: they are swapped, "
+                "both of one side, or in other coordinates.",
             )
         outside = igl.fast_winding_number(surface.vertices, surface.faces, white.vertices) < 0.5
         distance, _, _ = nearest_on(white.vertices, surface)

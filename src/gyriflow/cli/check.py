@@ -16,10 +16,11 @@ from typing import NamedTuple
 
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
-from ..errors import GyriflowError
+from ..errors import GyriflowError, InputError
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
+from ..names import require_bids_names
 from ..running.cost import ERROR_FACTOR, FOLDINGS, MIN_SURFACE_MIB, job_seconds, simulation_needs, surface_memory_mib
 from ..running.launch import main as launch
 from ..running.machine import available_cores, available_memory_mib
@@ -75,6 +76,7 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
     yield from ((f"  {owner}: {text}", bad) for owner, text, bad in further)
     yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
+    yield from ((f"  warning: no export: {line}", False) for line in export_problems(study))
     if without_unit:
         yield f"  note: {without_unit} of {len(volumes)} label volumes give no unit of length, taken as mm", False
     if downloads:
@@ -191,6 +193,14 @@ def coarse_cortices(study: Study) -> Iterator[str]:
         if is_coarse or error > LARGE_ELEMENT_ERROR:
             coarse[f"about {text}{few}; use {remedy}"].append(f"run {simulation.run} from {simulation.start.id}")
     yield from (f"{', '.join(names)}: {text}" for text, names in coarse.items())
+
+
+def export_problems(study: Study) -> Iterator[str]:
+    """Yield why a study cannot be exported under the labels that BIDS would give its subjects and runs."""
+    try:
+        require_bids_names([brain.subject for brain in study.brains.values()], study.config.runs)
+    except InputError as error:
+        yield str(error)
 
 
 def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:

@@ -13,6 +13,7 @@ import yaml
 from ..errors import InputError
 from ..io.files import read_json, read_text, write_json, write_text
 from ..io.yaml_files import read_keys
+from ..names import require_bids_names
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import own_name, validated
 from ..settings.brains import BrainConfig
@@ -179,6 +180,7 @@ def write_bids(
         choice = "Choose one of several files with --files, such as '*_desc-brain_dseg.nii.gz'."
         remedy = choice if "keep one" in causes else None
         raise InputError("no scan can be used", path=folder, found=causes, remedy=remedy)
+    require_bids_names(brain.entry.get("subject", brain.entry["id"]) for brain in brains)
     youngest = brains[0].entry["id"]
     brains.sort(key=lambda brain: (brain.entry.get("subject", ""), brain.entry["week"]))
     further = read_keys(Path(settings)) if settings else {}

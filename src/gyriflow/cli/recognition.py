@@ -106,7 +106,12 @@ def _label(file: Path, entity: str) -> str | None:
 
 
 def _scan_of(file: Path) -> str:
-    """Return the id of the scan that a file is of: by `sub-` and `ses-`, or else by the name of the file or folder."""
+    """Return the id of the scan that a file is of: the `_scan_name` with only the characters that ids may have."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", _scan_name(file)).strip("._-") or "brain"
+
+
+def _scan_name(file: Path) -> str:
+    """Return the name of the scan that a file is of: `sub-` and `ses-`, or else the name of the file or folder."""
     subject, session = _label(file, "sub"), _label(file, "ses")
     if subject:
         return f"sub-{subject}_ses-{session}" if session else f"sub-{subject}"
@@ -115,7 +120,7 @@ def _scan_of(file: Path) -> str:
     folders = [part for part in file.parts[:-1] if not GENERIC_FOLDER.fullmatch(part)]
     if folders and not re.search(r"\d", name):
         name = folders[-1]
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("._-") or "brain"
+    return name.strip(" ._-")
 
 
 def recognise(
@@ -212,13 +217,17 @@ def _brains_of_scan(
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
     above = (re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix()) for brain in group)
+    names = sorted({_scan_name(brain.file) for brain in group})
     data_sets = sorted({str(data_set_of(Path(match[1] or "" if match else ""))) for match in above})
     for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
             # several files of one scan do not make a series
             brain.entry.pop("subject", None)
-        if len(data_sets) > 1:
+        if len(names) > 1:
+            found = ", ".join(names)
+            brain.problem = f"several scans would have the id {name}; found {found}; rename them with ASCII letters"
+        elif len(data_sets) > 1:
             brain.problem = f"several data sets have this scan; found {', '.join(data_sets)}; run each by itself"
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
@@ -263,6 +272,7 @@ def _space(file: Path, *, is_surface: bool) -> str:
 
 def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
     surfaces: dict[tuple[str, str], dict[Side, Path]] = {}
+    further: dict[tuple[str, str], list[tuple[Side, Path]]] = defaultdict(list)
     files_of: dict[str, dict[Side, Path]] = defaultdict(dict)
     existing = set(files)
     for file in files:
@@ -278,7 +288,9 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
             # sides may be in other folders or in another order of parts
             folders = [part for part in file.parts[:-1] if not SIDE_FOLDER.fullmatch(part)]
             parts = sorted(re.split(r"[._]+", LAYER_NAME.sub("", SIDE_NAME.sub("", name))))
-            surfaces.setdefault(("/".join([*folders, *parts]), "pial" if is_pial else "white"), {})[side] = file
+            key = "/".join([*folders, *parts]), "pial" if is_pial else "white"
+            if surfaces.setdefault(key, {}).setdefault(side, file) != file:
+                further[key].append((side, file))
     for (rest, kind), sides in surfaces.items():
         pair = {side: str(sides[side]) for side in SIDES if side in sides}
         first = next(iter(pair))
@@ -299,6 +311,9 @@ def _hemispheres(files: Sequence[Path]) -> Iterator[FoundBrain]:
             problem = f"has one white surface; found {next(iter(white.values()))}; expected both or none"
         elif white:
             source["white"] = [str(white[side]) for side in SIDES]
+        for key in ((rest, "pial"), (rest, "white")):
+            for side, other in further[key]:
+                problem = f"has two {key[1]} surfaces of the {side} hemisphere; found {surfaces[key][side]} and {other}"
         yield FoundBrain(file, source, _space(file, is_surface=True), problem)
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from ..errors import InputError
 from ..geometry.matching import layer_labels
 from ..geometry.triangles import Floats, transformed
+from ..names import bids_label, bids_subject, folder_name, require_bids_names
 from ..quantities import VERTEX_MAPS
 from ..settings.terms import MEASURED, STRUCTURES, Side
 from .files import AnyPath, atomic_write, files_below, read_json, write_json, write_text
@@ -53,6 +54,8 @@ PEOPLE = {
     "gestational_age": {"Description": "Gestational age at the scan", "Units": "weeks"},
     "brain": {"Description": "Name of the brain in gyriflow's own results"},
 }
+OWN_COLUMNS = ("participant_id", "session_id", "gestational_age", "brain")
+"""The columns of the tables of people that are not covariates."""
 COLUMNS = {
     "brain": PEOPLE["brain"],
     "run": {"Description": f"Run of the simulation; {MEASURED}: the observed brain"},
@@ -111,10 +114,11 @@ def export_bids(
 
     Brains of no named session have their week's, where a subject has several. Surfaces lie in the world of the brain's
     volumes, unless its sides were posed separately. `tables` have the columns subject, run and week; `columns` has
-    description and unit of each in `metrics_wide`. InputError where two brains have one name.
+    description and unit of each in `metrics_wide`. InputError where two subjects, runs or brains would have one name.
     """
     folder = Path(folder)
     observed = [brain for brain in brains if brain.run == MEASURED]
+    require_bids_names([brain.subject for brain in observed], [brain.run for brain in brains])
     names = _subjects_and_sessions(observed)
     space, reference = _template(observed, names)
     places = _places(folder, brains, names)
@@ -136,11 +140,11 @@ def export_bids(
     _write_people(folder, observed, names)
     for name, table in tables.items():
         ids = [names[brain] for brain in table["subject"]]
-        table = table.rename(columns={"subject": "brain"})
+        table = table.rename(columns=_column_of_input).rename(columns={"subject": "brain"})
         table.insert(0, "participant_id", [subject for subject, _ in ids])
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
-    wide = dict.fromkeys(map(str, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
+    wide = dict.fromkeys(map(_column_of_input, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
     wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
     wide.pop("subject", None)
     write_json(folder / "metrics_wide.json", wide)
@@ -158,17 +162,16 @@ def labels_file(folder: AnyPath, brain: ExportedBrain, brains: Sequence[Exported
 
 
 def _places(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> list[Place]:
-    taken: dict[Place, ExportedBrain] = {}
+    taken: dict[tuple[str, str], ExportedBrain] = {}
     places = []
     for brain in brains:
         subject, session = names[brain.brain]
         stem = "_".join(filter(None, (subject, session)))
-        simulated = f"_desc-{_alphanumeric(brain.run)}gw{brain.week:.2f}".replace(".", "")
+        simulated = f"_desc-{bids_label(brain.run)}gw{brain.week:.2f}".replace(".", "")
         place = folder / subject / (session or "") / "anat" / stem, "" if brain.run == MEASURED else simulated
-        if subject == "sub-":
-            raise InputError("a subject has no BIDS name", found=brain.subject, expected="letters or digits")
         places.append(place)
-        if (first := taken.setdefault(place, brain)) is not brain:
+        on_disk = folder_name(stem), folder_name(place[1])
+        if (first := taken.setdefault(on_disk, brain)) is not brain:
             brains_and_runs = f"{first.brain} ({first.run}) and {brain.brain} ({brain.run})"
             expected = "ids and runs that differ in their letters and digits"
             raise InputError(f"two brains have the same BIDS name {stem}", found=brains_and_runs, expected=expected)
@@ -230,7 +233,7 @@ def _template(observed: Sequence[ExportedBrain], names: BidsNames) -> tuple[str,
     stem = "_".join(filter(None, names[template.brain]))
     place = "/".join(filter(None, (*names[template.brain], "anat", stem)))
     surfaces = {side[0].upper(): f"bids::{place}_hemi-{side[0].upper()}_pial.surf.gii" for side in template.surfaces}
-    return f"space-{_alphanumeric(stem)}", {"SpatialReference": surfaces}
+    return f"space-{bids_label(stem)}", {"SpatialReference": surfaces}
 
 
 def _labels(brain: ExportedBrain, back: Floats) -> LabelVolume:
@@ -273,9 +276,8 @@ def publish_derivatives(
 
 
 def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
-    subjects = {brain.brain: f"sub-{_alphanumeric(brain.subject.removeprefix('sub-'))}" for brain in brains}
+    subjects = {brain.brain: bids_subject(brain.subject) for brain in brains}
     sessions = {brain.brain: (match := SESSION.search(brain.brain)) and f"ses-{match[1]}" for brain in brains}
-    # subjects whose names differ only in other characters are noticed by their equal sessions
     several = max(Counter(brain.subject for brain in brains).values(), default=0) > 1 or any(sessions.values())
     week = {brain.brain: f"ses-{brain.week:.2f}w".replace(".", "") if several else None for brain in brains}
     return {brain.brain: (subjects[brain.brain], sessions[brain.brain] or week[brain.brain]) for brain in brains}
@@ -283,9 +285,10 @@ def _subjects_and_sessions(brains: Sequence[ExportedBrain]) -> BidsNames:
 
 def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsNames) -> None:
     # covariates that differ between a subject's brains are those of sessions
-    first = ["participant_id", "session_id", "gestational_age", "brain"]
+    first = list(OWN_COLUMNS)
     people = pd.DataFrame(
-        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True)) | dict(brain.covariates)
+        dict(zip(first, (*names[brain.brain], brain.week, brain.brain), strict=True))
+        | {_column_of_input(name): text for name, text in brain.covariates.items()}
         for brain in brains
     ).sort_values(first[:2])
     most = people.groupby("participant_id").nunique(dropna=False).max()
@@ -301,13 +304,14 @@ def _write_people(folder: Path, brains: Sequence[ExportedBrain], names: BidsName
         write_json(folder / f"{name}.json", columns)
 
 
+def _column_of_input(name: str) -> str:
+    """Return the column of a covariate, which may be named like a column of the export itself."""
+    return f"{name}_of_input" if name in OWN_COLUMNS else name
+
+
 def bids_unit(unit: str) -> str:
     """Return a unit as BIDS writes it: powers with ^, and "arbitrary" for none."""
     return "arbitrary" if unit == "1" else re.sub(r"([cm]m)(\d)", r"\1^\2", unit)
-
-
-def _alphanumeric(text: str) -> str:
-    return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 
 def _write_tsv(path: Path, table: pd.DataFrame) -> None:

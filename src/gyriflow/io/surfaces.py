@@ -85,7 +85,9 @@ def require_side(path: AnyPath, structure: str | None, side: str | None) -> None
     """Raise InputError if a file's structure is the other hemisphere than `side`, "left" or "right"."""
     expected = next((name for key, name in STRUCTURES.items() if key == side), None)
     if expected and structure in STRUCTURES.values() and structure != expected:
-        remedy = "Swap left and right, or correct the file's own side (AnatomicalStructurePrimary, or its name)."
+        other = next(key for key, name in STRUCTURES.items() if name == structure)
+        remedy = f"Give it as the {other} one. If you know that it is the {side} one, correct the file's own side "
+        remedy += "(AnatomicalStructurePrimary, or its name)."
         raise InputError("is the other hemisphere", path=path, found=structure, expected=expected, remedy=remedy)
 
 

@@ -30,7 +30,10 @@ MM_PER_NIFTI_UNIT = {"mm": 1.0, "meter": 1e3, "micron": 1e-3, "unknown": 1.0}
 # two header matrices agree if they place every corner within this share of a voxel
 AGREEMENT_VOXELS = 0.1
 ANISOTROPY_WARNED = 2.0
-WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
+WHICH_MATRIX = (
+    "Find out which one holds, for example from the scan that was labelled, and name it with the brain's affine_from: "
+    "qform or sform. The wrong one may exchange left and right."
+)
 # labels stored as floats or with a slope may differ by this from whole numbers
 MAX_LABEL_ERROR = 0.05
 GZIP_SUFFIXES = (".gz", ".mgz")
@@ -220,7 +223,7 @@ def _affine(image: SpatialImage, affine_from: AffineSource, path: AnyPath) -> Fl
         raise InputError(problem, path=path, expected="NIfTI (.nii, .nii.gz, or a pair of .hdr and .img) or MGH (.mgz)")
     if isinstance(image, nib.MGHImage) and not _has_directions(path):
         problem = "has no valid directions (goodRASFlag), so left and right are unknown"
-        remedy = "Set them with mri_convert, for example --in_orientation, or give the volume as NIfTI."
+        remedy = "Set them as in the scan that was labelled, for example with mri_convert --in_orientation."
         raise InputError(problem, path=path, found=0, expected=1, remedy=remedy)
     return image.affine
 
@@ -234,10 +237,12 @@ def _has_directions(path: AnyPath) -> bool:
 
 def _nifti_affine(image: nib.Nifti1Pair, affine_from: AffineSource, path: AnyPath) -> Floats:
     header = image.header
+    needed = ("sform", "qform") if affine_from == "auto" else (affine_from,)
     try:
-        matrices = {"sform": header.get_sform(), "qform": header.get_qform()}
+        matrices = {name: getattr(header, f"get_{name}")() for name in needed}
     except (HeaderDataError, ValueError) as error:
-        raise InputError(f"has a broken qform: {error}", path=path, remedy="Set affine_from: sform.") from error
+        remedy = "If the sform holds, as in the scan that was labelled, set affine_from: sform."
+        raise InputError(f"has a broken qform: {error}", path=path, remedy=remedy) from error
     codes = {"sform": int(header["sform_code"]), "qform": int(header["qform_code"])}
     unit = _length_unit(header, path)
     if unit == "unknown":

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, vertex_areas
+from ..names import column_part
 from ..quantities import METRICS, VERTEX_MAPS
 from ..settings.terms import MEASURED, NO_REGION, SIDES
 from ..units import CM2_PER_MM2
@@ -31,11 +32,24 @@ def wide_names(table: pd.DataFrame) -> list[str]:
     """Return the column of the wide table that each row of one as of `long_table` belongs in.
 
     They are named by hemisphere, region, metric and unit, such as `left_frontal_area_cm2`; numbers without a unit have
-    none in their name.
+    none in their name. InputError where two regions would have one column.
     """
     unit = table["unit"].astype(str).replace({"1": "", "nan": ""}).str.replace("/", "_per_")
     parts = [table["hemisphere"], table["region"].fillna(""), table["metric"], unit]
-    return ["_".join(part for part in row if part).replace(" ", "-") for row in zip(*parts, strict=True)]
+    columns = []
+    meanings: dict[str, tuple[str, ...]] = {}
+    for row in zip(*parts, strict=True):
+        column = "_".join(column_part(part) for part in row if part)
+        first = meanings.setdefault(column, row)
+        if first != row:
+            raise InputError(
+                f"two regions have the same column {column} of metrics_wide",
+                found=f"{first[2]} of {first[1]!r} and {row[2]} of {row[1]!r}",
+                expected="names of regions that differ not only in spaces and hyphens",
+                remedy="Rename one of them in the labels, or under names in metrics.regions.",
+            )
+        columns.append(column)
+    return columns
 
 
 def described_columns(table: pd.DataFrame) -> dict[str, tuple[str, str]]:

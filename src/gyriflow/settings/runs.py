@@ -165,14 +165,25 @@ class GrowthSettings(Settings):
 def growth_series(
     brains: Sequence[BrainConfig], given: Sequence[str] | Mapping[str, Sequence[str]] | None
 ) -> dict[str, list[str]]:
-    """Return the ids of the brains of each growth series that has two weeks or more.
+    """Return the ids of the brains of each growth series that has two weeks or more, by its name.
+
+    The names in a checked configuration are those of one series each (see `growing_groups`).
+    """
+    return {name: [brain.id for brain in members] for name, members in growing_groups(brains, given)}
+
+
+def growing_groups(
+    brains: Sequence[BrainConfig], given: Sequence[str] | Mapping[str, Sequence[str]] | None
+) -> list[tuple[str, Sequence[BrainConfig]]]:
+    """Return the name and the brains of each growth series that has two weeks or more.
 
     `given` is the setting `brains`; its ids must exist. Only a named series may combine several subjects or
     populations; `all` stands for all brains. Single hemispheres and whole brains are never in one series.
     """
-    series: dict[str, Sequence[BrainConfig]] = {}
+    series: list[tuple[str, Sequence[BrainConfig]]] = []
     if isinstance(given, Mapping):
-        series = {name: [brain for brain in brains if brain.id in ids or ALL in ids] for name, ids in given.items()}
+        for name, ids in given.items():
+            series.append((name, [brain for brain in brains if brain.id in ids or ALL in ids]))
     else:
         groups: dict[tuple[str | None, str | None, str], list[BrainConfig]] = {}
         for brain in brains:
@@ -184,8 +195,9 @@ def growth_series(
             for kind, same_kind in by_kind.items():
                 parts = [subject or "", population or "", side]
                 parts += [kind] if len(by_kind) > 1 or not (subject or population) else []
-                series[", ".join(part for part in parts if part) if len(groups) > 1 else kind] = same_kind
-    return {name: [brain.id for brain in members] for name, members in series.items() if _ages(members) > 1}
+                name = ", ".join(part for part in parts if part) if len(groups) > 1 else kind
+                series.append((name, same_kind))
+    return [(name, members) for name, members in series if _ages(members) > 1]
 
 
 def _series_by_kind(brains: Sequence[BrainConfig]) -> dict[str, Sequence[BrainConfig]]:
@@ -305,5 +317,11 @@ def changed(run: Run, changes: Mapping[str, Any]) -> Run:
 def variants(name: str, study: SweepSettings) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the name and the varied values of each run of a sweep, the last key varying fastest."""
     for values in product(*study.vary.values()):
-        texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+        texts = [_short(value) if isinstance(value, float) else value for value in values]
         yield "-".join([name, *texts]), dict(zip(study.vary, values, strict=True))
+
+
+def _short(number: float) -> str:
+    """Return a number in six digits, or in as many as it takes to tell it from all others."""
+    short = f"{number:g}"
+    return short if float(short) == number else repr(number)

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from ..errors import InputError
 from ..io.files import read_json
 from ..io.yaml_files import SCHEMES
+from ..names import column_part, folder_name, merged_names
 from ..quantities import METRICS
 from ..settings.base import Key, KeyProblem, did_you_mean, messages
 from ..settings.folding import VARYING, value_problems
@@ -24,6 +25,7 @@ from ..settings.runs import (
     Start,
     SweepSettings,
     changed,
+    growing_groups,
     growth_series,
     members_of,
     starts_of,
@@ -37,7 +39,7 @@ from .atlases import used_atlases
 RESERVED_BRAINS = ("study", "report", ALL, FIRST)
 """Ids that brains may not have, since they have another meaning in results, tables or settings."""
 RESULT_COLUMNS = re.compile(
-    "subject|run|week|(whole|left|right)_(.+_)?("
+    "subject|run|week|(participant_id|session_id|gestational_age|brain)_of_input|(whole|left|right)_(.+_)?("
     + "|".join(f"{metric.name}_{metric.unit.replace('/', '_per_')}".removesuffix("_1") for metric in METRICS.values())
     + ")"
 )
@@ -51,7 +53,7 @@ NO_FOLDING_KEY = "is not a key of folding"
 
 def problems_between(config: Config) -> list[KeyProblem]:
     """Return the problems between the sections of a configuration, each once."""
-    checks = (names, starts, runs, growth, studies, calibration, metrics)
+    checks = (names, run_names, starts, runs, growth, studies, calibration, metrics)
     return list(dict.fromkeys(problem for check in checks for problem in check(config)))
 
 
@@ -65,18 +67,21 @@ def names(config: Config) -> Iterator[KeyProblem]:
             yield KeyProblem(f"{count} brains have the id {name}; ids are unique", ("brains",))
         if name in RESERVED_BRAINS:
             yield KeyProblem(f"the id {name} is reserved; choose another", ("brains",))
-    for first, second in _equal_but_for_case(counts):
+    for first, second in merged_names(counts, folder_name):
         yield KeyProblem(
             f"the ids {first} and {second} differ only in case, so some disks mix up their folders; rename one",
             ("brains",),
         )
-    for first, second in _equal_but_for_case(config.runs):
-        text = f"differs from the run {first} only in case, so some disks mix up their folders; rename one"
-        yield KeyProblem(text, ("runs", second))
-    reserved = {"runs": (MEASURED,), "studies": RESERVED_STUDIES, "schemes": tuple(SCHEMES)}
+    for first, second in merged_names(config.studies, folder_name):
+        text = f"differs from the study {first} only in case, so some disks mix up their folders; rename one"
+        yield KeyProblem(text, ("studies", second))
+    reserved = {"runs": (MEASURED,), "schemes": tuple(SCHEMES)}
     for section, taken in reserved.items():
         for name in sorted(set(getattr(config, section)) & set(taken)):
             yield KeyProblem("the name is taken; choose another", (section, name))
+    for name in config.studies:
+        if folder_name(name) in RESERVED_STUDIES:
+            yield KeyProblem("the name is taken; choose another", ("studies", name))
     covariates = {name: number for number, brain in reversed([*enumerate(config.brains)]) for name in brain.covariates}
     for name, number in covariates.items():
         if RESULT_COLUMNS.fullmatch(name):
@@ -87,13 +92,6 @@ def names(config: Config) -> Iterator[KeyProblem]:
         if brain.scheme not in (None, *schemes):
             expected = f"expected one of {', '.join(schemes)}, or a name of schemes"
             yield KeyProblem(f"found {brain.scheme!r}; {expected}", ("brains", number, "scheme"))
-
-
-def _equal_but_for_case(names: Iterable[str]) -> Iterator[tuple[str, str]]:
-    first: dict[str, str] = {}
-    for name in names:
-        if (earlier := first.setdefault(name.lower(), name)) != name:
-            yield earlier, name
 
 
 def starts(config: Config) -> Iterator[KeyProblem]:
@@ -126,7 +124,6 @@ def _unknown(ids: Iterable[str], config: Config, key: Key) -> Iterator[KeyProble
 def runs(config: Config) -> Iterator[KeyProblem]:
     """Yield problems between the settings of each run and its start brains."""
     by_id = {brain.id: brain for brain in config.brains}
-    of_sweeps = {member for sweep in config.studies.items() for member, _ in variants(*sweep)}
     for name, run in config.runs.items():
         brains = [by_id[brain] for brain in starts_of(config.start, run, list(by_id))]
         weeks = [(brain.week, f"the week of the start brain {brain.id}") for brain in brains]
@@ -134,15 +131,36 @@ def runs(config: Config) -> Iterator[KeyProblem]:
         for week, called in weeks or [(run.end_week - 1e-9, "the start")]:
             for problem in value_problems(run, week, {}, called):
                 yield KeyProblem(problem.text, _place(name, problem.key, config))
-        for member in members_of(name, run):
-            if member in config.runs or member in of_sweeps:
-                yield KeyProblem(f"is the name of a member of the ensemble of {name}; rename it", ("runs", member))
         for key in VARYING if len(brains) > 1 else ():
             value = getattr(run, key)
             if isinstance(value, Varying) and value.surface is not None:
                 ids = ", ".join(brain.id for brain in brains)
                 text = f"has a map on a surface, which belongs to one brain; the run starts from {ids}"
                 yield KeyProblem(text, _place(name, (key,), config))
+
+
+def run_names(config: Config) -> Iterator[KeyProblem]:
+    """Yield runs with the name of another one. Runs of all sections have folders next to each other."""
+    earlier: dict[str, tuple[str, str]] = {}
+    for name, owner, key in _named_runs(config):
+        first, of = earlier.setdefault(folder_name(name), (name, owner))
+        if (first, of) != (name, owner):
+            pair = f"the run {name} of {owner} and the run {first} of {of}"
+            yield KeyProblem(f"{pair} would share a folder; choose names that differ, not only in case", key)
+
+
+def _named_runs(config: Config) -> Iterator[tuple[str, str, Key]]:
+    """Yield each run's name, what it is of, and the key with which its name is changed."""
+    for name in config.calibrate.runs if config.calibrate else ():
+        yield name, "the calibration", ("calibrate",)
+    for run, settings in config.runs.items():
+        for name in members_of(run, settings):
+            yield name, f"the ensemble of {run}", ("runs", run)
+    for name in config.runs:
+        yield name, "the section runs", ("runs", name)
+    for study, sweep in config.studies.items():
+        for name, values in variants(study, sweep):
+            yield name, f"the study {study} ({values})", ("studies", study)
 
 
 def _place(run: str, key: Key, config: Config) -> Key:
@@ -170,6 +188,11 @@ def growth(config: Config) -> Iterator[KeyProblem]:
         mixed = sorted({brain.population or "of no known population" for brain in brains})
         if named and len(mixed) > 1:
             yield KeyProblem(f"found brains {' and '.join(mixed)}; a growth curve is of one population", key)
+    names = [name for name, _ in growing_groups(config.brains, config.growth.brains)]
+    for name, count in Counter(names).items():
+        if count > 1:
+            text = f"{count} growth series would have the name {name}; rename a subject or a population"
+            yield KeyProblem(text, ("growth", "brains"))
     series, preferred = growth_series(config.brains, config.growth.brains), config.growth.series
     if preferred is not None and series and preferred not in series:
         yield KeyProblem(f"found {preferred!r}; the series are {', '.join(series)}", ("growth", "series"))
@@ -223,6 +246,10 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
         )
     with_regions = settings.regions if isinstance(settings.regions, dict) else {}
     yield from _unknown(with_regions, config, ("metrics", "regions"))
+    names = [name for given in with_regions.values() for name in given.names.values()]
+    for first, second in merged_names(names, column_part):
+        text = f"found {first!r} and {second!r}, which are one column of metrics_wide.csv; rename one"
+        yield KeyProblem(text, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # regions are carried, and their asymmetry measured, on both hemispheres together
     if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
@@ -239,16 +266,11 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
 
 def studies(config: Config) -> Iterator[KeyProblem]:
     """Yield problems between the studies, the runs and the brains."""
-    study_of_run: dict[str, str] = {}
     for name, study in config.studies.items():
         key = ("studies", name)
         yield from _comparison_problems(study, config, key)
         if study.base in config.runs:
             yield from _member_problems(study, config.runs[study.base], key)
-            for run, _ in variants(name, study):
-                if run in config.runs or study_of_run.setdefault(run, name) != name:
-                    where = "the section runs" if run in config.runs else f"the study {study_of_run[run]}"
-                    yield KeyProblem(f"has a run with the name {run}, and so has {where}; rename one", key)
 
 
 def _member_problems(study: SweepSettings, base: Run, key: Key) -> Iterator[KeyProblem]:
@@ -300,8 +322,6 @@ def calibration(config: Config) -> Iterator[KeyProblem]:
     if calibrate is None:
         return
     yield from _comparison_problems(calibrate, config, ("calibrate",))
-    for name in sorted(set(calibrate.runs) & set(config.runs)):
-        yield KeyProblem("the name is used for a run of the calibration; choose another", ("runs", name))
     if calibrate.base in config.runs:
         for key, bounds in calibrate.parameters.items():
             for text in _parameter_problems(key, bounds, config.runs[calibrate.base]):

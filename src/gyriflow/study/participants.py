@@ -12,6 +12,7 @@ from typing import Any
 from ..errors import InputError
 from ..formats import is_volume
 from ..io.files import read_json, read_text_table
+from ..names import merged_names
 from ..settings.base import absent_content, located, own_name, path_in
 from ..settings.brains import SOURCES, ParticipantsSettings
 from ..settings.weeks import EXPECTED_AGE, WeekNotation
@@ -112,6 +113,9 @@ def read_table_of_scans(path: Path) -> Table:
     empty = _empty_table(path)
     texts = read_text_table(path)
     columns = list(texts[0])
+    for first, second in merged_names(columns, column_key):
+        if column_key(first) in (*IDS, *SESSIONS) and any(row[first] != row[second] for row in texts):
+            raise InputError("has two columns of one name", path=path, found=f"{first} and {second}", expected="one")
     names = {column_key(name): name for name in columns}
     ids = next((names[key] for key in IDS if key in names), None)
     if ids is None and empty.subject is None:
@@ -304,6 +308,11 @@ def participants_brains(
         raise InputError(table.age_problem, path=path)
     if tables.ambiguity:
         raise InputError(tables.ambiguity, path=path)
+    for first, second in merged_names((row.name for row in table.rows), lambda name: name.removeprefix("sub-")):
+        expected = "one of them, since sub- is not part of the label"
+        raise InputError(
+            "has two names of one participant", path=path, found=f"{first} and {second}", expected=expected
+        )
     entries: list[dict[str, Any]] = []
     left_out: dict[str, dict[str, Any]] = {}
     sources: dict[str, str] = {}

@@ -78,7 +78,7 @@ THICKNESS = {
 FILLED_LABELS = f"{BRAIN}/surface/filled.nii.gz"
 MATCHED = f"{STUDY}/matched/{{earlier}}/{{later}}.h5"
 REGISTERED = f"{STUDY}/registration/{{earlier}}/{{later}}.h5"
-VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}.smoothing-{{smoothing}}.seed-{{seed}}.h5"
+VARIED_REGISTRATION = f"{STUDY}/registration/{{earlier}}/{{later}}/smoothing-{{smoothing}}.seed-{{seed}}.h5"
 """A registration with a factor of its smoothing, and labels perturbed with a seed (0: unchanged)."""
 MESH = {
     "mesh": f"{BRAIN}/mesh/brain.xdmf",
@@ -125,8 +125,8 @@ ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
 ONSET = f"{RUN}/metrics/onset.csv"
-COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}.csv"
-MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}.coefficients.csv"
+COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}/comparison.csv"
+MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}/coefficients.csv"
 CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
 
 
@@ -136,8 +136,12 @@ def one_of(names: Iterable[str]) -> str:
 
 
 def log_of(rule: str, pattern: str) -> str:
-    """Return the log of a rule that makes a file: named by the rule and the wildcards that are not in the folder."""
+    """Return the log of a rule that makes a file: named by the rule and the wildcards that are not in the folder.
+
+    Commas part the values of the wildcards, since ids of brains may contain dots.
+    """
     folders = (BRAIN, RUN, SWEEP, CALIBRATION, STUDY, REPORT, PLACE)
     folder = next(place for place in folders if pattern.startswith(f"{place}/"))
     wildcards = [f"{{{name}}}" for name in re.findall(r"{(\w+)}", pattern) if f"{{{name}}}" not in folder]
-    return f"{folder}/logs/{'.'.join([rule, *wildcards])}.log"
+    name = f"{rule}.{','.join(wildcards)}" if wildcards else rule
+    return f"{folder}/logs/{name}.log"

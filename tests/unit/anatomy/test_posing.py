@@ -17,10 +17,12 @@ from shapes import LPS, cerebrum_surface, ellipsoid, phantom, rigid
 from gyriflow.anatomy import pose as posing
 from gyriflow.anatomy.fissure import smallest_gap
 from gyriflow.anatomy.pial import from_hemispheres
-from gyriflow.anatomy.plausible import facing_warnings
+from gyriflow.anatomy.plausible import facing_warnings, require_left_and_right
 from gyriflow.anatomy.pose import (
+    axes_of_file,
     hemisphere_by_shape,
     hemisphere_warnings,
+    pose_of_hemisphere,
     pose_of_labels,
     pose_of_pair,
     pose_of_surface,
@@ -29,7 +31,7 @@ from gyriflow.anatomy.pose import (
 from gyriflow.anatomy.repair import pieces
 from gyriflow.anatomy.template import medial_wall, shape_of
 from gyriflow.errors import InputError
-from gyriflow.geometry.alignment import angle_deg, motion
+from gyriflow.geometry.alignment import CUBE_ROTATIONS, angle_deg, motion
 from gyriflow.geometry.triangles import TriangleMesh, euler_number, flipped, is_closed, signed_volume, transformed
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import SCHEMES
@@ -118,10 +120,100 @@ def test_other_sizes_and_asymmetric_brains_are_posed(halves, change):
 
 def test_swapped_hemispheres_are_refused(halves):
     left, right = (transformed(half, drawn(seed)) for half, seed in zip(halves, (9, 10), strict=True))
-    with pytest.raises(InputError, match=r"0\.\d\d .*0\.\d\d ", check=Facts("coordinates: ras")):
+    with pytest.raises(InputError, match=r"0\.\d\d .*0\.\d\d ", check=Facts("coordinates: ras", "mirrored")):
         pose_of_pair(right, left)
     with pytest.raises(InputError, match=r"1\.\d\d .*0\.\d\d "):
         pose_of_pair(left, left)
+
+
+AXES = {
+    "RAS": np.eye(3),
+    "LAS": np.diag([-1.0, 1.0, 1.0]),
+    "RPS": np.diag([1.0, -1.0, 1.0]),
+    "LPI": -np.eye(3),
+    "SAR": np.eye(3)[[2, 1, 0]],
+    "PIR": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+}
+"""Coordinates of files as (3, 3) matrices from RAS+, by their axes; all but the first and the last mirror."""
+
+
+def test_the_axes_of_a_file_are_named():
+    assert [axes_of_file(axes.T) for axes in AXES.values()] == list(AXES)
+    oblique = Rotation.from_euler("xyz", (40, 0, 0), degrees=True).as_matrix()
+    assert axes_of_file(oblique) == ""
+    slight = Rotation.from_euler("xyz", (20, -9, 12), degrees=True).as_matrix()
+    assert axes_of_file(slight) == "RAS"
+
+
+@pytest.mark.fault(9)
+@pytest.mark.parametrize(
+    ("axes", "is_exchanged", "facts"),
+    [
+        # each of a pair has one shape
+        ("RAS", True, ["exchanged", "RAS", "LAS", "swap", "do not swap"]),
+        ("LAS", False, ["exchanged", "RAS", "LAS", "swap", "do not swap"]),
+        ("RPS", False, ["exchanged", "LPS", "RPS", "swap", "do not swap"]),
+        # as of BrainVISA, and of an array in the order z, y, x
+        ("LPI", False, ["mirrored", "LPI", "Do not swap"]),
+        ("SAR", False, ["mirrored", "SAR", "Do not swap"]),
+    ],
+)
+def test_mirrored_hemispheres_are_told_from_exchanged_ones_or_both_are_named(halves, axes, is_exchanged, facts):
+    files = [linear(half, AXES[axes]) for half in halves]
+    with pytest.raises(InputError, check=Facts(*facts)) as caught:
+        pose_of_pair(*(files[::-1] if is_exchanged else files))
+    # nobody is told to swap whose files are not exchanged
+    assert ("If the files are exchanged, swap" in str(caught.value)) == ("exchanged" in facts)
+
+
+def test_of_unusual_axes_it_is_said_that_they_may_be_mirrored(halves):
+    (doubt,) = pose_of_pair(*(linear(half, AXES["PIR"]) for half in halves)).warnings
+    assert doubt == Facts("PIR", "left", "right")
+    # exchanged and mirrored hemispheres have the shapes of others: these are not to be told
+    exchanged = [linear(half, AXES["LPI"]) for half in halves[::-1]]
+    (doubt,) = pose_of_pair(*exchanged).warnings
+    assert doubt == Facts("RPI", "left", "right")
+
+
+@pytest.mark.parametrize("coordinates", ["ras", "lps"])
+def test_nobody_is_told_to_swap_sides_in_coordinates_that_do_not_fit(halves, coordinates):
+    # LPS named RAS, or the reverse
+    left, right = (transformed(half, LPS) for half in halves)
+    with pytest.raises(InputError, check=Facts("coordinates: auto", "do not swap")) as caught:
+        require_left_and_right(left, right, coordinates)
+    assert "Swap" not in str(caught.value)
+
+
+def test_a_hemisphere_of_the_other_shape_is_mirrored_or_of_the_other_side(halves):
+    mirrored = linear(halves[0], AXES["LAS"])
+    facts = Facts("right", "mirrored", "set side: right", "keep the side")
+    with pytest.raises(InputError, check=facts):
+        pose_of_hemisphere(mirrored, "left", "auto")
+    (doubt, *_) = pose_of_hemisphere(mirrored, "left", "ras").warnings
+    assert doubt == Facts("right", "left", "axis")
+
+
+@pytest.mark.slow
+@pytest.mark.fault(9, 10)
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no example hemispheres in {DATA}")
+def test_no_axes_of_a_real_pair_have_a_wrong_answer_but_what_has_two_faults():
+    truth = json.loads((DATA / "truth.json").read_text())
+    halves = []
+    for side in SIDES:
+        file = f"fetal.week22.{side}.pial.surf.gii"
+        mesh = transformed(read_surface(DATA / file), truth[file]["to_ras"])
+        halves.append(flipped(mesh) if signed_volume(mesh) < 0 else mesh)
+    for turn in CUBE_ROTATIONS[::3]:
+        named = axes_of_file(turn.T)
+        pose = pose_of_pair(*(linear(half, turn) for half in halves))
+        require_upright(pose, [motion(turn)] * 2)
+        for pair, axes in ((halves[::-1], turn), (halves, -turn)):
+            with pytest.raises(InputError, check=Facts("mirrored")) as caught:
+                pose_of_pair(*(linear(half, axes) for half in pair))
+            is_told = "exchanged, or" not in str(caught.value)
+            # what is exchanged in these axes is mirrored in those that its mirror image has
+            exchanged = named if axes is turn else axes_of_file(AXES["LAS"] @ axes.T)
+            assert is_told == (exchanged not in ("RAS", "LPS"))
 
 
 @pytest.mark.parametrize("half_lengths", [(9, 24, 16), (12, 24, 12)])

@@ -16,7 +16,7 @@ from shapes import hemisphere
 
 from gyriflow.anatomy.plausible import expected_volume_ml
 from gyriflow.cli import check as checking
-from gyriflow.cli.check import check_study, coarse_cortices, input_problems, plan, work_of
+from gyriflow.cli.check import check_study, coarse_cortices, export_problems, input_problems, plan, work_of
 from gyriflow.errors import InputError
 from gyriflow.geometry.alignment import MIRROR
 from gyriflow.geometry.triangles import TriangleMesh, transformed
@@ -152,9 +152,15 @@ def test_mirrored_hemispheres_are_refused_before_a_run(tmp_path, monkeypatch):
     for side, half in zip(("left", "right"), atlas_halves(), strict=True):
         write_surface(tmp_path / f"{side}.surf.gii", transformed(half, MIRROR))
     _, bad = checked(tmp_path, monkeypatch, brain={"week": 24})
-    assert bad == [Facts("brain sub-1", "Swap `left` and `right`")]
+    assert bad == [Facts("brain sub-1", "coordinates: auto", "do not swap `left` and `right`")]
     _, bad = checked(tmp_path, monkeypatch, brain={"week": 24, "coordinates": "auto"})
-    assert bad == [Facts("brain sub-1", "swapped")]
+    assert bad == [Facts("brain sub-1", "exchanged", "mirrored", "RAS", "LAS")]
+
+
+def test_subjects_that_would_be_one_in_the_export_are_told_before_a_run():
+    scans = [{**brain, "subject": name} for brain, name in zip(labelled(21, 22), ("1-12", "11-2"), strict=True)]
+    assert list(export_problems(resolved(scans))) == [Facts("sub-112", "1-12", "11-2")]
+    assert list(export_problems(resolved(labelled(21, 22)))) == []
 
 
 def test_files_named_as_of_another_subject_or_space_are_told(tmp_path, monkeypatch):

@@ -124,6 +124,21 @@ def test_hemispheres_are_paired_with_their_white_surfaces(tmp_path):
     assert second["white"] == ["sub-07/surf/lh.white", "sub-07/surf/rh.white"]
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "id"), [("case 1", "case-1", "case-1"), ("müller1", "möller1", "m-ller1"), ("李1", "王1", "1")]
+)
+def test_files_whose_ids_would_be_one_are_refused_with_both_names(tmp_path, first, second, id):
+    touched(tmp_path, *(f"{name}_dseg.nii.gz" for name in (first, second)))
+    brains = recognise(tmp_path).brains
+    assert [brain.problem for brain in brains] == [Facts(id, first, second)] * 2
+
+
+def test_two_surfaces_of_one_side_are_named_both(tmp_path):
+    touched(tmp_path, "a/left/lh.pial.gii", "a/right/lh.pial.gii", "a/rh.pial.gii")
+    (brain,) = recognise(tmp_path).brains
+    assert brain.problem == Facts("left", "a/left/lh.pial.gii", "a/right/lh.pial.gii")
+
+
 def test_an_age_is_read_from_a_name_that_says_week_or_ga(tmp_path):
     names = ("week21_dseg", "sub-01_ga-26.4_dseg", "sub-21_dseg", "image24_dseg", "AGA23_dseg")
     for name in names:

@@ -137,9 +137,57 @@ def test_subjects_and_sessions_keep_their_names(tmp_path, brain):
 
 
 def test_brains_of_one_bids_name_are_refused(tmp_path, brain):
-    same = brain._replace(brain="case-1", subject="case-1")
-    with pytest.raises(InputError, check=Facts("sub-case1", "case_1", "case-1")):
-        export_bids(tmp_path / "bids", [brain, same], {}, "1", {})
+    again = brain._replace(brain="scan-2")
+    with pytest.raises(InputError, check=Facts("sub-case1_ses-2243w", "case_1", "scan-2")):
+        export_bids(tmp_path / "bids", [brain, again], {}, "1", {})
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "label"),
+    [
+        ("1-12", "11-2", "sub-112"),
+        ("case_1", "case-1", "sub-case1"),
+        ("sub-01", "01", "sub-01"),
+        ("müller", "möller", "sub-mller"),
+        # a disk that ignores case has one folder for both
+        ("sub-a", "sub-A", "sub-a"),
+    ],
+)
+def test_subjects_of_one_bids_label_are_refused_at_any_weeks(tmp_path, brain, first, second, label):
+    scans = [
+        brain._replace(brain="a", subject=first, week=22.0),
+        brain._replace(brain="b", subject=second, week=23.0),
+        brain._replace(brain="c", subject=first, week=24.0),
+    ]
+    with pytest.raises(InputError, check=Facts(label, first, second)):
+        export_bids(tmp_path / "bids", scans, {}, "1", {})
+    assert not (tmp_path / "bids").exists()
+
+
+def test_runs_of_one_bids_label_are_refused_at_any_brains_and_weeks(tmp_path, brain):
+    other = brain._replace(brain="case_2", subject="case_2")
+    folded = [brain._replace(run="stiff-1", week=24.0), other._replace(run="stiff.1", week=25.0)]
+    with pytest.raises(InputError, check=Facts("stiff1", "stiff-1", "stiff.1")):
+        export_bids(tmp_path / "bids", [brain, other, *folded], {}, "1", {})
+
+
+def test_covariates_named_as_columns_of_the_export_stand_beside_these(tmp_path, brain):
+    # a table often has the age at birth beside that at the scan
+    covariates = {"gestational_age": "39.1", "brain": "left", "session_id": "b"}
+    wide = pd.DataFrame({"subject": ["case_1"], "week": [22.43], **{key: [text] for key, text in covariates.items()}})
+    export_bids(tmp_path, [brain._replace(covariates=covariates)], {"metrics_wide": wide}, "1", {})
+    (row,) = pd.read_csv(tmp_path / "participants.tsv", sep="\t", dtype=str).to_dict("records")
+    assert row == {"participant_id": "sub-case1", "gestational_age": "22.43", "brain": "case_1"} | {
+        f"{key}_of_input": text for key, text in covariates.items()
+    }
+    (row,) = pd.read_csv(tmp_path / "metrics_wide.tsv", sep="\t").to_dict("records")
+    assert (row["brain"], row["brain_of_input"], row["gestational_age_of_input"]) == ("case_1", "left", 39.1)
+
+
+@pytest.mark.parametrize("kind", ["subject", "run"])
+def test_a_name_without_letters_and_digits_has_no_label(tmp_path, brain, kind):
+    with pytest.raises(InputError, check=Facts(kind, "--")):
+        export_bids(tmp_path / "bids", [brain._replace(**{kind: "--"}, week=23.0), brain], {}, "1", {})
 
 
 def test_subjects_are_handed_over_beside_others(tmp_path, brain):

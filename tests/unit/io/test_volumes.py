@@ -75,6 +75,18 @@ def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
 
 
 @pytest.mark.fault(2)
+def test_a_broken_qform_is_not_read_where_the_sform_holds(tmp_path, labels):
+    path = saved(tmp_path / "a.nii", labels)
+    image = nib.load(path)
+    image.header["quatern_b"] = image.header["quatern_c"] = 0.9
+    content = bytearray(path.read_bytes())
+    content[:348] = image.header.binaryblock
+    path.write_bytes(content)
+    with pytest.raises(InputError, check=Facts("a.nii:", "affine_from: sform")):
+        read_label_volume(path)
+    assert np.allclose(read_label_volume(path, "sform").affine[:3, :3], AFFINE[:3, :3])
+
+
 @pytest.mark.parametrize(("sform", "qform"), [(1, 0), (0, 1)])
 def test_of_two_matrices_the_one_that_is_set_counts(tmp_path, labels, sform, qform):
     wrong = np.diag([3.0, 3.0, 3.0, 1.0])

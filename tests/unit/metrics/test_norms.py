@@ -11,6 +11,7 @@ from configurations import LABELLED, problems, study
 from facts import Facts
 from scipy import stats
 
+from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
 from gyriflow.io.yaml_files import SCHEMES
 from gyriflow.metrics.lms import MIN_SUBJECTS_FOR_SKEWNESS, SKEWNESS, fit_norm
@@ -485,6 +486,25 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
     assert list(known.columns[:3]) == ["run", "week", "sex"]
     assert known.loc["other", "sex"] == "F"
     assert known["run"].isin(table["run"]).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (("upper bank", "area"), ("upper-bank", "area")),
+        # the end of one name is the beginning of the other
+        (("frontal", "mean_shape_index"), ("frontal_mean", "shape_index")),
+        (("", "relative_power_B4"), ("relative", "power_B4")),
+    ],
+)
+def test_regions_of_one_column_are_refused_with_both_names(first, second) -> None:
+    rows = [
+        {"subject": "a", "run": "real", "week": 21.0, "hemisphere": "left", "region": region, "metric": metric}
+        for region, metric in (first, second)
+    ]
+    table = pd.DataFrame(rows).assign(value=[1.0, 2.0], unit="1")
+    with pytest.raises(InputError, check=Facts(repr(first[0]), repr(second[0]))):
+        wide_table(table, {})
 
 
 def test_asymmetry_of_sides() -> None:

@@ -82,6 +82,14 @@ def test_ids_are_unique_and_no_folder_of_the_results():
     ]
 
 
+@pytest.mark.parametrize("pair", [("s", "S"), ("w8", "W8")])
+def test_studies_that_differ_only_in_case_are_refused(pair):
+    sweep = {"base": "reference", "compare_week": 22.5, "vary": {"thickness_mm": [1, 2]}}
+    first, second = pair
+    text = problems(study(studies={first: sweep, second: sweep | {"vary": {"thickness_mm": [3, 4]}}}))
+    assert text == [Facts(f"studies.{second}:", first)]
+
+
 def test_one_scan_of_a_subject_is_of_each_week():
     scans = [{"id": name, "week": 24, "subject": "one", **LABELLED} for name in "ab"]
     assert problems(study(scans, folding={"end_week": 25})) == [Facts("brains:", 2, "one", 24)]
@@ -175,7 +183,9 @@ def test_what_is_no_age_is_refused(text, facts):
     assert problems(one(**LABELLED, week=text)) == [Facts("brains[0].week:", text, *facts)]
 
 
-@pytest.mark.parametrize("name", ["run", "week", "subject", "whole_area_cm2", "left_frontal_gyrification_index"])
+@pytest.mark.parametrize(
+    "name", ["run", "week", "subject", "brain_of_input", "whole_area_cm2", "left_frontal_gyrification_index"]
+)
 def test_covariates_named_like_columns_of_results_are_refused_once(name):
     brains = [{"id": text, "week": 21, "covariates": {"site": "run", name: "x"}, **LABELLED} for text in "ab"]
     assert problems(study(brains)) == [Facts(f"brains[0].covariates.{name}:", "metrics_wide.csv")]

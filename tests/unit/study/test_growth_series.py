@@ -1,7 +1,7 @@
 """Which brains growth is measured on, whose surfaces match by their vertices, and which are individuals."""
 
 import pytest
-from configurations import LABELLED, both_kinds, labelled, resolved, series_for, series_of, study, touched
+from configurations import LABELLED, both_kinds, labelled, problems, resolved, series_for, series_of, study, touched
 from facts import Facts
 from shapes import sphere
 
@@ -126,6 +126,23 @@ def test_averages_are_no_individuals():
     assert found.are_individuals(["s21", "s23"])
     assert not found.are_individuals(["n21", "n23"])
     assert found.are_individuals(["n21", "n21.4", "n23"])
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ({"subject": "a, b"}, {"subject": "a", "population": "b"}),
+        ({"subject": "control"}, {"population": "control"}),
+    ],
+)
+def test_two_series_of_one_name_are_refused(first, second):
+    brains = [
+        {"id": f"{name}{week}", "week": week, **source, **LABELLED}
+        for name, source in (("x", first), ("y", second))
+        for week in (21, 22)
+    ]
+    name = ", ".join(second.values())
+    assert problems(study(brains, start="x21")) == [Facts("growth.brains:", 2, name)]
 
 
 def test_charts_are_coloured_by_a_covariate_that_groups_subjects():

@@ -207,6 +207,26 @@ def test_ids_and_values_of_a_table_keep_their_text(folder):
     }
 
 
+def test_one_participant_with_two_names_is_refused_with_both(folder):
+    rows = (("sub-01", "21", "a.nii.gz", "feta-7"), ("01", "22", "lh.surf.gii; rh.surf.gii", "n/a"))
+    write(folder, ("participant_id", "week", "files", "scheme"), *rows)
+    with pytest.raises(InputError, check=Facts("participants.tsv:", "sub-01 and 01")):
+        config(folder)
+
+
+@pytest.mark.parametrize("columns", [("participant_id", "Participant ID"), ("session_id", "Session-ID")])
+def test_two_columns_of_one_name_with_other_values_are_refused(folder, columns):
+    further = {"id": "x", "week": "21", "files": "a.nii.gz", "scheme": "feta-7"}
+    write(folder, (*columns, *further), ("1", "2", *further.values()))
+    with pytest.raises(InputError, check=Facts("participants.tsv:", *columns)):
+        config(folder)
+    write(folder, (*columns, *further), ("1", "1", *further.values()))
+    with pytest.raises(InputError) as caught:
+        config(folder)
+    # equal values are one, and only the start brain is missing
+    assert "participants.tsv" not in str(caught.value)
+
+
 def test_scans_of_a_subject_are_in_the_order_of_their_weeks_not_of_their_names(folder):
     rows = [("sub-1", session, week, "a.nii.gz") for session, week in (("b", "23.4"), ("c", "21.5"), ("a", "24+6"))]
     write(folder, ("participant_id", "session_id", "scan_age", "labels"), *rows)

@@ -8,7 +8,7 @@ from configurations import LABELLED
 from facts import Facts
 
 from gyriflow.errors import InputError
-from gyriflow.study import resolve
+from gyriflow.study import paths, resolve
 from gyriflow.study.loading import load
 from gyriflow.study.paths import STUDY, log_of
 
@@ -117,6 +117,37 @@ def test_what_is_wrong_with_a_study_is_said(change, key, facts):
     assert refusal(studies={"s": THICKNESS | change}) == Facts(1, f"studies.s.{key}:", *facts)
 
 
+def test_values_that_agree_in_six_digits_are_runs_of_their_own():
+    study = THICKNESS | {"vary": {"thickness_mm": [1.0, 1.0000001, 1.0000002]}}
+    found = resolved(studies={"s": study}).sweeps["s"].members
+    assert [(member.run, values["thickness_mm"]) for member, values in found] == [
+        ("s-1", 1.0),
+        ("s-1.0000001", 1.0000001),
+        ("s-1.0000002", 1.0000002),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "facts"),
+    [
+        ({"studies": {"s": THICKNESS}, "runs": RUNS | {"S-0.8": {}}}, "studies.s", ["s-0.8", "S-0.8", "runs"]),
+        (
+            {
+                "studies": {
+                    "s": THICKNESS | {"vary": {"thickness_mm": [1, 2], "poisson_ratio": [0.3]}},
+                    "s-1": THICKNESS | {"vary": {"poisson_ratio": [0.3, 0.4]}},
+                }
+            },
+            "studies.s-1",
+            ["s-1-0.3", "study s", "study s-1"],
+        ),
+        ({"calibrate": CALIBRATION, "runs": RUNS | {"Calibration-01": {}}}, "runs.Calibration-01", ["calibration-01"]),
+    ],
+)
+def test_runs_of_all_sections_have_folders_of_their_own(changes, key, facts):
+    assert refusal(**changes) == Facts(1, f"{key}:", *facts)
+
+
 def test_folders_of_results_are_no_names_of_studies():
     sources = [
         ROOT / "workflow/figures.yaml",
@@ -129,6 +160,7 @@ def test_folders_of_results_are_no_names_of_studies():
     # records of time and memory are named like logs
     for folder in folders | {"benchmarks"}:
         assert refusal(studies={folder: THICKNESS}) == Facts(f"studies.{folder}:")
+        assert refusal(studies={folder.upper(): THICKNESS}) == Facts(f"studies.{folder.upper()}:")
     assert refusal(studies={"s": THICKNESS}, runs=RUNS | {"s-0.8": {}}) == Facts("studies.s:", "s-0.8")
 
 
@@ -157,9 +189,27 @@ def test_what_is_wrong_with_a_calibration_is_said(change, key, facts):
     [
         ("results/brains/{brain}/mesh/targets.{origin}.h5", "results/brains/{brain}/logs/rule.{origin}.log"),
         ("results/study/{study}/members/{run}.csv", "results/study/{study}/logs/rule.{run}.log"),
-        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier}.{later}.log"),
+        ("results/study/matched/{earlier}/{later}.h5", "results/study/logs/rule.{earlier},{later}.log"),
         ("results/{where}/regions.csv", "results/{where}/logs/rule.log"),
     ],
 )
 def test_a_log_is_in_the_folder_of_what_was_made_and_has_all_other_wildcards(pattern, log):
     assert log_of("rule", pattern) == log
+
+
+@pytest.mark.parametrize(
+    "patterns",
+    [
+        (paths.COMPARED_MEMBER, paths.MEMBER_COEFFICIENTS),
+        (paths.REGISTERED, paths.VARIED_REGISTRATION),
+        (log_of("rule", paths.MATCHED),),
+    ],
+)
+def test_ids_with_the_marks_of_file_names_have_files_of_their_own(patterns):
+    names = ("a", "a.b", "b", "b.c", "c", "a.coefficients", "b.smoothing-1.seed-2")
+    files = []
+    for first in names:
+        for second in names:
+            values = {"study": "s", "run": first, "brain": second, "earlier": first, "later": second}
+            files += [pattern.format(**values, smoothing="1", seed="2") for pattern in patterns]
+    assert len(set(files)) == len(files)

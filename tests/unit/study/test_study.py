@@ -350,7 +350,7 @@ def test_members_that_grow_as_their_own_series_register_all_pairs_anew(real):
     found = study(real, runs={"a": {"growth": "shapes", "ensemble": 3}})
     chain = found.chains["b21", "self.a-member-1"]
     assert chain.weeks == found.chains["b21", "self"].weeks
-    assert all(".smoothing-" in file and ".seed-1" in file for file in chain.correspondences)
+    assert all("/smoothing-" in file and ".seed-1" in file for file in chain.correspondences)
     assert refusal(real, runs={"a": {"ensemble": 3}}) == Facts("runs.a.ensemble", "rates", "shapes")
     taken = {"a": {"growth": "shapes", "ensemble": 3}, "a-member-2": {}}
     assert refusal(real, runs=taken) == Facts("runs.a-member-2", "ensemble of a")
