@@ -1,4 +1,4 @@
-"""Find voxels labelled as cortex where no cerebral cortex can be: beyond the brain, inside it, around the ventricles."""
+"""Find cortex labels where no cerebral cortex can be: beyond the brain, inside it, around the ventricles."""
 
 from collections.abc import Iterator
 
@@ -52,10 +52,8 @@ def misplaced_cortex(labels: np.ndarray, affine: Floats, scheme: LabelScheme) ->
     at_ventricles = ndimage.binary_dilation(fluid, INSIDE) & cerebrum & ~fluid
     share = (at_ventricles & cortex & ~enclosed).sum() / max(at_ventricles.sum(), 1)
     if share > MAX_AT_VENTRICLES:
-        yield (
-            f"cortex lies at {100 * share:.0f} % of the ventricles' surface, less than 1 % in atlases: is tissue around "
-            "or in the ventricles labelled as cortex?"
-        )
+        found = f"cortex lies at {100 * share:.0f} % of the ventricles' surface, less than 1 % in atlases"
+        yield f"{found}: is tissue around or in the ventricles labelled as cortex?"
 
 
 def hindbrain_note(labels: np.ndarray, scheme: LabelScheme) -> str:

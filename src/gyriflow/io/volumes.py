@@ -119,7 +119,8 @@ def read_header(path: AnyPath) -> VolumeHeader:
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
     """Return the (i, j, k) values of a NIfTI or MGH file, and the (4, 4) matrix to RAS+ positions in mm.
 
-    Values have the type in which they are stored; their axes are brought to the order right, front, up. `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
+    Values have the type in which they are stored; their axes are brought to the order right, front, up.
+    `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
     """
     image = _load(path, content)
     with reading(path, "an image", _expected(content)):

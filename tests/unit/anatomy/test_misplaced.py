@@ -18,7 +18,8 @@ AFFINE = rigid(10, -20, 30, shift=(120, -300, 80)) @ np.diag([*SIZE, 1.0])
 
 def ball(centre_mm, radius_mm):
     index = np.indices((70, 60, 60)).T
-    return np.linalg.norm(index * SIZE - centre_mm, axis=-1).T < radius_mm
+    distance_mm = np.linalg.norm(index * SIZE - centre_mm, axis=-1).T
+    return distance_mm < radius_mm
 
 
 CENTRE = np.array([28.0, 28.0, 44.0])
