@@ -33,6 +33,8 @@ ANISOTROPY_WARNED = 2.0
 WHICH_MATRIX = "Say which one holds with the brain's affine_from: qform or sform."
 # labels stored as floats or with a slope may differ by this from whole numbers
 MAX_LABEL_ERROR = 0.05
+# decimals in mm of the place of a volume
+PLACE_DECIMALS = 3
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
 GOOD_RAS_OFFSET = 28
@@ -145,7 +147,10 @@ def _in_canonical_order(values: NDArray[np.number], affine: Floats) -> tuple[NDA
     """Return a volume with the axes that are closest to RAS+, and its affine: results must not depend on storage."""
     axes = nib.io_orientation(affine)
     reordered = nib.apply_orientation(values, axes)
-    return reordered, affine @ nib.orientations.inv_ornt_aff(axes, values.shape)
+    canonical = affine @ nib.orientations.inv_ornt_aff(axes, values.shape)
+    # headers hold the place of another corner in each order, in single precision
+    canonical[:3, 3] = canonical[:3, 3].round(PLACE_DECIMALS)
+    return reordered, canonical
 
 
 VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}

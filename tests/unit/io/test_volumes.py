@@ -44,18 +44,22 @@ def storage_orders():
 
 
 @pytest.mark.fault(3)
-@pytest.mark.parametrize("order", list(storage_orders()))
 @pytest.mark.parametrize("pose", [np.eye(4), rigid(20, -15, 25, shift=(40, 200, -90))], ids=["straight", "tilted"])
-def test_storage_order_changes_neither_array_nor_place(tmp_path, labels, order, pose):
+def test_storage_order_changes_neither_array_nor_place(tmp_path, labels, pose):
     path, affine = tmp_path / "a.nii", pose @ AFFINE
     image = nib.Nifti1Image(labels, affine)
-    turn = nib.orientations.ornt_transform(nib.io_orientation(affine), nib.orientations.axcodes2ornt(order))
-    nib.save(image.as_reoriented(turn), path)
-    volume, (values, affine_of_map) = read_label_volume(path), read_volume_map(path)
-    assert np.array_equal(volume.labels, labels)
-    assert np.array_equal(values, labels)
-    assert volume.affine == pytest.approx(affine, abs=1e-4)
-    assert affine_of_map == pytest.approx(affine, abs=1e-4)
+    found = []
+    for order in storage_orders():
+        turn = nib.orientations.ornt_transform(nib.io_orientation(affine), nib.orientations.axcodes2ornt(order))
+        nib.save(image.as_reoriented(turn), path)
+        volume, (values, affine_of_map) = read_label_volume(path), read_volume_map(path)
+        assert np.array_equal(volume.labels, labels), order
+        assert np.array_equal(values, labels), order
+        assert np.array_equal(affine_of_map, volume.affine), order
+        found.append(volume.affine)
+    assert found[0] == pytest.approx(affine, abs=1e-3)
+    # no digit may depend on the order, or surfaces are meshed differently
+    assert all(np.array_equal(each, found[0]) for each in found)
 
 
 @pytest.mark.fault(4)
@@ -235,7 +239,7 @@ def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path
     metres = np.diag([1e-3, 1e-3, 1e-3, 1.0]) @ oblique
     found, affine = read_volume_map(saved(tmp_path / "a.nii.gz", values[..., None], metres, "meter"))
     np.testing.assert_array_equal(found, values)
-    assert affine == pytest.approx(oblique, abs=1e-5)
+    assert affine == pytest.approx(oblique, abs=1e-3)
 
 
 @pytest.mark.parametrize("shear", [0.0, 0.2])
@@ -274,7 +278,7 @@ def test_an_empty_border_is_left_out_and_nothing_moves(tmp_path, labels, affine)
     for label in (7, 2):
         assert position(volume, label) == pytest.approx(position(whole, label))
     index = np.add((1, 2, 3), (20, 10, 0))
-    assert position(volume, 7) == pytest.approx(affine[:3, :3] @ index + affine[:3, 3], abs=1e-4)
+    assert position(volume, 7) == pytest.approx(affine[:3, :3] @ index + affine[:3, 3], abs=1e-3)
     assert sum(volume.volumes_ml.values()) == pytest.approx(2e-3 * abs(np.linalg.det(affine[:3, :3])), rel=1e-5)
     shape, sizes, unit, space = read_header(path)
     assert shape == (54, 15, 46)
