@@ -42,6 +42,8 @@ DIGITS = bytes.maketrans(b"\0\1", b"01")
 RADII = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
 # margins in voxels for examining how a change affects connectivity; the last is the whole volume
 MARGINS = (4, 16, 64, 100_000)
+# values of a field, and distances in voxels, that agree to so many decimals are equal, whatever the order of sums
+FIELD_DECIMALS = 4
 # changed voxels get the level plus or minus this value
 CHANGED_STEP = 0.2
 # stalks are thinner than twice this
@@ -154,7 +156,8 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
     """Cut or fill the handles of the level set at one half of an (i, j, k) field; return the field and the counts.
 
     Patches that an opening removes or a closing adds are tried, smallest first. One that removes a handle is applied
-    but for its simple points (Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9).
+    but for its simple points (Bertrand and Malandain 1994, doi 10.1016/0167-8655(94)90046-9). Equal sizes are decided
+    by the field and by distances, not by the order of voxels, so that a mirrored mask has mirrored corrections.
     """
     original = field > 0.5
     mask = original.copy()
@@ -164,7 +167,7 @@ def without_handles(field: NDArray[np.float32]) -> tuple[NDArray[np.float32], di
     for closed_by, radius in product((INSIDE, OUTSIDE), RADII):
         if remaining == 0:
             break
-        for fills, box, patch in _patches(mask, radius):
+        for fills, box, patch in _patches(mask, field, radius):
             # an earlier change may have touched this patch
             patch = patch & (mask[box] != fills)
             changed = np.where(patch, fills, mask[box])
@@ -223,14 +226,20 @@ def dilated(mask: Mask, radius: float) -> Mask:
     return squared <= radius**2
 
 
-def _patches(mask: Mask, radius: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
+def _patches(mask: Mask, field: NDArray[np.float32], radius: float) -> list[tuple[bool, tuple[slice, ...], Mask]]:
     closed = ~dilated(~dilated(mask, radius), radius)
     opened = dilated(~dilated(~mask, radius), radius)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
         number, gains = _parts_with_gains(mask, change)
         patches += [(fills, box, patch) for box, patch in parts_in_boxes(change & (gains > 0)[number])]
-    return sorted(patches, key=lambda item: item[2].sum())
+
+    def size_and_change(item: tuple[bool, tuple[slice, ...], Mask]) -> tuple[int, float]:
+        _, box, patch = item
+        needed = np.abs(field[box][patch] - LEVEL).sum(dtype=float)
+        return int(patch.sum()), round(float(needed), FIELD_DECIMALS)
+
+    return sorted(patches, key=size_and_change)
 
 
 def _change(mask: Mask, box: tuple[slice, ...], changed: Mask, closed_by: Mask) -> int:
@@ -290,10 +299,15 @@ def _parts_with_gains(mask: Mask, change: Mask) -> tuple[NDArray[np.int32], NDAr
 
 
 def _minimal_change(before: Mask, after: Mask, field: NDArray[np.float32]) -> Mask:
-    """Return `after` with voxels restored to `before` where topology allows, those far from one half first."""
+    """Return `after` with voxels restored to `before` where topology allows, those far from one half first.
+
+    Of equal ones, those far from the middle of the change come first.
+    """
     mask = np.pad(after, 1)
     places = np.argwhere(before != after)
-    places = places[np.argsort(-np.abs(field[tuple(places.T)] - 0.5), kind="stable")] + 1
+    from_half = np.abs(field[tuple(places.T)] - LEVEL).round(FIELD_DECIMALS)
+    from_middle = np.linalg.norm(places - places.mean(axis=0), axis=1).round(FIELD_DECIMALS)
+    places = places[np.lexsort((-from_middle, -from_half))] + 1
     is_progressing = True
     while is_progressing and len(places):
         waiting = []

@@ -47,8 +47,9 @@ MAX_SHIFT_MM = 5.0
 N_UPDATES = 4
 # tissue inside the cortex further from the mid-surface than this is on its own side
 SEED_MM = 6.0
-# what breaks ties of a flood, per mm from the mid-surface
-TILT = 1e-3
+# lead of one side over the other where both reach a voxel about equally early, in voxels; above the noise of the
+# mid-surface, which would else decide a tie, and far below a voxel
+LEAD_VOXELS = 0.15
 # the labels show a fissure only as a gap of at least twice this in the surface between the hemispheres
 MIN_VISIBLE_MM = 3.0
 # a contact of the tissue inside the cortex joins the hemispheres if it has this share of the largest contact's size
@@ -283,12 +284,13 @@ def side_distance(
         seeds[core] = np.where(np.abs(height) > SEED_MM, np.where(height < 0, 1, 2), 0)
     else:
         seeds[left & mask], seeds[right & mask] = 1, 2
-    # where both sides are equally near, they win in turn, and the middle is between
-    tilt = np.zeros(mask.shape, dtype=np.float32)
-    tilt[mask] = TILT * fissure.height_above(transform_points(np.argwhere(mask), affine))
+    # where both sides are about equally near, they win in turn, and the middle is between
+    lead = np.zeros(mask.shape, dtype=np.float32)
+    height = fissure.height_above(transform_points(np.argwhere(mask), affine))
+    lead[mask] = LEAD_VOXELS * size.min() * np.tanh(height / size.min())
     distances = []
     for sign, compare in ((1, np.less), (-1, np.less_equal)):
-        side = watershed(order + sign * tilt, seeds, mask=mask)
+        side = watershed(order + sign * lead, seeds, mask=mask)
         to_left, to_right = (ndimage.distance_transform_edt(side != part, sampling=size) for part in (1, 2))
         distances.append(_signed_distance(compare(to_right, to_left), size))
     return ndimage.gaussian_filter(np.mean(distances, axis=0, dtype=np.float32), SMOOTHING_VOXELS)

@@ -14,6 +14,7 @@ from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
 from .extraction import Floats, Mask
+from .misplaced import hindbrain_note, misplaced_cortex
 
 log = logging.getLogger(__name__)
 
@@ -86,6 +87,10 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
     if missing_tissues := [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number in absent]:
         report["missing_tissues"] = missing_tissues
         log.info("tissues that this brain does not have: %s", ", ".join(missing_tissues[:20]))
+    if note := hindbrain_note(labels, scheme):
+        report["hindbrain"] = note
+        log.info(note)
+    warnings += misplaced_cortex(labels, affine, scheme)
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     unlabelled = unlabelled_ventricles(labels, scheme, affine)
     if scheme.cortex and (share := require_cortex_outside(labels, scheme, min_cortex, unlabelled)) < LITTLE_CORTEX:

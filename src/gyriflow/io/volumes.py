@@ -1,4 +1,4 @@
-"""Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm."""
+"""Volumes of labels and other numbers in NIfTI (and MGH) files, always in RAS+ mm and with axes in that order."""
 
 import gzip
 import logging
@@ -36,6 +36,8 @@ WHICH_MATRIX = (
 )
 # labels stored as floats or with a slope may differ by this from whole numbers
 MAX_LABEL_ERROR = 0.05
+# decimals in mm of the place of a volume
+PLACE_DECIMALS = 3
 GZIP_SUFFIXES = (".gz", ".mgz")
 PACKED_SUFFIXES = (*GZIP_SUFFIXES, ".bz2", ".zst")
 GOOD_RAS_OFFSET = 28
@@ -46,7 +48,10 @@ MAX_COMPRESSION = 1100
 
 @dataclass(frozen=True, eq=False)
 class LabelVolume:
-    """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel indices to RAS+ positions in mm."""
+    """The (i, j, k) tissue label of each voxel, and the (4, 4) affine from voxel indices to RAS+ positions in mm.
+
+    As read, i, j and k increase to the right, to the front and upwards, however the file stores them.
+    """
 
     labels: NDArray[np.int32]
     affine: Floats
@@ -117,8 +122,9 @@ def read_header(path: AnyPath) -> VolumeHeader:
 
 
 def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple[NDArray[np.number], Floats]:
-    """Return the (i, j, k) values of a NIfTI or MGH file as stored, and the (4, 4) matrix to RAS+ positions in mm.
+    """Return the (i, j, k) values of a NIfTI or MGH file, and the (4, 4) matrix to RAS+ positions in mm.
 
+    Values have the type in which they are stored; their axes are brought to the order right, front, up.
     `content` names the values in messages. InputError for invalid files, other numbers of axes, unclear orientation.
     """
     image = _load(path, content)
@@ -137,7 +143,17 @@ def read_values(path: AnyPath, affine_from: AffineSource, content: str) -> tuple
         raise InputError("has no usable affine", path=path, found=f"\n{affine}\n", expected="an invertible matrix")
     if sizes.max() > ANISOTROPY_WARNED * sizes.min():
         log.warning("%s: voxels of %.3g x %.3g x %.3g mm are not resampled", path, *sizes)
-    return values.reshape(shape), affine
+    return _in_canonical_order(values.reshape(shape), affine)
+
+
+def _in_canonical_order(values: NDArray[np.number], affine: Floats) -> tuple[NDArray[np.number], Floats]:
+    """Return a volume with the axes that are closest to RAS+, and its affine: results must not depend on storage."""
+    axes = nib.io_orientation(affine)
+    reordered = nib.apply_orientation(values, axes)
+    canonical = affine @ nib.orientations.inv_ornt_aff(axes, values.shape)
+    # headers hold the place of another corner in each order, in single precision
+    canonical[:3, 3] = canonical[:3, 3].round(PLACE_DECIMALS)
+    return reordered, canonical
 
 
 VOLUME_READERS: dict[str, Callable[[AnyPath], Any]] = {"NIfTI": nib.load, "NIfTI pair": nib.load, "MGH": nib.load}

@@ -1,5 +1,7 @@
 """Isosurfaces of masks: right size, outward, in world coordinates; handles are cut or filled with the least change."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -152,6 +154,21 @@ def test_a_thin_bridge_is_cut_and_a_narrow_tunnel_filled_with_the_least_change(m
     assert (counts["handles_left"], counts["bridges_cut"], counts["tunnels_filled"]) == (0, cut > 0, filled > 0)
     assert (counts["voxels_cut_from_bridges"], counts["voxels_filled_in_tunnels"]) == (cut, filled)
     assert ((repaired > 0.5) != mask).sum() == cut + filled
+
+
+def test_storage_order_does_not_decide_which_of_two_bridges_is_cut():
+    # two plates joined by two equal posts are one handle; the post with values nearer to one half gives way
+    values = np.full((18, 36, 20), 0.3, dtype=np.float32)
+    values[4:14, 4:32, 4:7] = values[4:14, 4:32, 13:16] = 0.7
+    values[7, 8, 7:13], values[10, 26, 7:13] = 0.7, 0.6
+    for axes in permutations(range(3)):
+        for flipped in np.ndindex(2, 2, 2):
+            turned = np.flip(values.transpose(axes), np.flatnonzero(flipped))
+            repaired, counts = without_handles(turned)
+            found = np.flip(repaired, np.flatnonzero(flipped)).transpose(np.argsort(axes))
+            assert (counts["bridges_cut"], counts["handles_left"]) == (1, 0)
+            assert (found[7, 8, 7:13] > 0.5).all()
+            assert (found[10, 26, 7:13] > 0.5).sum() == 5
 
 
 def test_several_handles_are_all_removed():

@@ -1,5 +1,7 @@
 """The mid-plane and the fissure of shifted, turned and asymmetric brains, and left and right of closed surfaces."""
 
+from dataclasses import replace
+
 import numpy as np
 import odd_brains
 import pytest
@@ -157,8 +159,24 @@ def test_only_a_fissure_that_is_hidden_is_opened(gap_voxels, open_voxels):
     assert not (wide[20, 20, 17:24] > 0.5).any()
 
 
+@pytest.mark.parametrize("gap_voxels", [0, 1])
+@pytest.mark.parametrize("shift_mm", [-0.05, 0.05])
+def test_noise_of_the_mid_plane_does_not_give_the_middle_to_one_side(gap_voxels, shift_mm):
+    # the layer of voxels in the middle is equally far from both cores
+    brain, core, affine = block(gap_voxels)
+    normal = np.array([1.0, 0.0, 0.0])
+    walls = isosurface(smooth_mask(core, 1.0), affine)
+    fissure = fissure_between(walls, MidPlane(normal, 18.0 + shift_mm, 0.0, 0))
+    flat = replace(fissure, heights=np.zeros_like(fissure.heights))
+    side_mm = side_distance(brain, core, affine, flat)
+    assert side_mm[20] == pytest.approx(0.0, abs=0.01)
+    assert side_mm[:20] == pytest.approx(-side_mm[:20:-1], abs=0.01)
+
+
 def test_tissue_that_crosses_a_fissure_is_opened():
     brain, core, affine = block(1)
+    # no cortex between the tissue that joins the hemispheres and what lies below
+    core[18:23, 12:28, 4:6] = True
     walls = isosurface(smooth_mask(core, 1.0), affine)
     brain[20, 18:21, 25] = True
     side_mm = side_distance(brain, core, affine, fissure_between(walls, mid_plane(walls)))
