@@ -389,7 +389,7 @@ def _complete(
 
 def _require_brain(path: Path, *, whole: bool = False) -> None:
     # imports that label volumes need not wait for
-    from ..anatomy.plausible import MIN_NARROWNESS, narrowness
+    from ..anatomy.plausible import MIN_NARROWNESS, narrowness, require_one_brain
     from ..geometry.triangles import volume_ml
     from ..io.surfaces import read_surface
 
@@ -397,7 +397,10 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
     if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(mesh))) < WHOLE_BRAIN_ML[1]:
         expected = f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to {WHOLE_BRAIN_ML[1]:g} mL"
         raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
-    if whole and (shape := narrowness(mesh)) < MIN_NARROWNESS:
+    if not whole:
+        return
+    require_one_brain(mesh, "surface", path)
+    if (shape := narrowness(mesh)) < MIN_NARROWNESS:
         problem = "seems to be one hemisphere only, and atlases have whole brains"
         found, expected = f"a shortest extent of {shape:.2f} of the longest", f"{MIN_NARROWNESS} or more"
         raise InputError(problem, path=path, found=found, expected=expected, remedy="Give LEFT and RIGHT.")
