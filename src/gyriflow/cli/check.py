@@ -17,6 +17,7 @@ from typing import NamedTuple
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError
+from ..grouping import grouped
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
@@ -58,8 +59,8 @@ class PlannedJob(NamedTuple):
     outputs: Sequence[str] = ()
 
 
-def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
-    """Yield lines on a study, its files and what would run up to some stages, each with whether it is a problem."""
+def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, int]]:
+    """Yield lines on a study, its files and what would run up to some stages, each with its number of problems."""
     with _read_study(path, directory) as study:
         config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
@@ -71,8 +72,11 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         valid = valid and not further
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
     yield f"{path}: {_contents(study)}", False
-    yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
-    yield from ((f"  {owner}: {text}", bad) for owner, text, bad in further)
+    warnings = [(brain, f"  warning: brain {brain}: {text}") for brain, text, bad in problems if not bad]
+    yield from ((line, False) for line, _ in grouped(warnings))
+    refusals = [(brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad]
+    refusals += [(owner, f"  {owner}: {text}") for owner, text, _ in further]
+    yield from grouped(refusals)
     yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     if without_unit:

@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
+from ..grouping import grouped
 from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
@@ -174,8 +175,8 @@ def _show_scans(
     """Print the table of scans and the unused files; return the exit code, 0 if values `may_fill_in` only."""
     from .scans import found_rows, scan_lines
 
-    for file, reason in found.unused.items():
-        click.echo(f"not used: {file} ({reason})")
+    for line, _ in grouped((file, f"not used: {file} ({reason})") for file, reason in found.unused.items()):
+        click.echo(line)
     for line in scan_lines(found_rows(found, verdicts or {})):
         click.echo(line)
     causes = (brain.problem or brain.contradiction or (brain.notes and not may_fill_in) for brain in found.brains)

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..errors import InputError, StorageError
 from ..formats import START_BYTES, foreign_format
-from ..settings.base import absent_content
+from ..settings.base import absent_content, hint_for_missing
 
 if TYPE_CHECKING:
     import h5py
@@ -78,9 +78,10 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
             require_content(companion)
         if isinstance(error, InputError):
             raise
-        reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair, the missing file
         path = getattr(error, "filename", None) or path
+        is_missing = isinstance(error, FileNotFoundError | IsADirectoryError)
+        reason = f"no such file{hint_for_missing(Path(path))}" if is_missing else error
         if foreign := foreign_format(path, _start_of(path)):
             reason, remedy = f"it is {foreign.name}", foreign.remedy
         raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError
 from ..formats import is_volume
 from ..io.files import read_json, read_text_table
-from ..settings.base import absent_content, located, own_name, path_in
+from ..settings.base import absent_content, hint_for_missing, located, own_name, path_in
 from ..settings.brains import SOURCES, ParticipantsSettings
 from ..settings.weeks import EXPECTED_AGE, WeekNotation
 from .ages import (
@@ -383,7 +383,7 @@ def _entry(
             parts = value.split(";") if column == "white" else [value]
             places = [own_name(path_in(folder, part.strip())) for part in parts]
             if lost := [place for place in places if not place.is_file()]:
-                return {}, f"{column}: {lost[0]}: {absent_content(lost[0]) or 'no such file'}"
+                return {}, f"{column}: {lost[0]}: {absent_content(lost[0]) or f'no such file{hint_for_missing(lost[0])}'}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))
         *outer, last = column.split(".")
         section = entry
