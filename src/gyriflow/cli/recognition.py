@@ -12,7 +12,7 @@ import numpy as np
 
 from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
+from ..formats import CIFTI_NAME, SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
@@ -189,7 +189,9 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
 
 def _rejection(file: Path) -> str:
     name = file.name.lower()
-    if name.endswith(VOLUME_SUFFIXES):
+    if CIFTI_NAME.search(name):
+        return "a CIFTI file, with values at grayordinates and no volume of labels"
+    if is_volume(file):
         return "its name has no label, seg, parcellation or tissue"
     return "its name is not that of a pial surface" if name.endswith(SURFACE_SUFFIXES) else "not a volume or surface"
 
@@ -211,8 +213,7 @@ def _brains_of_scan(
         else:
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
-    above = (re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix()) for brain in group)
-    data_sets = sorted({str(data_set_of(Path(match[1] or "" if match else ""))) for match in above})
+    data_sets = _data_sets(group)
     for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
@@ -223,6 +224,21 @@ def _brains_of_scan(
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
     return brains
+
+
+def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
+    """Return the folders of data sets that have the same kind of data of a scan, if there are several.
+
+    Labels and surfaces of one scan may be in folders of their own.
+    """
+    folders: dict[str, set[str]] = defaultdict(set)
+    for brain in group:
+        above = re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix())
+        folder = data_set_of(Path(above[1] or "" if above else ""))
+        parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
+        kind = "labels" if "labels" in brain.entry else "surfaces"
+        folders[kind].add(str(Path(*parts)))
+    return sorted(max(folders.values(), key=len))
 
 
 def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
@@ -318,7 +334,7 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[FoundBrain]:
 
 
 def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[FoundBrain]:
-    volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
+    volumes = [file for file in files if is_volume(file)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:

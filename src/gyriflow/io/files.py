@@ -104,11 +104,21 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        remedy = "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
-        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=remedy) from error
+        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=_remedy(path)) from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _remedy(path: Path) -> str:
+    """Return what to do about a file that cannot be written."""
+    for folder in path.parents:
+        if folder.is_symlink() and not folder.exists():
+            target = folder.readlink()
+            return f"{folder} is a link to {target}, which does not exist: make that folder or remove the link."
+        if folder.is_file():
+            return f"{folder} is a file in place of a folder: rename it."
+    return "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
 
 
 def _plain(value: Any) -> Any:

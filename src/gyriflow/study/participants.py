@@ -383,7 +383,8 @@ def _entry(
             parts = value.split(";") if column == "white" else [value]
             places = [own_name(path_in(folder, part.strip())) for part in parts]
             if lost := [place for place in places if not place.is_file()]:
-                return {}, f"{column}: {lost[0]}: {absent_content(lost[0]) or f'no such file{hint_for_missing(lost[0])}'}"
+                missing = absent_content(lost[0]) or f"no such file{hint_for_missing(lost[0])}"
+                return {}, f"{column}: {lost[0]}: {missing}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))
         *outer, last = column.split(".")
         section = entry
