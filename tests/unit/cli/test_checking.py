@@ -40,6 +40,7 @@ from gyriflow.running.cost import (
 )
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
+from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
@@ -135,9 +136,8 @@ def test_a_warning_of_a_reader_is_that_of_its_brain_and_comes_once(tmp_path, mon
         array.coordsys.xform = np.diag([1.2, 1.2, 1.2, 1.0])
     nib.save(image, tmp_path / "left.surf.gii")
     lines, _ = checked(tmp_path, monkeypatch)
-    assert (
-        len([line for line in lines if Facts("warning: brain sub-1:", "1.2", tmp_path / "left.surf.gii") == line]) == 1
-    )
+    warning = Facts("warning: brain sub-1:", "1.2", tmp_path / "left.surf.gii")
+    assert lines.count(warning) == 1
     assert lines[-2].split()[-1] == "warning"
     assert not caplog.records
 
@@ -477,6 +477,13 @@ def test_why_a_step_runs_is_said_in_words(tmp_path, monkeypatch, reason, words):
     write_json(tmp_path / "results" / "report" / "provenance.json", {"gyriflow": "0.1"})
     monkeypatch.setattr(checking, "plan", lambda *_, **__: [checking.PlannedJob("rule", {}, 1, reason)])
     assert [line for line, _ in work_of(tmp_path, tmp_path, 1, [], resolve(load(STUDY)))][1] == f"  {words}: rule"
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_number_of_elements_as_shown_is_not_fewer_than_itself(order):
+    for elements in np.linspace(0.8, 1.2, 401) * ELEMENTS_NEEDED[order]:
+        shown = float(element_error(order, elements)[1].split()[0])
+        assert is_too_coarse(order, elements) == (shown < ELEMENTS_NEEDED[order])
 
 
 def test_the_memory_of_a_surface_follows_the_header(tmp_path):

@@ -198,17 +198,20 @@ def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monke
     rows = ["participant_id gestational_age", "sub-01 24.1", *(f"sub-{number:02} n/a" for number in range(2, 8))]
     names = [f"sub-{number:02}_dseg.nii.gz" for number in range(1, 8)]
     make_tree(tmp_path, labels=names, tables={"participants.tsv": rows})
-    seen = []
-    monkeypatch.setattr(
-        checking, "plan", lambda config, *_, **__: seen.append(yaml.safe_load(config.read_text())) or []
-    )
+    planned = []
+
+    def plan(config, *_, **__):
+        planned.append(yaml.safe_load(config.read_text()))
+        return []
+
+    monkeypatch.setattr(checking, "plan", plan)
     # set in this process, and removed after the test
     monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
     before = set(tmp_path.rglob("*"))
     options = ("--scheme", "spina-bifida-atlas", "-d", str(tmp_path / "new"))
     done = CliRunner().invoke(main, ["check", str(tmp_path), *options])
     assert (done.exit_code, set(tmp_path.rglob("*"))) == (2, before)
-    assert [brain["id"] for brain in seen[0]["brains"]] == ["sub-01"]
+    assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-01"]
     assert done.output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
     # six scans with one fault: three lines and a number
     assert done.output.count("n/a") == 3

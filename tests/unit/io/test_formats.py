@@ -6,8 +6,8 @@ import nibabel as nib
 import numpy as np
 import pytest
 import pyvista as pv
-from nibabel.freesurfer.io import write_geometry
 from facts import Facts
+from nibabel.freesurfer.io import write_geometry
 from pydantic import ValidationError
 from shapes import sphere
 
