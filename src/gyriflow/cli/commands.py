@@ -44,10 +44,12 @@ class InputPath(click.Path):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
+            if Path(value).exists():
+                raise
             from ..settings.base import hint_for_missing  # settings take a while to import
 
-            error.message += hint_for_missing(Path(value))
-            raise
+            message = f"{error.message}{hint_for_missing(Path(value))}"
+            raise click.BadParameter(message, ctx=ctx, param=param) from None
 
 
 FOLDER = click.Path(file_okay=False, path_type=Path)

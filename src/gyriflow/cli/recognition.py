@@ -191,7 +191,7 @@ def _rejection(file: Path) -> str:
     name = file.name.lower()
     if CIFTI_NAME.search(name):
         return "a CIFTI file, with values at grayordinates and no volume of labels"
-    if is_volume(file):
+    if name.endswith(VOLUME_SUFFIXES):
         return "its name has no label, seg, parcellation or tissue"
     return "its name is not that of a pial surface" if name.endswith(SURFACE_SUFFIXES) else "not a volume or surface"
 
@@ -238,7 +238,7 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
         parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
         kind = "labels" if "labels" in brain.entry else "surfaces"
         folders[kind].add(str(Path(*parts)))
-    return sorted(max(folders.values(), key=len))
+    return sorted(max(folders.values(), key=lambda names: len(names)))
 
 
 def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
@@ -334,7 +334,8 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[FoundBrain]:
 
 
 def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[FoundBrain]:
-    volumes = [file for file in files if is_volume(file)]
+    # of a pair, the header
+    volumes = [file for file in files if is_volume(file) and file.name.lower().endswith(VOLUME_SUFFIXES)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:

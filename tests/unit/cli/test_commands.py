@@ -234,6 +234,9 @@ def test_a_current_folder_that_was_deleted_is_named(tmp_path, monkeypatch):
 def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
     done = predicted_from("brain.nii", "--week", "23.4")
     assert (done.exit_code, done.output) == (2, Facts("brain.nii", "there is brain.stl"))
+    # of another kind than expected, and there
+    done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
+    assert (done.exit_code, "there is" in done.output) == (2, False)
 
 
 @pytest.fixture(scope="module")
