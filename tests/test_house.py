@@ -18,15 +18,16 @@ from gyriflow.version import RELEASE
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "gyriflow"
 
-GROUND = {"errors", "units", "quantities", "formats", "names", "splines"}
+GROUND = {"errors", "units", "quantities", "formats", "names", "splines", "grouping"}
 PLAIN = GROUND | {"geometry", "settings"}
-"""What every room may import: errors, units, quantities, formats of files, plain geometry and typed settings."""
+"""What every room may import: errors and messages, units, quantities, formats of files, plain geometry and settings."""
 ARROWS = {
     "errors": set(),
     "units": set(),
     "quantities": set(),
     "formats": set(),
     "names": {"errors"},
+    "grouping": set(),
     "splines": set(),
     "code_hash": set(),
     "shipped": set(),

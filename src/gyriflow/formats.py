@@ -45,9 +45,15 @@ VOLUME_SUFFIXES = tuple(suffix for form in FORMATS if form.content == "volume" f
 ALL_SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.all_suffixes)
 
 
+CIFTI_NAME = re.compile(r"\.(?:d|p|dp|pd)(?:label|scalar|tseries|conn|connseries|connscalar|fan)\.nii$", re.IGNORECASE)
+"""End of the names of CIFTI files, whose values are at vertices and voxels of the grey matter: no NIfTI volumes."""
+
+
 def format_of(path: str | PathLike[str], content: Content) -> FileFormat | None:
     """Return the format of surfaces or of volumes that a file has by its name, or None."""
     name = str(path).lower()
+    if CIFTI_NAME.search(name):
+        return None
     return next((form for form in FORMATS if form.content == content and name.endswith(form.all_suffixes)), None)
 
 

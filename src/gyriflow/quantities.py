@@ -124,7 +124,10 @@ _BRAIN_MAPS = (
     ),
     VertexMap(
         "thickness_mm", "mm", "cortical thickness", "thickness",
-        "Cortical thickness", colours=POSITIVE_COLOURS,
+        "Cortical thickness; NaN where it was not measured: without cortex below, such as at the cut between the "
+        "hemispheres, and where the fissure or fused sulci were opened. The share of the area that has a value is "
+        "thickness_measured_share in metrics_wide.tsv",
+        colours=POSITIVE_COLOURS,
     ),
     VertexMap(
         "spangy_dominant_band", "1", "dominant SpAnGy band", "spangyDominantBand",

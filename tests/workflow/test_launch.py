@@ -13,7 +13,8 @@ from processes import ran
 from gyriflow.folding.__main__ import locked
 from gyriflow.folding.compilation import form_compiler
 from gyriflow.io import locks
-from gyriflow.running.launch import clear_stale_lock
+from gyriflow.running.launch import clear_stale_lock, what_runs
+from gyriflow.shipped import SHIPPED
 
 from .conftest import SMALL_STUDY
 
@@ -99,6 +100,37 @@ def test_a_working_directory_that_cannot_be_written_ends_in_5(workflow):
     outcome = workflow.run("--cores", "1", "surface", "--directory", "file/below")
     assert outcome.returncode == 5
     assert message(outcome) == Facts("file/below:", "Not a directory")
+
+
+@pytest.mark.parametrize("place", ["Snakefile", "workflow/Snakefile"])
+def test_the_first_line_says_what_runs_where_a_folder_has_its_own_workflow(tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    demo = SHIPPED / "config" / "config.yaml"
+    assert what_runs(tmp_path) == Facts("--configfile", "demo", demo)
+    (tmp_path / place).parent.mkdir(exist_ok=True)
+    (tmp_path / place).touch()
+    assert what_runs(tmp_path) == Facts("demo", demo, tmp_path / place)
+    own = tmp_path / "config" / "config.yaml"
+    own.parent.mkdir()
+    own.touch()
+    assert what_runs(tmp_path) == Facts(own, tmp_path / place) != Facts("demo")
+
+
+def test_what_runs_is_said_first_without_a_configuration(workflow):
+    (workflow.directory / "Snakefile").touch()
+    outcome = workflow.run("-n", "surface")
+    assert outcome.returncode == 0, outcome.stderr
+    assert outcome.stderr.splitlines()[0] == Facts("gyriflow:", "demo", workflow.directory / "Snakefile")
+    outcome = workflow.run("-n", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY))
+    assert "demo" not in outcome.stderr
+
+
+def test_results_that_are_a_link_to_nowhere_are_named(workflow):
+    (workflow.directory / "results").symlink_to("disk/results")
+    outcome = workflow.run("--cores", "1", "surface", "--configfile", workflow.write("study.yaml", SMALL_STUDY))
+    assert outcome.returncode == 5
+    assert message(outcome).splitlines()[-1] == Facts("results is a link to disk/results")
+    assert "disk space" not in outcome.stderr
 
 
 def gyriflow(workflow, *arguments):

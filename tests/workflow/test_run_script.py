@@ -215,6 +215,22 @@ def test_signals_reach_the_command(outside):
     assert process.wait(20) == 9
 
 
+def test_no_process_stays_between_run_and_the_command(outside):
+    process = start("bash", "-c", "echo $$ $PPID; read", env=outside)
+    own, parent = map(int, process.stdout.readline().split())
+    # the command has taken the place of the script, so signals to it are its own
+    assert (own, parent) == (process.pid, os.getpid())
+    process.terminate()
+    assert process.wait(20) == -signal.SIGTERM
+
+
+def test_a_current_folder_that_was_deleted_is_named(outside, tmp_path):
+    (tmp_path / "gone").mkdir()
+    done = ran("bash", "-c", f"cd '{tmp_path}/gone' && rmdir ../gone && '{RUN}' true", env=outside)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == Facts("gyriflow:", "the current folder no longer exists")
+
+
 def test_failing_set_up_shows_why_and_is_tried_again(outside, tmp_path):
     fails = tmp_path / "record.fails"
     fails.touch()

@@ -2,6 +2,7 @@
 import os
 
 from gyriflow.errors import GyriflowError
+from gyriflow.grouping import grouped
 from gyriflow.settings.base import folder_of
 from gyriflow.settings.terms import SIDES
 from gyriflow.study import resolve
@@ -71,10 +72,11 @@ if REFUSED and not study.brains:
     sys.exit(0)
 FIGURES = figures_of(study)
 if workflow.is_main_process:
-    for cause in study.unreachable.values():
-        print(f"gyriflow: not folded: {cause}", file=sys.stderr)
-    for row in CONFIG.left_out.values():
-        print(f"gyriflow: left out: {row['cause']}", file=sys.stderr)
+    messages = [(brain, f"not folded: {cause}") for brain, cause in study.unreachable.items()]
+    if not REFUSED:
+        messages += [(scan, f"left out: {row['cause']}") for scan, row in CONFIG.left_out.items()]
+    for line, _ in grouped(messages):
+        print(f"gyriflow: {line}", file=sys.stderr)
 
 # held as long as this process lives, so that `gyriflow.running.launch` can distinguish a live from an interrupted run
 if RUNS:

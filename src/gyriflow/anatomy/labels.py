@@ -28,6 +28,10 @@ MIN_SEPARATED = 0.9
 LITTLE_CORTEX = 0.7
 # a larger relative loss of volume gives a warning
 REPORTED_LOSS = 0.005
+# area of the slice at a border of the volume over that of the next one. None of 47 volumes of the atlases of Fidon et
+# al. 2021, CRL and Wu et al. 2021, cropped to the cerebrum, is taken as cut; of 1179 ends that lack up to 8 slices and
+# more than 0.5 % of the brain, 3 are missed
+CUT_SLICE_RATIO = 2 / 3
 # directions of rays from a voxel of fluid: to the faces, edges and corners of its cell
 DIRECTIONS = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)]) - 1
 # fluid belongs to the cerebrum if more than this share of its rays hits the cerebrum's tissue
@@ -274,10 +278,20 @@ def _ray_share(clear: Mask, tissue: Mask, smoothing_voxels: float) -> NDArray[np
 
 
 def border_share(mask: Mask) -> float:
-    """Return the share of a mask's surface that lies at the border of its volume, where it is cut off."""
+    """Return the share of an (i, j, k) mask's surface at those borders of its volume that cut it off.
+
+    The slices of a rounded end grow from the first one on: the second has at least twice the area of the first. So a
+    volume that ends exactly at the mask does not cut it off (`CUT_SLICE_RATIO`).
+    """
     surface = mask & ~ndimage.binary_erosion(mask, border_value=1)
-    at_border = int(sum(np.moveaxis(mask, axis, 0)[end].sum() for axis in range(3) for end in (0, -1)))
-    return at_border / max(at_border + int(surface.sum()), 1)
+    at_border = cut_off = 0
+    for axis in range(3):
+        areas = mask.sum(axis=tuple({0, 1, 2} - {axis}))
+        for end in (areas[:2], areas[:-3:-1]):
+            at_border += int(end[0])
+            if end[0] > CUT_SLICE_RATIO * end[-1]:
+                cut_off += int(end[0])
+    return cut_off / max(at_border + int(surface.sum()), 1)
 
 
 def _listed(numbers: Iterable[int], scheme: LabelScheme | None = None) -> str:

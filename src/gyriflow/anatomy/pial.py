@@ -149,8 +149,9 @@ def _read_volume(
         raise InputError(f"the volume contains labels of another hemisphere than the {side} one")
     brain.warn(plausible.require_plausible_size((2.0 if side else 1.0) * cerebrum.volume_mm3, brain.week))
     if (share := cerebrum.report["border_share"]) > REPORTED_LOSS:
-        cut = f"the cerebrum touches the border of the volume with {100 * share:.0f} % of its surface"
-        brain.warn([f"{cut}: parts outside are missing, and the surface is flat there"])
+        cut = f"the border of the volume cuts the cerebrum at {100 * share:.0f} % of its surface"
+        wall = "unless it is the medial wall, " if side else ""
+        brain.warn([f"{cut}: {wall}parts outside are missing, and the surface is flat there"])
     if not side:
         brain.warn(scheme_contradictions(layout_of(labels), scheme))
         if len(sides) == 1:

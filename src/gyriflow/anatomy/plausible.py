@@ -3,12 +3,13 @@
 import logging
 from collections.abc import Iterable
 from itertools import pairwise
+from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..geometry.triangles import Floats, TriangleMesh, signed_volume
+from ..geometry.triangles import Floats, TriangleMesh, face_components, signed_volume, submesh
 from ..units import ML_PER_MM3
 
 log = logging.getLogger(__name__)
@@ -30,6 +31,8 @@ MAX_CUT_FACTOR = 2.0
 # range of a median cortical thickness, also of bodies other than brains
 THICKNESSES_MM = (0.1, 20.0)
 UNITS_MM = {"metres": 1e3, "micrometres": 1e-3, "centimetres": 10.0, "decimetres": 100.0}
+# a header of a volume with the other unit, and numbers in mm, gives the same wrong size
+WRONG_HEADERS = {"metres": "micrometres", "micrometres": "metres"}
 # left and right cerebral hemispheres of one fetus differ by a few percent; successive weeks by 15 %
 DOUBTFUL_RATIO = 1.15
 # shift of one hemisphere along the mid-plane, in cube roots of its volume
@@ -71,13 +74,16 @@ def require_plausible_size(volume_mm3: float, week: float) -> list[str]:
         text = f"a cerebrum of {volume:.0f} mL has {100 * share:.0f} % of the volume expected at week {week:g}"
         return [f"{text}: is the week correct, and is the file in mm, not in voxel indices?"]
     guess = next((u for u, mm in UNITS_MM.items() if MIN_RATIO <= volume * mm**3 / expected <= MAX_RATIO), None)
+    if guess:
+        wrong_header = f", or its header says {WRONG_HEADERS[guess]} and means mm" if guess in WRONG_HEADERS else ""
+        remedy = f"The file seems to be in {guess}{wrong_header}: give it in mm, with mm in the header."
+    else:
+        remedy = "Check the file's unit, its week, and which labels belong to the cerebrum."
     raise InputError(
         f"the cerebrum's size is impossible at week {week:g}",
         found=f"{volume:.3g} mL",
         expected=f"{MIN_RATIO * expected:.0f} to {MAX_RATIO * expected:.0f} mL",
-        remedy=f"The file seems to be in {guess}: give it in mm, with mm in the header."
-        if guess
-        else "Check the file's unit, its week, and which labels belong to the cerebrum.",
+        remedy=remedy,
     )
 
 
@@ -138,8 +144,30 @@ def require_single_hemisphere(mesh: TriangleMesh) -> None:
         )
 
 
+def require_one_brain(mesh: TriangleMesh, what: str, path: str | PathLike[str] | None = None) -> None:
+    """Raise InputError if a whole brain's surface, of a "surface" or "volume", consists of several whole brains."""
+    pieces = face_components(mesh)
+    brains = 0
+    for piece in np.unique(pieces):
+        part, _ = submesh(mesh, pieces == piece)
+        # single hemispheres are narrower
+        brains += narrowness(part) > MIN_USUAL_NARROWNESS
+    if brains > 1 and narrowness(mesh) < MIN_USUAL_NARROWNESS:
+        raise InputError(
+            f"the {what} contains {brains} separate brains, such as twins",
+            path=path,
+            found=f"{brains} parts, each as wide as a whole cerebrum",
+            expected="one brain",
+            remedy="Save each brain in a file of its own.",
+        )
+
+
 def require_whole(mesh: TriangleMesh, what: str, *, refuses: bool = True) -> list[str]:
-    """Return a warning if a whole brain's surface, a "surface" or "volume", is narrow; InputError for one side."""
+    """Return a warning if a whole brain's surface, a "surface" or "volume", is narrow.
+
+    InputError for one hemisphere, and for several brains.
+    """
+    require_one_brain(mesh, what)
     shape = narrowness(mesh)
     if refuses and shape < MIN_NARROWNESS:
         raise InputError(

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from ..anatomy.labels import MIN_CORTEX_OUTSIDE, layout_of, read_cerebrum, scheme_contradictions
 from ..anatomy.plausible import require_plausible_size
 from ..errors import GyriflowError, InputError
+from ..grouping import grouped
 from ..io.downloads import require_checksums
 from ..io.volumes import read_header, read_label_volume
 from ..io.yaml_files import read_keys
@@ -59,9 +60,14 @@ class PlannedJob(NamedTuple):
     outputs: Sequence[str] = ()
 
 
-def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] = ()) -> Iterator[tuple[str, bool]]:
-    """Yield lines on a study, its files and what would run up to some stages, each with whether it is a problem."""
-    with _read_study(path, directory) as study:
+def check_study(
+    path: Path, directory: Path, cores: int, stages: Sequence[str] = (), *, name: Path | None = None
+) -> Iterator[tuple[str, int]]:
+    """Yield lines on a study, its files and what would run up to some stages, each with its number of problems.
+
+    `name` stands for a temporary configuration.
+    """
+    with _read_study(path, directory) as study, _collected_warnings() as logged:
         config, problems = study.config, list(input_problems(study.config))
         valid = not any(bad for *_, bad in problems)
         volumes = [volume for brain in config.brains if (volume := brain.label_volume) and Path(volume).is_file()]
@@ -71,9 +77,14 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         further, facts = list(check_other_files(study)), list(input_facts(study))
         valid = valid and not further
         downloads = sum(len(atlas.missing) for atlas in used_atlases(config))
-    yield f"{path}: {_contents(study)}", False
-    yield from ((f"  {'' if bad else 'warning: '}brain {brain}: {text}", bad) for brain, text, bad in problems)
-    yield from ((f"  {owner}: {text}", bad) for owner, text, bad in further)
+    yield f"{name or path}: {_contents(study)}", False
+    warnings = [(brain, f"  warning: brain {brain}: {text}") for brain, text, bad in problems if not bad]
+    told = {text for _, text, _ in problems}
+    warnings += [("", f"  warning: {text}") for text in logged if text not in told]
+    yield from ((line, False) for line, _ in grouped(warnings))
+    refusals = [(brain, f"  brain {brain}: {text}") for brain, text, bad in problems if bad]
+    refusals += [(owner, f"  {owner}: {text}") for owner, text, _ in further]
+    yield from grouped(refusals)
     yield from ((f"  {line}", False) for line in facts)
     yield from ((f"  warning: {line}", False) for line in coarse_cortices(study))
     yield from ((f"  warning: no export: {line}", False) for line in export_problems(study))
@@ -86,6 +97,31 @@ def check_study(path: Path, directory: Path, cores: int, stages: Sequence[str] =
         yield from work_of(path, directory, cores, ["--cores", str(cores), *stages], study)
     yield from ((f"not used: {line}", False) for line in commented_scans(path))
     yield from ((line, False) for line in scan_lines(_scans(config, problems)))
+
+
+class _Collector(logging.Handler):
+    """A handler that keeps the texts of warnings."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(record.getMessage())
+
+
+@contextmanager
+def _collected_warnings() -> Iterator[list[str]]:
+    """Collect the warnings that readers log, which would be printed each time that a file is read."""
+    logger, collector = logging.getLogger("gyriflow"), _Collector()
+    propagate = logger.propagate
+    logger.addHandler(collector)
+    logger.propagate = False
+    try:
+        yield collector.texts
+    finally:
+        logger.removeHandler(collector)
+        logger.propagate = propagate
 
 
 @contextmanager
@@ -210,11 +246,15 @@ def input_problems(config: Config) -> Iterator[tuple[str, str, bool]]:
     """
     checksums = known_checksums(used_atlases(config))
     for brain in config.brains:
-        try:
-            for doubt in _check_files(brain, config, checksums):
-                yield brain.id, doubt, False
-        except GyriflowError as error:
-            yield brain.id, str(error), True
+        doubts: list[str] = []
+        refusals = []
+        with _collected_warnings() as logged:
+            try:
+                doubts.extend(_check_files(brain, config, checksums))
+            except GyriflowError as error:
+                refusals.append(str(error))
+        yield from ((brain.id, text, False) for text in dict.fromkeys([*logged, *doubts]))
+        yield from ((brain.id, text, True) for text in refusals)
 
 
 def _scans(config: Config, problems: Sequence[tuple[str, str, bool]]) -> Iterator[ScanRow]:
@@ -296,12 +336,12 @@ def _path_lines(jobs: Sequence[PlannedJob], seconds: Sequence[float], study: Stu
             yield f"path of {name}: kept from an earlier study"
         elif job.rule == "atlas_path":
             line = f"path of {name}: has to be made, about {format_duration(path_s)}"
-            yield f"{line}; {_reuse(used.folder, directory)}" if used else line
+            yield f"{line}; {_reuse(used.settings.folder, directory)}" if used else line
 
 
-def _reuse(folder: Path, directory: Path) -> str:
-    """Return which studies find a path again that is kept in the folder of an atlas' files."""
-    if folder.is_relative_to(directory.resolve()):
+def _reuse(folder: str | None, directory: Path) -> str:
+    """Return which studies find a path again that is kept in the folder of an atlas' files, None for the default."""
+    if folder is None or Path(folder).is_relative_to(directory.resolve()):
         return (
             "kept for this study only; with a folder of the atlas outside it (--folder, atlas.folder), for others too"
         )

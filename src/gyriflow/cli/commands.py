@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import GyriflowError, InputError
+from ..grouping import grouped
 from ..running.machine import available_cores
 from ..shipped import CONFIG, DEMO, SHIPPED, shipped_atlases
 
@@ -35,9 +36,25 @@ class Cores(click.IntRange):
         return available_cores() if value == "all" else super().convert(value, param, ctx)
 
 
+class InputPath(click.Path):
+    """A path, with a hint if there is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            if Path(value).exists():
+                raise
+            from ..settings.base import hint_for_missing  # settings take a while to import
+
+            message = f"{error.message}{hint_for_missing(Path(value))}"
+            raise click.BadParameter(message, ctx=ctx, param=param) from None
+
+
 FOLDER = click.Path(file_okay=False, path_type=Path)
-EXISTING_DIR = click.Path(exists=True, file_okay=False, path_type=Path)
-EXISTING_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+EXISTING_DIR = InputPath(exists=True, file_okay=False, path_type=Path)
+EXISTING_FILE = InputPath(exists=True, dir_okay=False, path_type=Path)
 directory_option = click.option(
     "-d", "--directory", type=FOLDER, default=Path(), help="Working directory, for results/. [default: here]"
 )
@@ -67,6 +84,7 @@ class Commands(click.Group):
     def invoke(self, context: click.Context) -> Any:
         """Run the command that is asked for."""
         try:
+            require_current_folder()
             return super().invoke(context)
         except GyriflowError as error:
             click.echo(f"gyriflow: {error}", err=True)
@@ -75,6 +93,14 @@ class Commands(click.Group):
             command = error.ctx.command_path if error.ctx else command_name()
             click.echo(f"gyriflow: {' '.join(error.format_message().split())} See `{command} --help`.", err=True)
             sys.exit(error.exit_code)
+
+
+def require_current_folder() -> None:
+    """Raise InputError if the current folder was deleted, since all paths are relative to it."""
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        raise InputError("the current folder no longer exists", remedy="cd to one that does.") from None
 
 
 def _one_by_one(args: Sequence[str]) -> list[str]:
@@ -174,33 +200,70 @@ def _show_scans(
     """Print the table of scans and the unused files; return the exit code, 0 if values `may_fill_in` only."""
     from .scans import found_rows, scan_lines
 
-    for file, reason in found.unused.items():
-        click.echo(f"not used: {file} ({reason})")
+    _show_unused(found)
     for line in scan_lines(found_rows(found, verdicts or {})):
         click.echo(line)
     causes = (brain.problem or brain.contradiction or (brain.notes and not may_fill_in) for brain in found.brains)
     return InputError.exit_code if any(causes) else 0
 
 
+def _show_unused(found: "FoundScans") -> None:
+    for line, _ in grouped((file, f"not used: {file} ({reason})") for file, reason in found.unused.items()):
+        click.echo(line)
+
+
 @main.command()
-@click.argument("config", type=click.Path(path_type=Path), required=False)
+@click.argument("data", type=click.Path(path_type=Path), required=False, metavar="[FOLDER|CONFIG]")
+@scheme_option
+@files_option
+@notation_option
 @directory_option
 @cores_option
 @stages_option
-def check(config: Path | None, directory: Path, cores: int, stages: Sequence[str]) -> None:
+def check(data: Path | None, directory: Path, cores: int, stages: Sequence[str], **selection: Any) -> None:
     """Check a study; show what it would run and need.
 
-    Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default.
+    Its configuration and files are checked. Nothing is run or written. CONFIG is gyriflow.yaml by default. A FOLDER
+    without gyriflow.yaml is checked as `gyriflow measure` would measure it.
     """
     from .check import check_study
 
+    is_folder = data is not None and data.is_dir() and not (data / CONFIG).exists()
     problems = 0
-    for line, bad in check_study(_find_config(config, directory), directory, cores, stages):
-        click.echo(line)
-        problems += bad
+    with TemporaryDirectory() as scratch:
+        if data is not None and is_folder:
+            config = Path(scratch) / CONFIG
+            found = _write_measured(data, config, **selection)
+            problems += sum(bool(brain.causes) for brain in found.brains)
+            _show_unused(found)
+        else:
+            _require_no_selection(data, **selection)
+            config = _find_config(data / CONFIG if data is not None and data.is_dir() else data, directory)
+        for line, bad in check_study(config, directory, cores, stages, name=data if is_folder else None):
+            click.echo(line)
+            problems += bad
     if problems:
         click.echo(f"gyriflow: {problems} problem{'s' if problems > 1 else ''} found", err=True)
         sys.exit(2)
+
+
+def _write_measured(data: Path, config: Path, **selection: Any) -> "FoundScans":
+    """Write a configuration to measure the brains of a folder, and have this process fold nothing."""
+    from ..running.launch import MEASURE_ONLY_VAR
+    from .init import write_configuration
+
+    os.environ[MEASURE_ONLY_VAR] = "1"
+    found = _recognise(data, **selection)
+    write_configuration(found, data, config, only_measured=True)
+    return found
+
+
+def _require_no_selection(data: Path | None, **selection: Any) -> None:
+    """Raise InputError if options are set that select the files of a folder, where a configuration has them."""
+    names = {"scheme": "--scheme", "files": "--files", "decimal_weeks": "--decimal-weeks, --weeks-days"}
+    if given := [names[key] for key, value in selection.items() if value is not None]:
+        remedy = f"Set these in the configuration, or write it anew: {command_name()} init FOLDER --force."
+        raise InputError(f"{', '.join(given)}: not used, as there is a configuration", path=data, remedy=remedy)
 
 
 @main.command(context_settings={"ignore_unknown_options": True})
@@ -244,7 +307,7 @@ def _run(config: Path, directory: Path, cores: int, dry_run: bool, options: list
 
 
 @main.command()
-@click.argument("data", type=click.Path(exists=True, path_type=Path), metavar="FOLDER|CONFIG")
+@click.argument("data", type=InputPath(exists=True, path_type=Path), metavar="FOLDER|CONFIG")
 @scheme_option
 @files_option
 @notation_option
@@ -259,7 +322,7 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
     that of the first failure.
     """
     from ..running.launch import MEASURE_ONLY_VAR
-    from .init import commented_scans, write_configuration
+    from .init import commented_scans
 
     config = data / CONFIG if data.is_dir() else data
     os.environ[MEASURE_ONLY_VAR] = "1"
@@ -267,11 +330,10 @@ def measure(data: Path, directory: Path, cores: int, dry_run: bool, **selection:
     with TemporaryDirectory() as scratch:
         if not config.exists():
             config = Path(scratch) / CONFIG if dry_run else config
-            found = _recognise(data, **selection)
-            write_configuration(found, data, config, only_measured=True)
-            refused = _show_scans(found)
-        elif data.is_dir():
-            for line in commented_scans(config):
+            refused = _show_scans(_write_measured(data, config, **selection))
+        else:
+            _require_no_selection(data, **selection)
+            for line in commented_scans(config) if data.is_dir() else ():
                 click.echo(f"not used, by {config}: {line}")
                 refused = InputError.exit_code
         code = _run(config, directory, cores, dry_run, ["--cores", str(cores), "--keep-going"], "all")

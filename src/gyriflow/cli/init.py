@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from ..errors import InputError
+from ..grouping import grouped
 from ..io.files import read_json, read_text, write_json, write_text
 from ..io.yaml_files import read_keys
 from ..names import require_bids_names
@@ -82,13 +83,14 @@ def _keep_other(path: Path, text: str) -> Path | None:
 
 
 def commented_scans(path: Path) -> list[str]:
-    """Return the scans that are comments in a configuration as of `write_configuration`: id and cause."""
-    lines = re.findall(r"^  # - \{id: ([^,]+),.*?\}  # (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
-    return [f"{scan}: {cause}" for scan, cause in lines]
+    """Return lines on the scans that are comments in a configuration as of `write_configuration`: id and cause."""
+    scans = re.findall(r"^  # - \{id: ([^,]+),.*?\}  # (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return [line for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans)]
 
 
 def _causes(brains: Iterable[FoundBrain]) -> str:
-    return "".join(f"\n  {brain.entry['id']}: {cause}" for brain in brains for cause in brain.causes)
+    scans = [(brain.entry["id"], cause) for brain in brains for cause in brain.causes]
+    return "".join(f"\n  {line}" for line, _ in grouped((scan, f"{scan}: {cause}") for scan, cause in scans))
 
 
 def write_prediction(

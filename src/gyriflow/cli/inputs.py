@@ -36,6 +36,8 @@ from ..study.study import Study
 from .recognition import NATIVE_SPACES, SPACE_NAME
 
 SUBJECT_NAME = re.compile(r"(?<![A-Za-z0-9])sub-([A-Za-z0-9]+)")
+TEMPLATE_SPACES = ("mni", "mni_152", "talairach", "template")
+"""Spaces of NIfTI and GIFTI files in which a brain may have the size of a template."""
 HULL_SHARE = 0.8
 """About the volume of a hemisphere over that of its convex hull, where a surface is open."""
 
@@ -139,10 +141,19 @@ def _named_otherwise(path: str, brain: BrainConfig) -> Iterator[str]:
     if own and (found := {*SUBJECT_NAME.findall(name)} - own):
         yield f"{path} has a name of sub-{', sub-'.join(sorted(found))}"
     spaces = {space for space in SPACE_NAME.findall(name) if space.lower() not in NATIVE_SPACES}
-    if is_volume(path) and Path(path).is_file() and (space := read_header(path).space) in ("mni", "talairach"):
+    if Path(path).is_file() and (space := _template_space(path)):
         spaces.add(space)
     if spaces:
         yield f"{path} is in the space {', '.join(sorted(spaces))}: has the brain its own size and shape there?"
+
+
+def _template_space(path: str) -> str:
+    """Return the space of a template that a file names for its coordinates, or ""."""
+    if is_volume(path):
+        space = read_header(path).space
+    else:
+        space = (surface_space_structure(path)[1] or "").removeprefix("NIFTI_XFORM_").lower()
+    return space if space in TEMPLATE_SPACES else ""
 
 
 def check_other_files(study: Study) -> Iterator[tuple[str, str, bool]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..anatomy.labels import cerebrum_mask, layout_of, scheme_contradictions
 from ..errors import InputError
-from ..formats import SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
+from ..formats import CIFTI_NAME, SIDE_NAME, SURFACE_SUFFIXES, VOLUME_SUFFIXES, format_of, is_volume, side_in_name
 from ..io.files import files_in, reading
 from ..io.made_files import is_own_data_set
 from ..io.volumes import read_label_volume
@@ -194,6 +194,8 @@ def _no_brain(folder: Path, reasons: Mapping[str, str]) -> InputError:
 
 def _rejection(file: Path) -> str:
     name = file.name.lower()
+    if CIFTI_NAME.search(name):
+        return "a CIFTI file, with values at grayordinates and no volume of labels"
     if name.endswith(VOLUME_SUFFIXES):
         return "its name has no label, seg, parcellation or tissue"
     return "its name is not that of a pial surface" if name.endswith(SURFACE_SUFFIXES) else "not a volume or surface"
@@ -216,9 +218,8 @@ def _brains_of_scan(
         else:
             brains.append(brain)
     readable = [brain for brain in brains if not brain.is_unreadable]
-    above = (re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix()) for brain in group)
     names = sorted({_scan_name(brain.file) for brain in group})
-    data_sets = sorted({str(data_set_of(Path(match[1] or "" if match else ""))) for match in above})
+    data_sets = _data_sets(group)
     for number, brain in enumerate([*readable, *(brain for brain in brains if brain.is_unreadable)], start=1):
         brain.entry["id"] = name if number == 1 else f"{name}-{number}"
         if len(brains) > 1:
@@ -232,6 +233,21 @@ def _brains_of_scan(
         elif len(readable) > 1 and brain in readable:
             brain.notes.append(f"{len(readable)} files are of {name}: keep one")
     return brains
+
+
+def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
+    """Return the folders of data sets that have the same kind of data of a scan, if there are several.
+
+    Labels and surfaces of one scan may be in folders of their own.
+    """
+    folders: dict[str, set[str]] = defaultdict(set)
+    for brain in group:
+        above = re.match(r"(?:(.*?)/)?sub-", brain.file.as_posix())
+        folder = data_set_of(Path(above[1] or "" if above else ""))
+        parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
+        kind = "labels" if "labels" in brain.entry else "surfaces"
+        folders[kind].add(str(Path(*parts)))
+    return sorted(max(folders.values(), key=lambda names: len(names)))
 
 
 def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
@@ -333,7 +349,8 @@ def _whole_surfaces(files: Sequence[Path]) -> Iterator[FoundBrain]:
 
 
 def _volumes(files: Sequence[Path], unreadable: Sequence[Path]) -> Iterator[FoundBrain]:
-    volumes = [file for file in files if file.name.lower().endswith(VOLUME_SUFFIXES)]
+    # of a pair, the header
+    volumes = [file for file in files if is_volume(file) and file.name.lower().endswith(VOLUME_SUFFIXES)]
     images: dict[Path, list[str]] = defaultdict(list)
     for file in volumes:
         if "_T2w." in file.name:
@@ -404,7 +421,7 @@ def _complete(
 
 def _require_brain(path: Path, *, whole: bool = False) -> None:
     # imports that label volumes need not wait for
-    from ..anatomy.plausible import MIN_NARROWNESS, narrowness
+    from ..anatomy.plausible import MIN_NARROWNESS, narrowness, require_one_brain
     from ..geometry.triangles import volume_ml
     from ..io.surfaces import read_surface
 
@@ -412,7 +429,10 @@ def _require_brain(path: Path, *, whole: bool = False) -> None:
     if not WHOLE_BRAIN_ML[0] < (volume := abs(volume_ml(mesh))) < WHOLE_BRAIN_ML[1]:
         expected = f"the closed surface of a brain, {WHOLE_BRAIN_ML[0]:g} to {WHOLE_BRAIN_ML[1]:g} mL"
         raise InputError("is not a brain", path=path, found=f"{volume:.3g} mL", expected=expected)
-    if whole and (shape := narrowness(mesh)) < MIN_NARROWNESS:
+    if not whole:
+        return
+    require_one_brain(mesh, "surface", path)
+    if (shape := narrowness(mesh)) < MIN_NARROWNESS:
         problem = "seems to be one hemisphere only, and atlases have whole brains"
         found, expected = f"a shortest extent of {shape:.2f} of the longest", f"{MIN_NARROWNESS} or more"
         raise InputError(problem, path=path, found=found, expected=expected, remedy="Give LEFT and RIGHT.")

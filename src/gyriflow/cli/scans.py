@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from tabulate import tabulate
 
+from ..grouping import Kinds
 from ..io.files import read_table
 from .recognition import UNSET, FoundScans
 
@@ -32,10 +33,14 @@ def scan_lines(scans: Iterable[ScanRow]) -> Iterator[str]:
     rows = list(scans)
     table = tabulate([row[:6] for row in rows], headers=HEADINGS, tablefmt="plain", disable_numparse=True)
     heading, *lines = table.splitlines()
+    shown = Kinds()
     yield heading
     for line, row in zip(lines, rows, strict=True):
         yield line
-        yield from (f"    {' '.join(reason.split())}" for reason in row.reasons)
+        for reason in (" ".join(text.split()) for text in row.reasons):
+            if shown.add(row.scan, f"{row.scan}: {reason}"):
+                yield f"    {reason}"
+    yield from shown.others()
     counts = Counter(row.verdict for row in rows)
     unusable = [f"{counts[verdict]} {text}" for verdict, text in UNUSABLE.items() if counts[verdict]]
     usable = sum(row.verdict not in UNUSABLE for row in rows)

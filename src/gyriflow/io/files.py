@@ -22,7 +22,7 @@ import numpy as np
 
 from ..errors import InputError, StorageError
 from ..formats import START_BYTES, foreign_format
-from ..settings.base import absent_content
+from ..settings.base import absent_content, hint_for_missing
 
 if TYPE_CHECKING:
     import h5py
@@ -78,9 +78,10 @@ def reading(path: AnyPath, kind: str, expected: str | None = None, remedy: str |
             require_content(companion)
         if isinstance(error, InputError):
             raise
-        reason = "no such file" if isinstance(error, FileNotFoundError) else error
         # of a pair, the missing file
         path = getattr(error, "filename", None) or path
+        is_missing = isinstance(error, FileNotFoundError | IsADirectoryError)
+        reason = f"no such file{hint_for_missing(Path(path))}" if is_missing else error
         if foreign := foreign_format(path, _start_of(path)):
             reason, remedy = f"it is {foreign.name}", foreign.remedy
         raise InputError(f"cannot be read as {kind}: {reason}", path=path, expected=expected, remedy=remedy) from error
@@ -103,11 +104,21 @@ def atomic_write(path: AnyPath) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        remedy = "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
-        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=remedy) from error
+        raise StorageError(f"cannot be written: {error.strerror or error}", path=path, remedy=_remedy(path)) from error
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _remedy(path: Path) -> str:
+    """Return what to do about a file that cannot be written."""
+    for folder in path.parents:
+        if folder.is_symlink() and not folder.exists():
+            target = folder.readlink()
+            return f"{folder} is a link to {target}, which does not exist: make that folder or remove the link."
+        if folder.is_file():
+            return f"{folder} is a file in place of a folder: rename it."
+    return "Free disk space or choose a folder that can be written (--directory); earlier files are unchanged."
 
 
 def _plain(value: Any) -> Any:

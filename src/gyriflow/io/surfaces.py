@@ -21,7 +21,7 @@ from nibabel.nifti1 import intent_codes
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..formats import SURFACE_SUFFIXES, format_of, side_in_name
+from ..formats import START_BYTES, SURFACE_SUFFIXES, format_of, side_in_name
 from ..geometry.poses import Pose, pose_from
 from ..geometry.triangles import Floats, Ints, TriangleMesh, is_closed, merged
 from ..settings.terms import NO_REGION, SIDES, STRUCTURES, Side
@@ -63,7 +63,7 @@ def surface_space_structure(path: AnyPath) -> tuple[TriangleMesh, str | None, st
     with reading(path, "a surface", SURFACE_NAMES):
         vertices, faces, space, structure = read(path)
     if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3 or not faces.size:
-        shapes = f"points of shape {vertices.shape}, faces of shape {faces.shape}"
+        shapes = f"points of shape {vertices.shape}, faces of shape {faces.shape}" if faces.size else "no faces"
         raise InputError("holds no surface", path=path, found=shapes, expected="(n, 3) points and (m, 3) faces")
     require_finite(vertices, path, "coordinates", "vertices")
     if not (np.isfinite(faces).all() and 0 <= faces.min() <= faces.max() < len(vertices)) or (
@@ -236,6 +236,41 @@ def _read_with_trimesh(path: Path) -> RawSurface:
     return np.asarray(body.vertices, dtype=float), np.asarray(body.faces), None, None
 
 
+MNI_OBJ = re.compile(rb"\s*P\s+[\d.]")
+"""Start of a text file of triangles as CIVET's, whose name also ends in .obj."""
+
+
+def _read_obj(path: Path) -> RawSurface:
+    """Return vertices and faces of a Wavefront file or of a text file of the MNI."""
+    with path.open("rb") as file:
+        start = file.read(START_BYTES)
+    if start.startswith(b"p") and b"\0" in start:
+        problem, expected = "is a binary .obj file of the MNI", "its form as text, or another format such as GIFTI"
+        raise InputError(problem, path=path, expected=expected)
+    return _read_mni_obj(path) if MNI_OBJ.match(start) else _read_with_trimesh(path)
+
+
+def _read_mni_obj(path: Path) -> RawSurface:
+    """Return vertices and faces of a text file of the MNI (BICPL's polygons).
+
+    After `P`, five properties of light and the number of points follow the points, their normals, the number of faces,
+    colours, the end of each face in the list of corners, and that list.
+    """
+    words = path.read_text(encoding="ascii").split()
+    n_points = int(words[6])
+    points = np.array(words[7 : 7 + 3 * n_points], dtype=float).reshape(n_points, 3)
+    place = 7 + 6 * n_points
+    n_faces, coloured_by = int(words[place]), words[place + 1]
+    n_colours = {"0": 1, "1": n_faces, "2": n_points}[coloured_by]
+    place += 2 + 4 * n_colours
+    ends = np.array(words[place : place + n_faces], dtype=np.int64)
+    if not np.array_equal(ends, 3 * np.arange(1, n_faces + 1)):
+        raise InputError("has faces that are no triangles", path=path, expected="three corners of each face")
+    place += n_faces
+    corners = np.array(words[place : place + 3 * n_faces], dtype=np.int64)
+    return points, corners.reshape(n_faces, 3), None, None
+
+
 def read_pose(path: AnyPath) -> Pose:
     """Read the pose in a `surface.json`."""
     return pose_from(read_json(path)["pose"])
@@ -399,7 +434,9 @@ def _read_freesurfer_surface(path: Path) -> RawSurface:
 SURFACE_READERS: dict[str, Callable[[Path], RawSurface]] = {
     "GIFTI": _read_gifti_surface,
     "VTK": lambda path: (*read_vtk(path), None, None),
-    **dict.fromkeys(("STL", "PLY", "OBJ", "OFF"), _read_with_trimesh),
+    **dict.fromkeys(("STL", "PLY"), _read_with_trimesh),
+    "OBJ": _read_obj,
+    "OFF": _read_with_trimesh,
     "FreeSurfer": _read_freesurfer_surface,
 }
 """The reader of each format of surfaces."""

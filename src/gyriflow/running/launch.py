@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
@@ -61,6 +61,8 @@ MIN_FREE_BYTES = 4 * 2**20
 """If less disk space is left, a run that failed without an exit code of its own has filled the disk."""
 MIN_FREE_FILES = 16
 """Likewise, for systems that can hold a fixed number of files."""
+SNAKEFILES = ("Snakefile", "snakefile", "workflow/Snakefile", "workflow/snakefile")
+"""Where Snakemake finds a workflow by itself."""
 NO_RULE = re.compile(r"No rule to produce (\S+)")
 _held_locks: list[IO[str]] = []
 received_signals: list[int] = []
@@ -110,6 +112,17 @@ def check_configfiles(files: Sequence[Path], directory: Path) -> None:
         except InputError as error:
             remedy = None if file.exists() else "Put targets before --configfile, or after another option"
             raise InputError(f"configuration {error}", remedy=remedy) from error
+
+
+def what_runs(directory: Path) -> str:
+    """Return which configuration runs if a call names none, and which workflow in the current folder does not."""
+    demo, own = SHIPPED / "config" / "config.yaml", directory / "config" / "config.yaml"
+    is_demo = not own.is_file() or own.samefile(demo)
+    text = f"without --configfile, this runs {f'the demo, {demo}' if is_demo else own.resolve()}"
+    for name in SNAKEFILES:
+        if Path(name).is_file() and not Path(name).samefile(SHIPPED / "Snakefile"):
+            return f"{text}, and not {Path(name).absolute()}: that workflow needs its own snakemake"
+    return text
 
 
 def check_options(unknown: Sequence[str], usage: str) -> None:
@@ -213,6 +226,19 @@ def full_disk(directory: Path) -> str:
     return ""
 
 
+def restore_dates(dates: Mapping[Path, float]) -> bool:
+    """Give files and links a date each (s since the epoch); return whether all of several have it now."""
+    try:
+        for path, date in dates.items():
+            os.utime(path, (date, date))
+            if path.is_symlink():
+                os.utime(path, (date, date), follow_symlinks=False)
+    except OSError:
+        # files of another user
+        return False
+    return bool(dates)
+
+
 def set_cache(directory: Path) -> None:
     """Let libraries keep their caches with a study if the home folder cannot be written or is unknown."""
     try:
@@ -293,16 +319,16 @@ def main(arguments: Sequence[str]) -> int:
     options, unknown = parser.parse_known_args(arguments)
     check_options(unknown, parser.format_usage())
     directory = options.directory or Path()
+    is_second_pass = REFUSED_FILE_VAR in os.environ
+    if not (options.configfile or options.snakefile or is_second_pass):
+        print(f"gyriflow: {what_runs(directory)}", file=sys.stderr)
     check_configfiles(options.configfile or [], directory)
     dry_run = any(getattr(options, name, None) not in (None, False) for name in READ_ONLY_OPTIONS)
     if not dry_run:
         clear_stale_lock(directory)
-        if dates := dates_before_copy(directory):
-            print("gyriflow: this study was copied: its results get the dates at which they were made", file=sys.stderr)
-        # files of another user cannot be dated
-        with suppress(OSError):
-            for path, date in dates.items():
-                os.utime(path, (date, date))
+        if restore_dates(dates_before_copy(directory)):
+            text = "the results were copied, or stored by git-annex: they get the dates at which they were made"
+            print(f"gyriflow: {text}", file=sys.stderr)
     runs_nothing = dry_run and not options.nolock
     if not runs_nothing:
         set_cache(directory)
@@ -331,7 +357,7 @@ def main(arguments: Sequence[str]) -> int:
     if code > 128:
         print("gyriflow: interrupted; run the same command again to resume", file=sys.stderr)
         return code
-    can_finish = options.keep_going and not dry_run and REFUSED_FILE_VAR not in os.environ
+    can_finish = options.keep_going and not dry_run and not is_second_pass
     brains = failed_brains(directory, began_s) if code and can_finish else {}
     if brains and (interrupted := finish_without(brains, arguments, directory)):
         return interrupted

@@ -24,6 +24,8 @@ PACKAGES = (
 """Packages whose versions are recorded because results depend on them."""
 STUDY_RECORD = Path("results", "study", "study.json")
 """Record of the study that the results belong to, in the working directory."""
+INPUTS_RECORD = Path("results", "study", "inputs.json")
+"""Record of the contents of the study's input files."""
 
 
 def software() -> dict[str, Any]:
@@ -52,8 +54,9 @@ def recorded_version(directory: Path) -> str | None:
 def check_results_belong_to(directory: Path, files: Sequence[Path], config: Config, record: bool) -> None:
     """Raise InputError if the results in a working directory belong to another study.
 
-    Two studies differ if they share neither configuration files nor a brain, so a configuration may be edited, copied
-    or moved. With `record`, this study is recorded as the owner of the results.
+    Two studies differ if they share neither configuration files nor a brain, by its entry or the content of its files.
+    So a configuration may be edited, copied or moved, and data may be renamed. With `record`, this study is recorded
+    as the owner of the results.
     """
     path = directory / STUDY_RECORD
     brains: list[list[Any]] = [
@@ -63,7 +66,7 @@ def check_results_belong_to(directory: Path, files: Sequence[Path], config: Conf
     recorded = read_json(path) if path.is_file() else study
     existing = [brain[0] for brain in recorded["brains"] if (directory / "results" / "brains" / brain[0]).is_dir()]
     is_same_study = recorded["configuration"] == study["configuration"] or any(b in recorded["brains"] for b in brains)
-    if existing and not is_same_study:
+    if existing and not is_same_study and not _have_recorded_content(directory, config):
         results_of = f"{', '.join(existing)} of {', '.join(recorded['configuration'])}"
         expected = f"{', '.join(brain[0] for brain in brains)} of {', '.join(study['configuration'])}"
         remedy = f"Choose another --directory, or delete these results (or only study/{path.name}, to keep both here)."
@@ -71,6 +74,20 @@ def check_results_belong_to(directory: Path, files: Sequence[Path], config: Conf
         raise InputError(problem, path=results, found=results_of, expected=expected, remedy=remedy)
     if record and (recorded != study or not path.is_file()):
         write_json(path, study)
+
+
+def _have_recorded_content(directory: Path, config: Config) -> bool:
+    """Return whether any file of a study's brains has the content of an input of the results in a directory."""
+    recorded = _recorded_inputs(directory)
+    known = {sha256 for sha256, *_ in recorded.values()}
+    files = [file for brain in config.brains for file in brain.files]
+    return any(sha256 in known for sha256, *_ in contents(files, recorded).values())
+
+
+def _recorded_inputs(directory: Path) -> dict[str, Any]:
+    with suppress(InputError):
+        return read_json(directory / INPUTS_RECORD)
+    return {}
 
 
 def texts_in(value: Any) -> list[str]:
@@ -87,15 +104,12 @@ def input_contents(
     For a file of an atlas that is not downloaded yet, it is the one in `checksums`. With `record`, hashes are stored in
     the results with sizes and times, so that unchanged files are not read again.
     """
-    path = directory / "results" / "study" / "inputs.json"
-    recorded: dict[str, Any] = {}
-    with suppress(InputError):
-        recorded = read_json(path)
+    recorded = _recorded_inputs(directory)
     # a word of the configuration may be the name of a file, too
     named = [text for text in texts_in(config.model_dump()) if "/" in text or "." in text]
     files = contents(dict.fromkeys(named), recorded)
     if record and files != recorded:
-        write_json(path, files)
+        write_json(directory / INPUTS_RECORD, files)
     expected = {name: sha256 for name, (_, sha256) in checksums.items()}
     return expected | joined_contents(files), joined_contents(recorded)
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ..errors import StorageError
+from ..grouping import Kinds
 from ..io.files import write_json
 from ..step import KILLED, record_exit_code
 from .jobs import OUT_OF_MEMORY, cause, events_in, messages_in, read_log
@@ -69,7 +70,8 @@ class RunDisplay:
         self.work_done = 0.0
         self.done = self.total = self.next_percent = 0
         self.failed: list[dict[str, Any]] = []
-        self.shown: set[str] = set()
+        self.messages = Kinds()
+        self.sizes: set[str] = set()
         self.failure_messages: list[str] = []
         self.interrupted = self.has_errors = False
 
@@ -137,7 +139,9 @@ class RunDisplay:
             record_exit_code(KILLED)
         name = job.name if job else event["rule_name"]
         self.failed.append({"job": name, "cause": reason, "logs": [str(Path(log).absolute()) for log in event["log"]]})
-        self.console.print("\n        ".join([f"failed  {name}: {reason}", *(f"log: {log}" for log in event["log"])]))
+        line = f"failed  {name}: {reason}"
+        if self.messages.add(name, line):
+            self.console.print("\n        ".join([line, *(f"log: {log}" for log in event["log"])]))
 
     def tick(self) -> None:
         """Read the progress of running jobs; update the bar and the recorded state."""
@@ -168,6 +172,8 @@ class RunDisplay:
         self.ended = datetime.now()
         self.tick()
         self.bar.stop()
+        for line in self.messages.others():
+            self.console.print(line)
         took = format_duration((self.ended - self.began).total_seconds())
         done = f"{self.done} of {self.total} steps done"
         if self.interrupted:
@@ -187,10 +193,13 @@ class RunDisplay:
         for event in events_in(read_log(job.log.with_suffix(".jsonl"))) if job.log else ():
             match event:
                 case {"event": "warning", "message": str(text)}:
-                    self._show_once(f"warning {job.name}: {text}")
+                    self._show_warning(job, text)
                 case {"event": "size", "elements": elements, "ranks": ranks, "memory_mib": mib}:
                     on = f"{ranks} rank{'s' if ranks > 1 else ''}"
-                    self._show_once(f"       {job.name}: {elements} elements, {on}, about {mib} MiB")
+                    size = f"       {job.name}: {elements} elements, {on}, about {mib} MiB"
+                    if size not in self.sizes:
+                        self.sizes.add(size)
+                        self.console.print(size)
                 case {"event": "step"}:
                     job.step = event
 
@@ -198,9 +207,9 @@ class RunDisplay:
         self._follow(job)
         for message in messages_in(read_log(job.log)) if job.log else ():
             if message.by_gyriflow and message.level == "warning":
-                self._show_once(f"warning {job.name}: {message.first_line}")
+                self._show_warning(job, message.first_line)
 
-    def _show_once(self, line: str) -> None:
-        if line not in self.shown:
-            self.shown.add(line)
+    def _show_warning(self, job: Job, text: str) -> None:
+        line = f"warning {job.name}: {text}"
+        if self.messages.add(job.name, line):
             self.console.print(line)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ConfigDict, Field, field_validator
 
 from ..shipped import ATLASES, shipped_atlases
-from .base import KeyProblem, Settings, did_you_mean, located, refused
+from .base import KeyProblem, Settings, did_you_mean, located, not_a_path, refused
 from .terms import AffineSource, Coordinates
 from .weeks import AnyWeek
 
@@ -190,6 +190,15 @@ class AtlasSettings(Settings):
         if not name.endswith((".yaml", ".yml")) and name not in (shipped := shipped_atlases()):
             raise refused(f"found {name!r}; {did_you_mean(name, shipped)} An atlas of your own is an atlas.yaml")
         return name
+
+    @field_validator("folder")
+    @classmethod
+    def _plain_folder(cls, folder: str | None) -> str | None:
+        # a missing folder is made
+        hint = folder and not Path(folder).exists() and not_a_path(folder)
+        if hint:
+            raise refused(f"found {folder!r}; {hint}")
+        return folder
 
     @property
     def description(self) -> Path:

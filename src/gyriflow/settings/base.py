@@ -6,7 +6,7 @@ Pydantic checks single keys. `Settings.problems` checks keys against each other 
 import difflib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
@@ -27,6 +27,7 @@ from pydantic_core import CoreSchema, ErrorDetails, InitErrorDetails, PydanticCu
 from pydantic_core.core_schema import tagged_union_schema
 
 from ..errors import InputError
+from ..formats import ALL_SUFFIXES
 
 PROBLEM = "problem"
 """Type of the errors whose message already contains the value found."""
@@ -233,7 +234,7 @@ def _absolute(path: str, info: ValidationInfo) -> str:
     if absent := absent_content(place):
         raise refused(absent)
     if not place.is_file() and path not in info.context.get("awaited", ()):
-        raise refused(f"no such file: {path_in(folder, path)}{_present_instead(path_in(folder, path))}")
+        raise refused(f"no such file: {path_in(folder, path)}{hint_for_missing(path_in(folder, path))}")
     if not WILDCARD.search(str(place)):
         return str(place)
     # a relative path avoids the braces of the working directory
@@ -246,11 +247,58 @@ InputFile = Annotated[str, AfterValidator(_absolute)]
 """The path of an input file, relative to the configuration file or else to the working directory."""
 
 
-def _present_instead(path: Path) -> str:
-    """Return a hint with existing files whose names differ from a missing one only in a number, such as the week."""
-    pattern = re.compile(re.sub(r"\d+(\\\.\d+)?", r"[0-9.]+", re.escape(path.name)))
+NO_PATH = (
+    (re.compile(r"\$\w|\$\{|%\w+%"), "variables such as $HOME are not replaced; write the whole path, or ~/…"),
+    (re.compile(r"(?:^|/)[A-Za-z][A-Za-z0-9+.-]+:/"), "expected a path without file:// or another address"),
+    (re.compile(r"\\"), r"write / between folders, not \\"),
+)
+"""What paths of files do not have, and the hints about it."""
+MAX_NAMES = 3
+"""Most names of files in a hint."""
+
+
+def not_a_path(text: str) -> str:
+    """Return a hint if a text has what paths of files do not have, or ""."""
+    return next((hint for pattern, hint in NO_PATH if pattern.search(text)), "")
+
+
+def hint_for_missing(path: Path) -> str:
+    """Return a hint why there is no such file, or "": what its path is instead, or names like its in the folder."""
+    if hint := not_a_path(str(path)):
+        return f"; {hint}"
     try:
-        names = sorted(file.name for file in path.parent.iterdir() if pattern.fullmatch(file.name))
+        if path.is_symlink() and not path.exists():
+            return f"; it is a link to {path.readlink()}, which does not exist"
+        if path.is_dir():
+            return f"; it is a folder{_listed(' with', sorted(path.iterdir()))}; expected a file"
+        absent = [folder for folder in path.parents if not folder.exists()]
+        if absent:
+            return f"; there is no folder {absent[-1]}"
+        return _listed("; there is", _named_alike(path))
     except OSError:
-        names = []
-    return f"; there are {', '.join(names)}" if names else ""
+        return ""
+
+
+def _named_alike(path: Path) -> list[Path]:
+    """Return the files next to a missing one with its name, but for ending, case and spaces, or else for numbers."""
+    files = sorted(path.parent.iterdir())
+    stem = _stem(path.name)
+    same = [file for file in files if _stem(file.name) == stem]
+    return same or [file for file in files if _without_numbers(_stem(file.name)) == _without_numbers(stem)]
+
+
+def _stem(name: str) -> str:
+    name = name.strip().lower()
+    endings = [ending for ending in ALL_SUFFIXES if name.endswith(ending)]
+    return name.removesuffix(max(endings, key=len, default=""))
+
+
+def _without_numbers(stem: str) -> str:
+    # such as the week
+    return re.sub(r"\d+(\.\d+)?", "#", stem)
+
+
+def _listed(words: str, files: Sequence[Path]) -> str:
+    names = [repr(file.name) if file.name != file.name.strip() else file.name for file in files[:MAX_NAMES]]
+    names += ["…"] if len(files) > MAX_NAMES else []
+    return f"{words} {', '.join(names)}" if names else ""

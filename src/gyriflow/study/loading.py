@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError
+from ..grouping import grouped
 from ..io.yaml_files import read_keys
 from ..settings.atlas import Atlas, AtlasSettings
 from ..settings.base import PROBLEM, Key, line, messages
@@ -33,8 +34,7 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
     entries, left_out, sources = _participants(plain.get("participants"), folder, problems)
     if further := [*(entry for used in atlases for entry in atlas_brains(used)), *entries]:
         plain["brains"] = [*(plain.get("brains") or ()), *further]
-    if not (keep_going and plain.get("brains")):
-        problems += [row["cause"] for row in left_out.values()]
+    unusable = [] if keep_going and plain.get("brains") else [(scan, row["cause"]) for scan, row in left_out.items()]
     awaited = [str(file.path) for used in atlases for file in used.files]
     hints = ["config/README.md lists the descriptions of all keys"]
     try:
@@ -45,14 +45,16 @@ def load(raw: Mapping[str, Any], base_dir: Path | str = ".", *, keep_going: bool
             hints.append("once each key is valid, they are checked against each other")
     else:
         problems += _lines([(problem.key, problem.text) for problem in problems_between(config)])
-    if not problems:
+    if not problems and not unusable:
         config.left_out.update(left_out)
         config.age_sources.update(sources)
         return config
     if left_out and not keep_going:
         hints.append("use --keep-going to leave out rows that cannot be used")
-    counted = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
-    raise InputError("\n  ".join([f"the configuration has {counted}:", *problems]) + "\n" + "; ".join(hints))
+    count = len(problems) + len(unusable)
+    counted = f"{count} problem{'s' if count > 1 else ''}"
+    lines = [text for text, _ in grouped([*(("", problem) for problem in problems), *unusable])]
+    raise InputError("\n  ".join([f"the configuration has {counted}:", *lines]) + "\n" + "; ".join(hints))
 
 
 def _participants(

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..formats import is_volume
 from ..io.files import read_json, read_text_table
 from ..names import merged_names
-from ..settings.base import absent_content, located, own_name, path_in
+from ..settings.base import absent_content, hint_for_missing, located, own_name, path_in
 from ..settings.brains import SOURCES, ParticipantsSettings
 from ..settings.weeks import EXPECTED_AGE, WeekNotation
 from .ages import (
@@ -392,7 +392,8 @@ def _entry(
             parts = value.split(";") if column == "white" else [value]
             places = [own_name(path_in(folder, part.strip())) for part in parts]
             if lost := [place for place in places if not place.is_file()]:
-                return {}, f"{column}: {lost[0]}: {absent_content(lost[0]) or 'no such file'}"
+                missing = absent_content(lost[0]) or f"no such file{hint_for_missing(lost[0])}"
+                return {}, f"{column}: {lost[0]}: {missing}"
             value = str(places[0]) if len(places) == 1 else list(map(str, places))
         *outer, last = column.split(".")
         section = entry

@@ -9,6 +9,7 @@ from shapes import phantom, rigid
 
 from gyriflow.anatomy.extraction import isosurface, smooth_mask, without_stalks
 from gyriflow.anatomy.labels import (
+    REPORTED_LOSS,
     border_share,
     cerebrum_mask,
     layout_of,
@@ -259,6 +260,18 @@ def test_a_brain_that_is_cut_at_any_border_of_its_volume_is_told_with_the_share(
     # a side of 8 × 8 voxels; the rest of the surface has those of the other five
     rest = 8**3 - 6 * 6 * 7
     assert border_share(np.roll(block, shift, axis)) == pytest.approx(64 / (64 + rest))
+
+
+def test_a_volume_that_ends_at_the_cerebrum_does_not_cut_it():
+    labels, affine = phantom()
+    (box,) = ndimage.find_objects(np.isin(labels, CEREBRUM).astype(int))
+    tight = labels[box]
+    assert read_cerebrum(tight, affine, ATLAS).report["border_share"] == 0.0
+    for axis in range(3):
+        missing = max(4, tight.shape[axis] // 8)
+        for end in (slice(missing, None), slice(None, -missing)):
+            cut = np.moveaxis(np.moveaxis(tight, axis, 0)[end], 0, axis)
+            assert read_cerebrum(cut, affine, ATLAS).report["border_share"] > REPORTED_LOSS
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])

@@ -14,7 +14,12 @@ from shapes import LPS, rigid, scaling, sphere
 
 from gyriflow.anatomy.fissure import smallest_gap, split
 from gyriflow.anatomy.pial import from_hemispheres, from_labels, from_surface
-from gyriflow.anatomy.plausible import expected_volume_ml, proportion_warnings, require_plausible_size
+from gyriflow.anatomy.plausible import (
+    expected_volume_ml,
+    proportion_warnings,
+    require_plausible_size,
+    require_whole,
+)
 from gyriflow.anatomy.repair import pieces
 from gyriflow.errors import InputError, MeshError
 from gyriflow.geometry.matching import nearest_on
@@ -113,17 +118,34 @@ def test_storage_order_makes_no_difference(volume, phantom):
 
 
 @pytest.mark.fault(4)
-@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "metres"), (1e3, "micrometres"), (0.1, "centimetres")])
-def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, unit):
+@pytest.mark.parametrize(
+    # with the wrong unit of a header that may give the same size, if any
+    ("factor", "units"), [(1e-3, ["metres", "header says micrometres"]), (1e3, ["micrometres", "header says metres"]),
+                          (0.1, ["centimetres"])]
+)  # fmt: skip
+def test_wrong_unit_is_caught_and_named(volume, phantom, halves, factor, units):
     labels, affine = volume
     scale = np.diag([factor] * 3 + [1.0])
-    facts = Facts(24, "mL", unit)
+    facts = Facts(24, "mL", *units)
     with pytest.raises(InputError, check=facts):
         from_labels(labels, scale @ affine, ATLAS, week=24.0)
     with pytest.raises(InputError, check=facts):
         from_surface(transformed(phantom.whole, scale), week=24.0, max_hole_mm=3.0)
     with pytest.raises(InputError, check=facts):
         from_hemispheres(*(transformed(half, scale) for half in halves), week=24.0)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_two_brains_in_one_volume_or_surface_are_not_one_hemisphere(volume, phantom, axis):
+    labels, affine = volume
+    facts = Facts("2 separate brains")
+    with pytest.raises(InputError, check=facts):
+        from_labels(np.concatenate([labels, labels], axis=axis), affine, ATLAS, week=24.0, **QUICK)
+    # in contact or nearly so, as in one uterus
+    size = np.ptp(phantom.whole.vertices, axis=0)
+    twins = merged(phantom.whole, transformed(phantom.whole, rigid(shift=1.02 * size * np.eye(3)[axis])))
+    with pytest.raises(InputError, check=facts):
+        require_whole(twins, "surface")
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ from gyriflow.running.cost import (
 )
 from gyriflow.running.status import format_duration
 from gyriflow.settings.stages import MeshSettings
+from gyriflow.settings.terms import ELEMENTS_NEEDED, element_error, is_too_coarse
 from gyriflow.shipped import SHIPPED
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
@@ -107,6 +108,38 @@ def test_every_file_is_told_with_its_size_side_and_number_of_vertices(tmp_path, 
     assert Facts("left.surf.gii", count, "mm", "left", "scanner_anat") in lines
     assert Facts("thick.shape.gii", count, 2.5, "left") in lines
     assert Facts("regions.nii.gz", "4 x 5 x 6", "2 x 1 x 0.5 mm") in lines
+
+
+def test_a_surface_in_the_space_of_a_template_is_doubted_once(tmp_path, monkeypatch):
+    for side, sign in (("left", -1), ("right", 1)):
+        path = tmp_path / f"{side}.surf.gii"
+        write_surface(path, hemisphere(sign), f"Cortex{side.title()}")
+        image = nib.load(path)
+        for array in image.darrays:
+            array.coordsys.dataspace = array.coordsys.xformspace = nib.nifti1.xform_codes["talairach"]
+        nib.save(image, path)
+    lines, bad = checked(tmp_path, monkeypatch)
+    assert bad == []
+    assert [line for line in lines if "warning:" in line] == [
+        Facts("brain sub-1", tmp_path / f"{side}.surf.gii", "talairach") for side in ("left", "right")
+    ]
+    assert lines[-2].split()[-1] == "warning"
+
+
+def test_a_warning_of_a_reader_is_that_of_its_brain_and_comes_once(tmp_path, monkeypatch, caplog):
+    for side, sign in (("left", -1), ("right", 1)):
+        write_surface(tmp_path / f"{side}.surf.gii", hemisphere(sign), f"Cortex{side.title()}")
+    image = nib.load(tmp_path / "left.surf.gii")
+    for array in image.darrays:
+        array.coordsys.dataspace = 0
+        array.coordsys.xformspace = nib.nifti1.xform_codes["talairach"]
+        array.coordsys.xform = np.diag([1.2, 1.2, 1.2, 1.0])
+    nib.save(image, tmp_path / "left.surf.gii")
+    lines, _ = checked(tmp_path, monkeypatch)
+    warning = Facts("warning: brain sub-1:", "1.2", tmp_path / "left.surf.gii")
+    assert lines.count(warning) == 1
+    assert lines[-2].split()[-1] == "warning"
+    assert not caplog.records
 
 
 @pytest.mark.parametrize(
@@ -424,8 +457,10 @@ def test_a_path_is_said_to_be_of_this_study_or_of_all_with_its_folder(tmp_path, 
     prediction = {"brains": [{"id": "a", "week": 23, "population": "a", **LABELLED}], "start": "a"}
     prediction |= {"folding": {"preset": "expected", "end_week": 24}}
     atlas = {"name": "spina-bifida", "series": "unoperated", "weeks": [22, 23, 24]}
-    for folder, fact in ((tmp_path / "study" / "atlas", "this study only"), (tmp_path / "atlas", tmp_path / "atlas")):
-        study = resolve(load(prediction | {"atlas": atlas | {"folder": str(folder)}}))
+    in_study, outside = {"folder": str(tmp_path / "study" / "atlas")}, {"folder": str(tmp_path / "atlas")}
+    # by default in the working directory, which need not be the current folder
+    for more, fact in (({}, "this study only"), (in_study, "this study only"), (outside, tmp_path / "atlas")):
+        study = resolve(load(prediction | {"atlas": atlas | more}))
         lines = [line for line, _ in work_of(tmp_path / "x.yaml", tmp_path / "study", 1, [], study)]
         (line,) = [line for line in lines if line.startswith("path of")]
         assert line == Facts("path of spina-bifida", fact)
@@ -448,6 +483,13 @@ def test_why_a_step_runs_is_said_in_words(tmp_path, monkeypatch, reason, words):
     write_json(tmp_path / "results" / "report" / "provenance.json", {"gyriflow": "0.1"})
     monkeypatch.setattr(checking, "plan", lambda *_, **__: [checking.PlannedJob("rule", {}, 1, reason)])
     assert [line for line, _ in work_of(tmp_path, tmp_path, 1, [], resolve(load(STUDY)))][1] == f"  {words}: rule"
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_number_of_elements_as_shown_is_not_fewer_than_itself(order):
+    for elements in np.linspace(0.8, 1.2, 401) * ELEMENTS_NEEDED[order]:
+        shown = float(element_error(order, elements)[1].split()[0])
+        assert is_too_coarse(order, elements) == (shown < ELEMENTS_NEEDED[order])
 
 
 def test_the_memory_of_a_surface_follows_the_header(tmp_path):

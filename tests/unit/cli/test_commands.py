@@ -10,6 +10,7 @@ import yaml
 from atlas_brains import atlas_brain, atlas_halves
 from click.testing import CliRunner
 from facts import Facts
+from scan_trees import make_tree
 from shapes import sphere
 
 from gyriflow.cli import check as checking
@@ -191,6 +192,51 @@ def test_a_prediction_that_no_atlas_allows_is_refused(predicted, tmp_path, until
     done = predicted("--week", "22.4", "--until", until, *more)
     assert (done.exit_code, done.output) == (2, Facts(*facts))
     assert not (tmp_path / "gyriflow.yaml").exists()
+
+
+def test_check_takes_a_folder_as_measure_does_and_writes_nothing(tmp_path, monkeypatch):
+    rows = ["participant_id gestational_age", "sub-01 24.1", *(f"sub-{number:02} n/a" for number in range(2, 8))]
+    names = [f"sub-{number:02}_dseg.nii.gz" for number in range(1, 8)]
+    make_tree(tmp_path, labels=names, tables={"participants.tsv": rows})
+    planned = []
+
+    def plan(config, *_, **__):
+        planned.append(yaml.safe_load(config.read_text()))
+        return []
+
+    monkeypatch.setattr(checking, "plan", plan)
+    # set in this process, and removed after the test
+    monkeypatch.setenv(launch.MEASURE_ONLY_VAR, "")
+    before = set(tmp_path.rglob("*"))
+    options = ("--scheme", "spina-bifida-atlas", "-d", str(tmp_path / "new"))
+    done = CliRunner().invoke(main, ["check", str(tmp_path), *options])
+    assert (done.exit_code, set(tmp_path.rglob("*"))) == (2, before)
+    assert [brain["id"] for brain in planned[0]["brains"]] == ["sub-01"]
+    assert done.output == Facts(f"{tmp_path}: 1 brain, measured only", "6 problems")
+    # six scans with one fault: three lines and a number
+    assert done.output.count("n/a") == 3
+    assert done.output == Facts("3 more")
+    # the options are those of measure
+    (tmp_path / "gyriflow.yaml").write_text("brains: []")
+    for command in ("check", "measure"):
+        done = CliRunner().invoke(main, [command, str(tmp_path), "--files", "*x*"])
+        assert (done.exit_code, done.output) == (2, Facts("--files", "init FOLDER"))
+
+
+def test_a_current_folder_that_was_deleted_is_named(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    done = CliRunner().invoke(main, ["check"])
+    assert (done.exit_code, done.output) == (2, Facts("the current folder no longer exists"))
+
+
+def test_a_file_that_is_not_there_is_answered_with_what_is(predicted_from):
+    done = predicted_from("brain.nii", "--week", "23.4")
+    assert (done.exit_code, done.output) == (2, Facts("brain.nii", "there is brain.stl"))
+    # of another kind than expected, and there
+    done = predicted_from("brain.stl", "--week", "23.4", "--folder", "half.stl")
+    assert (done.exit_code, "there is" in done.output) == (2, False)
 
 
 @pytest.fixture(scope="module")

@@ -118,6 +118,21 @@ def test_files_that_cannot_be_used_are_named(tmp_path, contents, cause):
     assert found == cause
 
 
+@pytest.mark.parametrize(
+    ("labels", "surfaces", "cause"),
+    [
+        # of one data set
+        (["anat/sub-01_dseg.nii.gz"], "surf/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
+        (["volumes/sub-01_dseg.nii.gz"], "meshes/sub-01_hemi-@_pial.surf.gii", KEEP_ONE),
+        (["anat/sub-01_dseg.nii.gz", "seg/sub-01_desc-x_dseg.nii.gz"], None, KEEP_ONE),
+        (["siteA/anat/sub-01_dseg.nii.gz", "siteB/anat/sub-01_dseg.nii.gz"], None, Facts("siteA", "siteB")),
+    ],
+)
+def test_folders_of_kinds_of_data_are_not_data_sets(tmp_path, labels, surfaces, cause):
+    make_tree(tmp_path, labels=labels, surfaces=both(surfaces) if surfaces else [])
+    assert all(found == cause for _, _, found in brains(tmp_path).values())
+
+
 def test_a_resampled_surface_is_used_with_a_warning(tmp_path):
     make_tree(tmp_path, surfaces=both("sub-01_hemi-@_space-fsLR_den-32k_pial.surf.gii"))
     (brain,) = recognise(tmp_path).brains

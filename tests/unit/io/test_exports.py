@@ -76,6 +76,8 @@ def test_bids_derivatives(tmp_path, brain):
     assert wide["area"] == {"Description": "pial area, both hemispheres", "Units": "cm^2"}
     assert set(wide) == {"brain", "run", "week", "area", "depth"}
     assert read_json(folder / "sulc.json")["Units"] == "mm"
+    # what has no value, and how much of it
+    assert read_json(folder / "thickness.json")["Description"] == Facts("NaN", "thickness_measured_share")
     write_vertex_maps(brain.maps["left"], {"unheard_of": depth["sulc"]})
     with pytest.raises(KeyError, match="unheard_of"):
         export_bids(folder, [brain], TABLES, "1.2.3", {})

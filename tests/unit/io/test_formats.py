@@ -6,11 +6,13 @@ import nibabel as nib
 import numpy as np
 import pytest
 import pyvista as pv
+from facts import Facts
 from nibabel.freesurfer.io import write_geometry
 from pydantic import ValidationError
 from shapes import sphere
 
 from gyriflow.cli.recognition import recognise
+from gyriflow.errors import InputError
 from gyriflow.formats import FORMATS, is_volume
 from gyriflow.geometry.triangles import is_closed, signed_volume
 from gyriflow.io.surfaces import SURFACE_READERS, read_surface, write_surface
@@ -81,6 +83,61 @@ def test_a_format_is_read_recognised_and_hidden(tmp_path, form, suffix):
     (found,) = recognise(tmp_path).brains
     # a pair is named by its header
     assert all(repr(path.name.replace(".img", ".hdr")) in repr(found.entry) for path in paths)
+
+
+def write_mni(path, ball=BALL, coloured_by=2, corners=3):
+    """Write a surface as programs of the MNI do, coloured as a whole (0), by faces (1) or by vertices (2)."""
+    colours = {0: 1, 1: len(ball.faces), 2: len(ball.vertices)}[coloured_by]
+    ends = corners * np.arange(1, len(ball.faces) + 1)
+    parts = [
+        f"P 0.3 0.3 0.4 10 1 {len(ball.vertices)}",
+        "\n".join(" ".join(map(str, point)) for point in ball.vertices),
+        "0 0 1\n" * len(ball.vertices),
+        f"{len(ball.faces)}\n{coloured_by} " + "0 1 1 1\n" * colours,
+        " ".join(map(str, ends)),
+        " ".join(map(str, ball.faces.ravel())),
+    ]
+    path.write_text("\n".join(parts))
+
+
+@pytest.mark.parametrize("coloured_by", [0, 1, 2])
+def test_an_obj_file_of_the_mni_is_read(tmp_path, coloured_by):
+    path = tmp_path / "sub-1_gray_surface_left_81920.obj"
+    write_mni(path, coloured_by=coloured_by)
+    found = read_surface(path)
+    assert found.vertices == pytest.approx(BALL.vertices)
+    assert (found.faces == BALL.faces).all()
+
+
+def test_other_obj_files_of_the_mni_are_named(tmp_path):
+    path = tmp_path / "a.obj"
+    write_mni(path, corners=4)
+    with pytest.raises(InputError, check=Facts(path, "triangles")):
+        read_surface(path)
+    write_mni(path)
+    path.write_bytes(path.read_bytes()[:-500])
+    with pytest.raises(InputError, check=Facts(path)):
+        read_surface(path)
+    path.write_bytes(b"p" + np.array([0.3, 0.3, 0.4, 10.0], ">f4").tobytes() + b"\0" * 100)
+    with pytest.raises(InputError, check=Facts(path, "binary", "MNI")):
+        read_surface(path)
+    path.write_text("# nothing\n")
+    with pytest.raises(InputError, check=Facts(path)):
+        read_surface(path)
+
+
+@pytest.mark.parametrize("ending", ["dlabel", "dscalar", "dtseries", "pconn", "dpconn", "plabel"])
+def test_cifti_files_are_not_volumes(tmp_path, ending):
+    assert not is_volume(f"a.{ending}.nii")
+    assert is_volume(f"a.{ending}.nii.gz")
+    assert is_volume("a.label.nii")
+    save_volume(nib.Nifti1Image)(tmp_path / "sub-1_week24_dseg.nii.gz")
+    (tmp_path / f"sub-1_week24_seg.{ending}.nii").touch()
+    (brain,) = recognise(tmp_path).brains
+    assert brain.entry["labels"] == "sub-1_week24_dseg.nii.gz"
+    (tmp_path / "sub-1_week24_dseg.nii.gz").unlink()
+    with pytest.raises(InputError, check=Facts(f"sub-1_week24_seg.{ending}.nii", "CIFTI")):
+        recognise(tmp_path)
 
 
 def test_each_format_has_a_reader_and_each_reader_a_format():

@@ -13,6 +13,7 @@ from processes import ran
 
 from gyriflow.code_hash import code_hash
 from gyriflow.io.files import files_in
+from gyriflow.running.launch import restore_dates
 from gyriflow.running.snakemake_internals import dates_before_copy
 
 SNAKEFILE = """
@@ -121,6 +122,22 @@ def test_only_files_that_a_run_made_are_removed_where_no_rule_makes_them_any_mor
     assert snakemake(study, "-n", "--config", "names=c").returncode == 0
     left = {path.name for path in files_in(study) if path.suffix in (".csv", ".png")}
     assert left == {"mine.csv", "mine.png", "made-a.csv", "coded.csv", "after.csv"}
+
+
+def test_results_that_are_kept_as_links_count_as_copied_once(study):
+    # as by git-annex
+    store = study.parent / "annex" / "objects"
+    store.mkdir(parents=True)
+    for number, name in enumerate(("after.csv", "tables/coded.csv", "made-a.csv", "made-b.csv", "large.bin")):
+        kept = (study / name).rename(store / f"key-{number}")
+        (study / name).symlink_to(kept)
+        os.utime(study / name, (2e9 + number, 2e9 + number), follow_symlinks=False)
+    dates = dates_before_copy(study)
+    assert len(dates) == 5
+    assert restore_dates(dates)
+    assert dates_before_copy(study) == {}
+    assert not restore_dates({})
+    assert not restore_dates({study / "none": 1e9})
 
 
 def test_the_dates_of_a_copy_are_those_at_which_its_results_were_made(study):

@@ -11,7 +11,7 @@ from gyriflow.errors import InputError
 from gyriflow.io.files import read_json, write_json
 from gyriflow.running.jobs import OUT_OF_MEMORY
 from gyriflow.running.launch import hold_lock
-from gyriflow.running.provenance import check_results_belong_to
+from gyriflow.running.provenance import check_results_belong_to, input_contents
 from gyriflow.running.status import STATE, status
 from gyriflow.running.terminal import RunDisplay
 from gyriflow.step import EXIT_FILE, recorded_exit_code
@@ -141,6 +141,23 @@ def test_a_step_without_a_message_is_told_with_where_its_own_is_not_by_the_shell
     run.fail("measure", "CalledProcessError in file x:\nCommand 'set -e; python x.py' returned 1", [])
     assert run.lines[0] == Facts("measure", run.display.details)
     assert "python" not in run.lines[0]
+
+
+def test_a_hundred_jobs_with_one_warning_and_one_cause_are_three_lines_each_and_a_number(run):
+    for number in range(100):
+        log = run.begin("pial", number, brain=f"sub-{number:03}")
+        log.write_text(f"2026-01-01 10:00:00 WARNING gyriflow.io.volumes: /a/{number}.nii: voxels of {number} mm\n")
+        if number % 2:
+            run.end(number)
+        else:
+            log.write_text(log.read_text() + f"gyriflow: /a/{number}.nii: is empty\n")
+            run.fail("pial", log=[str(log)], number=number)
+    run.display.end()
+    assert sum(line.startswith("warning ") for line in run.lines) == 3
+    assert sum(line.startswith("failed ") for line in run.lines) == 3
+    assert Facts("97 more", "voxels of 0 mm") in run.lines
+    assert Facts("47 more", "is empty") in run.lines
+    assert len(run.state["failed"]) == 50
 
 
 def test_a_run_until_a_stage_says_when_it_is_done(run):
@@ -285,6 +302,24 @@ def test_a_study_that_was_changed_goes_on(made, file, ids):
     check_results_belong_to(made, [made / file], configured(*ids), record=True)
     # whose they are now
     check_results_belong_to(made, [made / file], configured(*ids), record=False)
+
+
+def test_renamed_data_with_a_renamed_configuration_are_the_same_study(tmp_path):
+    def renamed(name):
+        brain = {"id": name, "week": 21, "labels": f"{name}.nii.gz", "scheme": "binary"}
+        return load({"brains": [brain], "start": name, "folding": {"end_week": 30}}, tmp_path)
+
+    (tmp_path / "old.nii.gz").write_text("one")
+    config = renamed("old")
+    check_results_belong_to(tmp_path, [tmp_path / "old.yaml"], config, record=True)
+    input_contents(tmp_path, config, {}, record=True)
+    (tmp_path / "results" / "brains" / "old").mkdir(parents=True)
+    (tmp_path / "old.nii.gz").rename(tmp_path / "new.nii.gz")
+    config = renamed("new")
+    check_results_belong_to(tmp_path, [tmp_path / "new.yaml"], config, record=False)
+    (tmp_path / "new.nii.gz").write_text("another")
+    with pytest.raises(InputError, check=Facts("old", "new")):
+        check_results_belong_to(tmp_path, [tmp_path / "new.yaml"], config, record=False)
 
 
 def test_results_that_were_deleted_are_nobodys(made):

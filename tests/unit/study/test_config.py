@@ -36,6 +36,40 @@ def test_all_mistakes_are_named_at_once():
     assert refusal(wrong).splitlines()[-1] != refusal(across).splitlines()[-1] == Facts("config/README.md")
 
 
+@pytest.mark.parametrize(
+    ("path", "facts"),
+    [
+        ("$HOME/scans/week24.nii.gz", ["$HOME", "~/"]),
+        ("${DATA}/week24.nii.gz", ["$HOME", "~/"]),
+        ("file:///scans/week24.nii.gz", ["file://"]),
+        ("https://site/week24.nii.gz", ["file://"]),
+        (r"scans\week24.nii.gz", ["/", "\\"]),
+        ("scans", ["folder with week24.nii.gz, week25.nii"]),
+        ("scan/week24.nii.gz", ["no folder {}/scan"]),
+        ("scans/week24.nii.gz ", ["there is week24.nii.gz"]),
+        ("scans/week24.nii", ["there is week24.nii.gz"]),
+        ("scans/Week24.nii.gz", ["there is week24.nii.gz"]),
+        ("scans/week25.nii.gz", ["there is week25.nii"]),
+        ("scans/week26.mgz", ["there is week24.nii.gz, week25.nii"]),
+        ("lost.nii.gz", ["a link to {}/nowhere.nii.gz"]),
+    ],
+)  # fmt: skip
+def test_a_path_without_a_file_says_what_is_there_instead(tmp_path, path, facts):
+    (tmp_path / "scans").mkdir()
+    for name in ("week24.nii.gz", "week25.nii"):
+        (tmp_path / "scans" / name).touch()
+    (tmp_path / "lost.nii.gz").symlink_to(tmp_path / "nowhere.nii.gz")
+    brain = {"id": "a", "week": 24, "labels": path, "scheme": "binary"}
+    expected = [fact.format(tmp_path) for fact in facts]
+    assert refusal({"brains": [brain]}, folder=tmp_path) == Facts("brains[0].labels:", *expected)
+
+
+def test_a_folder_of_an_atlas_is_not_made_of_a_variable_or_an_address():
+    for folder in ("$HOME/atlas", "file:///atlas"):
+        section = {"name": "spina-bifida", "folder": folder}
+        assert refusal(study(atlas=section)) == Facts("atlas.folder:", folder)
+
+
 @pytest.mark.fault(28, 29)
 @pytest.mark.parametrize(
     ("folding", "key", "facts"),
