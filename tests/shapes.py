@@ -70,12 +70,15 @@ def uneven(ball: TriangleMesh, ratio: float = 5.0) -> TriangleMesh:
 
     The map is conformal, so triangles keep their angles. A mean over vertices is not one over the area.
     """
-    radius = np.linalg.norm(ball.vertices, axis=1, keepdims=True)
-    x, y, z = (ball.vertices / radius).T
-    # stereographic coordinates from the bottom, which a factor draws to the top
-    flat = np.stack([x, y], axis=1) / np.maximum(1.0 + z, 1e-9)[:, None] / np.sqrt(ratio)
-    square = (flat**2).sum(axis=1)[:, None]
-    return TriangleMesh(radius * np.hstack([2.0 * flat, 1.0 - square]) / (1.0 + square), ball.faces)
+    radius = np.linalg.norm(ball.vertices, axis=1)
+    x, y, z = (ball.vertices / radius[:, None]).T
+    # half the angle from the top, whose tangent is the distance in stereographic coordinates
+    half_angle = np.arccos(np.clip(z, -1.0, 1.0)) / 2
+    polar = 2 * np.arctan2(np.sin(half_angle), np.sqrt(ratio) * np.cos(half_angle))
+    azimuth = np.arctan2(y, x)
+    flat = np.sin(polar)
+    directions = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
+    return TriangleMesh(radius[:, None] * directions, ball.faces)
 
 
 @cache
