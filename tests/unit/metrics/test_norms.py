@@ -24,7 +24,14 @@ from gyriflow.metrics.norms import (
     published_scores,
     volume_tables,
 )
-from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
+from gyriflow.metrics.tables import (
+    asymmetry,
+    change_between_scans,
+    described_columns,
+    long_table,
+    weekly_norms,
+    wide_table,
+)
 from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 from gyriflow.study.checks import norm_settings
 from gyriflow.study.loading import load
@@ -485,6 +492,14 @@ def test_wide_has_a_row_per_brain_and_week() -> None:
     assert list(known.columns[:3]) == ["run", "week", "sex"]
     assert known.loc["other", "sex"] == "F"
     assert known["run"].isin(table["run"]).all()
+
+
+def test_columns_are_described_by_side_region_and_unit() -> None:
+    columns = described_columns(long_table([METRICS, REGIONS]))
+    assert columns["left_frontal_area_cm2"] == (Facts("region frontal", "left hemisphere"), "cm2")
+    assert columns["whole_area_cm2"] == (Facts("both hemispheres"), "cm2")
+    assert "region" not in columns["left_mean_curvedness_1_per_mm"][0]
+    assert columns["left_mean_curvedness_1_per_mm"][1] == "1/mm"
 
 
 def test_asymmetry_of_sides() -> None:
