@@ -19,6 +19,8 @@ HALF_AXES = np.array([11.0, 24.0, 16.0])
 
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 """The motion from LPS to RAS coordinates, and back."""
+LONG_MM = (0.5, 0.7, 1.0)
+"""Edges of a voxel that is no cube."""
 PAD = 4
 
 
@@ -28,6 +30,10 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
     matrix[:3, :3] = Rotation.from_euler("xyz", degrees or (0.0, 0.0, 0.0), degrees=True).as_matrix()
     matrix[:3, 3] = shift
     return matrix
+
+
+FAR = rigid(0.0, 0.0, 30.0, shift=(200.0, -180.0, 130.0)), rigid(25.0, 0.0, -30.0, shift=(-150.0, 220.0, 140.0))
+"""Two poses, each 300 mm from the origin and turned by 30 degrees or more, so that none stands for the other."""
 
 
 def scaling(factors, shift=0.0) -> np.ndarray:
@@ -57,6 +63,22 @@ def ellipsoid(half_axes, subdivisions: int = 4, centre=(0.0, 0.0, 0.0)) -> Trian
     """Return an icosphere drawn out to semi-axes in mm."""
     vertices, faces = _icosphere(subdivisions)
     return TriangleMesh(vertices * np.asarray(half_axes) + np.asarray(centre), faces)
+
+
+def uneven(ball: TriangleMesh, ratio: float = 5.0) -> TriangleMesh:
+    """Return a sphere around the origin, its triangles at the bottom wider than those at the top by a ratio.
+
+    The map is conformal, so triangles keep their angles. A mean over vertices is not one over the area.
+    """
+    radius = np.linalg.norm(ball.vertices, axis=1)
+    x, y, z = (ball.vertices / radius[:, None]).T
+    # half the angle from the top, whose tangent is the distance in stereographic coordinates
+    half_angle = np.arccos(np.clip(z, -1.0, 1.0)) / 2
+    polar = 2 * np.arctan2(np.sin(half_angle), np.sqrt(ratio) * np.cos(half_angle))
+    azimuth = np.arctan2(y, x)
+    flat = np.sin(polar)
+    directions = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(polar)], axis=1)
+    return TriangleMesh(radius[:, None] * directions, ball.faces)
 
 
 @cache

@@ -58,7 +58,7 @@ def test_the_optimum_is_found():
     assert best["score"].iloc[0] == pytest.approx(0.1, abs=0.02)
 
 
-def folded(thickness: float, **flags: bool) -> pd.DataFrame:
+def folded(thickness: float) -> pd.DataFrame:
     """Return made spectra of folds whose wavelength is 6 thicknesses, in bands of a brain with λ1 = (2π/128 mm)²."""
     bands = np.arange(1, 7)
     power = np.exp(-((np.log2(128 / (6 * thickness)) - bands + 0.5) ** 2))
@@ -66,7 +66,7 @@ def folded(thickness: float, **flags: bool) -> pd.DataFrame:
     table = table.assign(wavelength_min_mm=128 / 2.0**bands, wavelength_max_mm=256 / 2.0**bands, is_open=False)
     octaves = np.arange(0.5, 16 * 6).reshape(6, 16) / 16
     table[PART_POWERS] = np.exp(-((np.log2(128 / (6 * thickness)) - octaves) ** 2))
-    return table.assign(hemisphere="left", proxy="mean_curvature", **({"complete": True, "resolved": True} | flags))
+    return table.assign(hemisphere="left", proxy="mean_curvature", complete=True, resolved=True)
 
 
 @pytest.mark.parametrize("name", ["relative_power_b5", "spectral_distance"])
@@ -105,19 +105,34 @@ def test_sides_that_differ_in_opposite_directions_do_not_cancel():
     assert spectral_scores(brain(0.4, 0.25), brain(0.3, 0.3))["relative_power_b4"] == pytest.approx(0.075)
 
 
+def test_a_spectral_distance_reaches_to_the_last_complete_band():
+    one, other = folded(1.7), folded(1.7)
+    last = other["band"] == 6
+    other.loc[last, ["power", "relative_power", *PART_POWERS]] *= 1.5
+    assert spectral_scores(one, other)["spectral_distance"] > 0.01
+
+
 @pytest.mark.fault(86)
+@pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize(
-    ("flags", "name", "remedy"),
+    ("flag", "band", "name", "remedy"),
     [
-        ({"resolved": False}, "relative_power_b5", "metrics.curvature_radius_mm"),
-        ({"resolved": False}, "spectral_distance", "metrics.curvature_radius_mm"),
-        ({"complete": False}, "relative_power_b6", "metrics.spangy_modes: B6"),
+        ("resolved", 5, "relative_power_b5", "metrics.curvature_radius_mm"),
+        ("resolved", 4, "spectral_distance", "metrics.curvature_radius_mm"),
+        ("resolved", 6, "spectral_distance", "metrics.curvature_radius_mm"),
+        ("complete", 6, "relative_power_b6", "metrics.spangy_modes: B6"),
+        ("complete", 5, "spectral_distance", "metrics.spangy_modes: B5"),
     ],
 )
-def test_scores_of_bands_that_are_cut_off_or_not_resolved_are_refused(flags, name, remedy):
-    require_bands(folded(1.7), [name, "size"])
-    with pytest.raises(InputError, check=Facts("spectra.csv", name, "mm", remedy)):
-        require_bands(folded(1.7, **flags), [name, "size"], "spectra.csv")
+def test_scores_of_a_band_that_is_cut_off_or_not_resolved_on_a_side_are_refused(side, flag, band, name, remedy):
+    spectra = pd.concat([folded(1.7).assign(hemisphere=each) for each in ("left", "right")], ignore_index=True)
+    require_bands(spectra, [name, "size"])
+    at = (spectra["hemisphere"] == side) & (spectra["band"] == band)
+    spectra.loc[at, flag] = False
+    with pytest.raises(InputError, check=Facts("spectra.csv", name, f"B{band}", "mm", remedy)):
+        require_bands(spectra, [name, "size"], "spectra.csv")
+    # another score does not need this band
+    require_bands(spectra, [f"relative_power_b{4 if band != 4 else 5}", "size"])
 
 
 def test_a_diverged_run_keeps_others_away():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import ellipsoid, rigid, sphere
+from shapes import ellipsoid, rigid, sphere, uneven
 
 from gyriflow.compare.comparison import (
     GROUPS,
@@ -128,7 +128,7 @@ def raised(ball):
 
 
 def test_distances_are_weighted_by_area():
-    ball = sphere(10.0)
+    ball = uneven(sphere(10.0))
     found = surface_distances(pairwise_distances(raised(ball), ball))
     assert found["distance_mm"] == pytest.approx(0.1, abs=0.05)
     assert found["distance95_mm"] == pytest.approx(1.0, abs=0.15)
@@ -147,11 +147,16 @@ def test_vertices_of_the_even_surface_are_measured_instead_of_the_observed_ones(
 
 
 def test_each_side_of_the_middle_has_its_distance():
-    ball = sphere(10.0)
-    # waves on the right only
-    right = np.where(ball.vertices[:, 0] > 0, 1 + 0.05 * np.cos(np.arctan2(*ball.vertices[:, 1:].T) * 8), 1.0)
-    found = surface_distances(pairwise_distances(TriangleMesh(ball.vertices * right[:, None], ball.faces), ball))
-    assert found["distance_right_mm"] > 5 * found["distance_left_mm"]
+    ball = uneven(sphere(10.0, 5))
+    x, _, z = ball.vertices.T
+    # half a millimetre on the lower right, a tenth on the lower left; the triangles below are the wide ones
+    raised_mm = np.where(z < 0, np.where(x > 0, 0.5, 0.1), 0.0)
+    larger = TriangleMesh(ball.vertices * (1 + raised_mm / 10)[:, None], ball.faces)
+    found = surface_distances(pairwise_distances(larger, ball))
+    for side, mm in (("right", 0.5), ("left", 0.1)):
+        # of the larger surface, and of the ball
+        shares = (1 + mm / 10) ** 2 / (1 + (1 + mm / 10) ** 2), 0.5
+        assert found[f"distance_{side}_mm"] == pytest.approx(mm * np.mean(shares), rel=0.12)
     assert found["distance_mm"] == pytest.approx((found["distance_left_mm"] + found["distance_right_mm"]) / 2, rel=0.05)
     half = TriangleMesh(ball.vertices + [20.0, 0, 0], ball.faces)
     assert np.isnan(surface_distances(pairwise_distances(half, half))["distance_left_mm"])

@@ -3,10 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
-from shapes import moved, sphere
+from scripts import run_script
+from shapes import FAR, moved, sphere
 
 from gyriflow.compare.deviation import deviation_maps, deviation_scores, deviation_table, thickness_difference
-from gyriflow.geometry.triangles import TriangleMesh, merged
+from gyriflow.geometry.triangles import TriangleMesh, merged, transformed
+from gyriflow.io.files import read_table
+from gyriflow.io.surfaces import read_vertex_maps, write_surface, write_vertex_maps
 
 BALL = sphere(20.0)
 
@@ -100,3 +103,27 @@ def test_a_deviation_is_scored_among_the_other_brains_of_its_run_and_place():
     assert (scores["brains"] == 11).all()
     averages = deviation_scores(pd.concat(tables, ignore_index=True), individuals=False)
     assert averages["centile"].isna().all()
+
+
+def test_the_script_takes_each_surface_with_its_own_thickness(tmp_path):
+    """The observed brain is in another pose, and a millimetre larger than expected; no two thicknesses are equal."""
+    brains = {
+        "start": (sphere(19.5, 3), 2.0),
+        "first": (BALL, 1.0),
+        "expected": (sphere(22.0), 1.5),
+        "real": (transformed(sphere(23.0), FAR[0]), 2.7),
+    }
+    inputs = {"thickness": [f"{name}.shape.gii" for name in brains], "regions": []}
+    for name, (mesh, thickness_mm) in brains.items():
+        write_surface(tmp_path / f"{name}.gii", mesh)
+        values = np.full(len(mesh.vertices), thickness_mm)
+        write_vertex_maps(tmp_path / f"{name}.shape.gii", {"thickness_mm": values})
+        inputs[name] = f"{name}.gii"
+    inputs["sides"] = ["expected.gii"]
+    params = {"sides": ["left"], "labels": {"run": "r", "subject": "b", "week": 24.0}}
+    run_script("deviation.py", tmp_path, inputs, {"maps": "maps.gii", "table": "table.csv"}, params)
+    maps = read_vertex_maps(tmp_path / "maps.gii")
+    assert maps["distance_mm"] == pytest.approx(1.0, abs=0.05)
+    assert maps["thickness_difference_mm"] == pytest.approx(2.7 - 2.0 * 1.5 / 1.0, abs=1e-3)
+    table = read_table(tmp_path / "table.csv").set_index(["hemisphere", "metric"])["value"]
+    assert table["left", "distance"] == pytest.approx(1.0, abs=0.05)

@@ -1,11 +1,13 @@
 """Distances of runs from observed brains, the nearest run, and verdicts on the results of the paper."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from facts import Facts
+from scripts import run_script
 from shapes import sphere
 
 from gyriflow.compare.published import (
@@ -23,6 +25,7 @@ from gyriflow.compare.published import (
     replication_table,
 )
 from gyriflow.compare.sweeps import (
+    COEFFICIENTS,
     COMPARISON_COLUMNS,
     NO_NEAREST,
     WITHIN_NOISE,
@@ -34,6 +37,8 @@ from gyriflow.compare.sweeps import (
 )
 from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.triangles import merged, transformed
+from gyriflow.io.files import read_table, write_table
+from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.spangy import PART_POWERS
 from gyriflow.settings.stages import CostSettings
@@ -103,6 +108,31 @@ def test_a_band_that_one_of_both_has_not_in_full_is_cut_off():
     (row,) = table[table["measure"] == "relative_power_B4"].to_dict("records")
     assert row["flag"] == "cut off"
     assert np.isnan([row["value"], row["observed_value"], row["distance"]]).all()
+
+
+def test_the_script_compares_each_part_with_that_of_each_observed_brain(tmp_path):
+    """Parts of unequal size of two observed brains, a millimetre and three larger than the simulated one."""
+    radii = {"sim": 10.0, "b": 11.0, "c": 13.0}
+    for name, radius in radii.items():
+        for part, surface in parts(radius).items():
+            write_surface(tmp_path / f"{name}.{part}.gii", surface)
+    tables = [spectra("sim", "a", (0.5, 0.2, 0.1)), *(spectra("real", b, (0.4, 0.3, 0.1)) for b in "bc")]
+    both = pd.concat(tables)
+    write_table(tmp_path / "spectra.csv", with_parts(both.assign(power=both["relative_power"])))
+    write_table(tmp_path / "metrics.csv", METRICS)
+    write_table(tmp_path / "modes.csv", pd.DataFrame(columns=COEFFICIENTS))
+    files = {name: [f"{name}.{part}.gii" for part in ("whole", "left")] for name in radii}
+    inputs = {"metrics": ["metrics.csv"], "spectra": ["spectra.csv"], "coefficients": ["modes.csv"]}
+    inputs |= {"simulated": files["sim"], "measured": [*files["b"], *files["c"]]}
+    params = {"parts": ["whole", "left"], "real": {"b": "one", "c": "two"}, "population": "two"}
+    outputs = {"table": "table.csv", "coefficients": "found.csv"}
+    wildcards = SimpleNamespace(run="sim", brain="a")
+    run_script("compare_member.py", tmp_path, inputs, outputs, params, wildcards=wildcards)
+    table = read_table(tmp_path / "table.csv")
+    assert table.groupby("observed")["same_population"].all().to_dict() == {"b": False, "c": True}
+    found = table[table["measure"] == "surface_distance"].set_index(["observed", "hemisphere"])["distance"]
+    expected = {("b", "whole"): 1.0, ("b", "left"): 0.5, ("c", "whole"): 3.0, ("c", "left"): 1.5}
+    assert found.to_dict() == pytest.approx(expected, abs=0.05)
 
 
 def test_a_run_is_compared_with_each_observed_brain_and_its_population_is_named():

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from ellipsoid import GAP_MM, RUN, SEMI_AXES
 from facts import Facts
-from shapes import ellipsoid_mesh, rigid
+from shapes import box_mesh, ellipsoid_mesh, rigid
 
 from gyriflow.errors import SolverError
 from gyriflow.folding.growth import GrowthInputs, Size, StepStart
 from gyriflow.folding.growth_models import growth_model
-from gyriflow.folding.output import growth_components
+from gyriflow.folding.output import growth_components, log_growth_at_vertices
 from gyriflow.folding.steering import SteeredStep, blended, free_growth, missed_curves, steered_rates
-from gyriflow.folding.stretches import packed
+from gyriflow.folding.stretches import packed, unpacked
 from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.tetrahedra import quadratic
 from gyriflow.settings.folding import parameters_from
 from gyriflow.units import CM2_PER_MM2, ML_PER_MM3, SECONDS_PER_GW
 
@@ -117,3 +118,19 @@ def test_growth_in_any_direction_is_shown_along_the_surface_across_it_and_by_its
     directions = found["growth_direction_per_step"]
     directions = directions * np.sign((directions * [[0, 1, 0], turn[:, 1]]).sum(axis=1))[:, None]
     assert directions == pytest.approx(0.03 * np.stack([[0.0, 1.0, 0.0], turn[:, 1]]))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_map_of_growth_is_where_the_elements_have_grown(order):
+    # elements of unequal size: those above grow by a fifth along x, those below do not
+    mesh = box_mesh((4, 5, 8), (8.0, 10.0, 16.0))
+    mesh = mesh if order == 1 else quadratic(mesh)
+    p = parameters_from(RUN | GROWING)
+    inputs = GrowthInputs(mesh, zones_of_run(mesh, p, GAP_MM), {})
+    is_above = mesh.vertices[mesh.corners][:, :, 2].mean(axis=1) > 0
+    growth = np.where(is_above[:, None, None], np.diag([1.2, 1.0, 1.0]), np.eye(3))
+    logs = unpacked(log_growth_at_vertices(mesh.vertices, inputs, growth))
+    z = mesh.vertices[:, 2]
+    for is_there, expected in ((z > 3.0, math.log(1.2)), (z < -3.0, 0.0)):
+        assert logs[is_there, 0, 0] == pytest.approx(np.full(is_there.sum(), expected), abs=0.01)
+    assert np.abs(logs - logs[:, :1, :1] * np.diag([1, 0, 0])).max() < 1e-9

@@ -147,16 +147,17 @@ def test_a_mask_is_the_inside_even_where_lines_of_voxels_meet_vertices_and_edges
         np.testing.assert_array_equal(mask.ravel()[clear] > 0, winding[clear] > 0.5)
 
 
-def test_labels_of_a_layer_below_a_surface():
-    """A ball of 10 mm with a layer of 2 mm above and 4 mm below, in a turned grid that does not hold all of it."""
+@pytest.mark.parametrize("low", [0.25, -12.0])
+def test_labels_of_a_layer_below_a_surface(low):
+    """A ball of 10 mm with a layer of 2 mm above and 4 mm below, in a turned grid that holds half of it."""
     ball = sphere(10.0)
     thickness = np.where(ball.vertices[:, 2] > 0, 2.0, 4.0)
-    affine = np.array([[0.0, -0.5, 0, 12], [-0.5, 0, 0, 12], [0, 0, 0.5, -12], [0, 0, 0, 1]])
+    affine = np.array([[0.0, 0.5, 0, low], [-0.5, 0, 0, 12], [0, 0, 0.5, -12], [0, 0, 0, 1]])
     labels = layer_labels(ball, thickness, (49, 24, 49), affine)
     places = transform_points(np.argwhere(labels >= 0), affine)
     radius = np.linalg.norm(places, axis=1).reshape(labels.shape)
     up = places[:, 2].reshape(labels.shape)
-    assert places[:, 0].min() > 0
+    assert np.abs(np.sign(places[:, 0]).sum()) == len(places)
     clear = (np.abs(radius - 10) > 0.3) & (np.abs(up) > 2)
     inner = np.where(up > 0, 8, 6)
     clear &= np.abs(radius - inner) > 0.3

@@ -90,10 +90,10 @@ def test_an_element_inverted_in_the_middle_of_a_straight_way_is_found():
     after = before * [-1, -1, 1]
     assert volumes_between(after, tet) > 0
     assert inverted_on_the_way(before, after, tet).tolist() == [True]
-    # a third of a turn stays valid, with a negative Bernstein coefficient or not
-    c, s = np.cos(1.0), np.sin(1.0)
-    third = before @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    assert inverted_on_the_way(before, third, tet).tolist() == [False]
+    # less than half a turn stays valid: with positive Bernstein coefficients, and with a negative one
+    for degrees in (60, 150):
+        turned_part = transform_points(before, rigid(0, 0, degrees))
+        assert inverted_on_the_way(before, turned_part, tet).tolist() == [False]
     assert inverted_on_the_way(before, before * [1, 1, -1], tet).tolist() == [True]
     assert inverted_on_the_way(before, before * [0.1, 0.1, 0.1], tet).tolist() == [False]
 

@@ -307,15 +307,18 @@ def test_an_atlas_resampled_by_size_has_the_volumes_of_its_curve_as_multiples_of
 
 @pytest.fixture(scope="module")
 def prediction():
-    """Return a function that predicts a ball 5 % larger than the atlas at 22.3 GW, to an end week."""
+    """Return a function that predicts a ball 5 % larger than the atlas at 22.3 GW, to an end week.
+
+    The ball may be called that of another week.
+    """
     path = path_of([21.0, 22.0, 23.0, 24.0, 25.0, 26.0], uneven)
     start = TetrahedralMesh(1.05 * uneven(BALL.vertices, 22.3), BALL.tets)
     turn = rigid(0, 0, -12)
     turn[:3, :3] /= 1.05
     pair = Deformation(turn, np.zeros((13, 13, 13, 3)), scaling(10.0, -60.0))
 
-    def predict(end_week, **options):
-        return start, predict_shapes(start, 22.3, end_week, path, pair, 22.0, ElasticFit, **options)
+    def predict(end_week, start_week=22.3, **options):
+        return start, predict_shapes(start, start_week, end_week, path, pair, 22.0, ElasticFit, **options)
 
     return predict
 
@@ -331,6 +334,13 @@ def test_a_prediction_at_a_week_does_not_depend_on_where_it_ends_or_on_what_else
     places = [found.positions[found.weeks.index(23.4)] for found in (first, second)]
     assert places[0] == pytest.approx(places[1], abs=1e-9)
     assert first.between == [23.4]
+
+
+def test_a_brain_that_is_older_than_stated_grows_as_one_of_that_age(prediction):
+    _, shifted = prediction(24.0, age_shift_gw=0.5)
+    _, older = prediction(24.5, start_week=22.8)
+    assert np.array(shifted.shapes.weeks) + 0.5 == pytest.approx(older.shapes.weeks)
+    assert shifted.shapes.positions == pytest.approx(older.shapes.positions, abs=1e-6)
 
 
 def test_a_brain_larger_than_the_atlas_grows_as_the_atlas_and_stays_larger(prediction):

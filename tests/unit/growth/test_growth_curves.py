@@ -49,6 +49,37 @@ def test_a_week_that_leaps_does_not_leap(leaping, factor):
     assert table.loc[21.0 + leaping, "error"] == pytest.approx(1 / factor - 1, abs=0.05)
 
 
+SCATTERED = VOLUMES * np.exp(0.01 * np.random.default_rng(5).normal(size=10))
+
+
+def test_a_week_without_weight_counts_neither_for_the_curve_nor_for_its_error():
+    leaping = SCATTERED.copy()
+    leaping[4] *= 1.5
+    fit, without = fitted(WEEKS, leaping), fitted(np.delete(WEEKS, 4), np.delete(SCATTERED, 4))
+    assert fit.weights[4] == 0
+    for found, expected in zip(interval(fit.curve, WEEKS), interval(without.curve, WEEKS), strict=True):
+        assert found == pytest.approx(expected, rel=0.005)
+    at = fit.curve.weeks
+    assert fit.curve.sd == pytest.approx(np.interp(at, without.curve.weeks, without.curve.sd), rel=0.05)
+
+
+def test_the_first_week_is_kept_where_all_growth_refers_to_it(caplog):
+    leaping = SCATTERED * np.where(WEEKS == 21, 1.5, 1.0)
+    assert value(fitted(WEEKS, leaping).curve, 21.0) < 1.05 * VOLUMES[0]
+    assert caplog.messages == [Facts("curve", 21)]
+    caplog.clear()
+    fit = fitted(WEEKS, leaping, keeps_first=True)
+    assert (fit.weights[0], value(fit.curve, 21.0) > 1.2 * VOLUMES[0]) == (1, True)
+    assert caplog.messages == []
+
+
+def test_a_small_scatter_is_no_outlier_and_few_weeks_show_none():
+    nearly = VOLUMES * np.where(WEEKS == 25, 1.004, 1.0)
+    assert fitted(WEEKS, nearly).weights.min() > 0.8
+    leaping = VOLUMES * np.where(WEEKS == 24, 1.3, 1.0)
+    assert fitted(WEEKS[:7], leaping[:7]).weights == pytest.approx(np.ones(7))
+
+
 def test_it_is_monotone_where_weeks_are_not():
     measured = [50.0, 60.0, 70.0, 64.0, 63.0, 75.0, 90.0]
     fit, free = (fitted(WEEKS[:7], measured, degrees_of_freedom=6, may_shrink=shrinks) for shrinks in (False, True))
@@ -116,9 +147,13 @@ def test_tables_go_through_their_values_and_are_written_out():
 
 # curves for runs that follow sizes
 
+TWICE = np.sort([*WEEKS, 23.0, 27.0])
+"""The weeks of brains of which two are of one week, and larger and smaller than the curve."""
+SIZE = np.select([np.diff(TWICE, append=99) == 0, np.diff(TWICE, prepend=0) == 0], [1 / 1.02, 1.02], 1.0)
 AREAS = pd.DataFrame(
-    {"series": "volume", "week": WEEKS, "area_cm2": 90 * 1.1 ** (WEEKS - 21), "volume_ml": 46 * 1.2 ** (WEEKS - 21)}
+    {"series": "volume", "week": TWICE, "area_cm2": 90 * 1.1 ** (TWICE - 21), "volume_ml": 46 * 1.2 ** (TWICE - 21)}
 ).assign(thickness_mm=np.nan)
+AREAS[["area_cm2", "volume_ml"]] *= SIZE[:, None]
 MEASURED = {"area_cm2": "measured", "volume_ml": "measured", "thickness_mm": None}
 
 
@@ -171,7 +206,7 @@ def test_a_given_table_shrinks_only_where_that_is_allowed():
 def test_parameters_of_a_run_have_the_sizes_that_it_follows_and_the_shapes_that_it_grows_towards():
     weeks, surface = [21.0, 22.0], {"fissure_x_mm": 0.5, "side": "left"}
     settings = {"growth": MEASURED | {"thickness_mm": "measured"}, "thickness_mm": 1.5, "end_week": 22.0}
-    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (WEEKS - 21)))
+    table = curves(AREAS.assign(thickness_mm=2.4 - 0.1 * (TWICE - 21)))
     found = run_parameters(settings, weeks, surface, {}, [], table, "volume")
     assert {name: found[name] for name in ("start_week", "output_weeks", "fissure_x_mm", "side", "end_week")} == {
         **{"start_week": 21.0, "output_weeks": weeks, "fissure_x_mm": 0.5, "side": "left", "end_week": 22.0}
@@ -205,27 +240,25 @@ def test_compound_rates_multiply_up_to_the_ratios(weeks: float) -> None:
     assert row["core_rate_per_s"] > row["core_compound_rate_per_s"]
 
 
-def brains(series: str, areas_cm2: dict[float, float], volumes_ml: dict[float, float]) -> pd.DataFrame:
-    """Return areas and volumes by week as the workflow's table has them."""
-    columns = {"week": list(areas_cm2), "area_cm2": list(areas_cm2.values()), "volume_ml": list(volumes_ml.values())}
-    return pd.DataFrame({"series": series, "subject": "brain", **columns})
+def brains(series: str, rows: list[tuple[float, float, float, float]]) -> pd.DataFrame:
+    """Return brains as the workflow's table has them: of each its week, area, volume and volume of tissue."""
+    table = pd.DataFrame(rows, columns=["week", "area_cm2", "volume_ml", "tissue_ml"])
+    return table.assign(series=series, subject="brain")
 
 
 def test_each_series_has_rates_of_its_own_and_brains_of_one_week_are_their_mean() -> None:
     # in any order
-    surface = brains("surface", {22: 121.0, 21: 100.0}, {22: 1331.0, 21: 1000.0})
-    volume = pd.concat(
-        [
-            brains("volume", {21: 90.0, 23: 144.0}, {21: 1000.0, 23: 1728.0}),
-            brains("volume", {21: 110.0}, {21: 1000.0}),
-        ]
-    )
+    surface = brains("surface", [(22, 121.0, 1331.0, 1200.0), (21, 100.0, 1000.0, 800.0)])
+    # two brains of one week, larger and smaller than their mean
+    volume = brains("volume", [(21, 90.0, 1100.0, 480.0), (23, 144.0, 1728.0, 550.0), (21, 110.0, 900.0, 400.0)])
     areas = pd.concat([surface, volume, surface.assign(series="cross-section")])
     table = rates_of_series(areas, ["surface", "volume"])
     assert table["series"].tolist() == ["surface", "volume"]
     np.testing.assert_allclose(table["rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
     np.testing.assert_allclose(table["core_rate_per_s"], [0.1 / WEEK_S, 0.1 / WEEK_S])
     np.testing.assert_allclose(table[["area_ratio", "volume_ratio"]], [[1.1**2, 1.1**3], [1.2**2, 1.2**3]])
+    np.testing.assert_allclose(table["tissue_ratio"], [1.5, 1.25])
+    np.testing.assert_allclose(table["tissue_compound_rate_per_s"], np.log([1.5, 1.25]) / (3 * WEEK_S) / [1, 2])
     assert table["to_week"].tolist() == [22, 23]
 
 

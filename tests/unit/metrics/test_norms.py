@@ -25,7 +25,14 @@ from gyriflow.metrics.norms import (
     published_scores,
     volume_tables,
 )
-from gyriflow.metrics.tables import asymmetry, change_between_scans, long_table, weekly_norms, wide_table
+from gyriflow.metrics.tables import (
+    asymmetry,
+    change_between_scans,
+    described_columns,
+    long_table,
+    weekly_norms,
+    wide_table,
+)
 from gyriflow.settings.terms import SIDES, SPREAD_UNKNOWN
 from gyriflow.study.checks import norm_settings
 from gyriflow.study.loading import load
@@ -505,6 +512,14 @@ def test_regions_of_one_column_are_refused_with_both_names(first, second) -> Non
     table = pd.DataFrame(rows).assign(value=[1.0, 2.0], unit="1")
     with pytest.raises(InputError, check=Facts(repr(first[0]), repr(second[0]))):
         wide_table(table, {})
+
+
+def test_columns_are_described_by_side_region_and_unit() -> None:
+    columns = described_columns(long_table([METRICS, REGIONS]))
+    assert columns["left_frontal_area_cm2"] == (Facts("region frontal", "left hemisphere"), "cm2")
+    assert columns["whole_area_cm2"] == (Facts("both hemispheres"), "cm2")
+    assert "region" not in columns["left_mean_curvedness_1_per_mm"][0]
+    assert columns["left_mean_curvedness_1_per_mm"][1] == "1/mm"
 
 
 def test_asymmetry_of_sides() -> None:

@@ -1,13 +1,18 @@
 """The names of kept paths: another one for everything that a path is made from, the same for everything else."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from configurations import touched, write_atlas
 
 from gyriflow.code_hash import code_hash
 from gyriflow.io.origins import origin_key
+from gyriflow.io.registrations import WeeklyShapes, stored_name, write_weekly_shapes
 from gyriflow.running import path_store
 from gyriflow.study import resolve
 from gyriflow.study.loading import load
+from gyriflow.study.paths import ATLAS_PATH
 
 WEEKS = (21, 22, 23)
 FILES = ("w{week}.nii.gz", "t2-{week}.nii.gz", "pial-{week}.surf.gii", "white-{week}.surf.gii")
@@ -18,11 +23,11 @@ SCHEME = {"cerebrum": [1, 2, 5], "cortex": [5], "white_matter": [1]}
 
 
 @pytest.fixture
-def keys(tmp_path):
-    """Return a function: the key of the path of an atlas, after changes of its series, the study and its files."""
+def paths(tmp_path):
+    """Return a function: a study and its atlas' path, after changes of the atlas' series, the study and its files."""
     touched(tmp_path, "mine.nii.gz", *(name.format(week=week) for week in WEEKS for name in FILES))
 
-    def key(series=LABELS, changed=None, start=None, atlas=None, missing=(), **settings):
+    def path(series=LABELS, start=None, atlas=None, **settings):
         write_atlas(tmp_path, series, folder=".")
         config = {
             "brains": [START | {"labels": str(tmp_path / "mine.nii.gz")} | (start or {})],
@@ -31,12 +36,50 @@ def keys(tmp_path):
             "folding": {"preset": "expected", "end_week": 22},
         }
         study = resolve(load(config | settings, tmp_path))
-        contents = {str(path): path.name for path in tmp_path.iterdir() if path.name not in missing}
+        return study, study.chains["start", "atlas"].path
+
+    return path
+
+
+@pytest.fixture
+def keys(paths, tmp_path):
+    """Return a function: the key of the path of an atlas, after changes; some files are changed or missing."""
+
+    def key(*series, changed=None, missing=(), **changes):
+        study, path = paths(*series, **changes)
+        contents = {str(file): file.name for file in tmp_path.iterdir() if file.name not in missing}
         contents |= {str(tmp_path / name): "other" for name in changed or ()}
-        path = study.chains["start", "atlas"].path
         return origin_key(path_store.path_origin(study, path), contents)
 
     return key
+
+
+def test_a_path_is_kept_next_to_its_atlas_until_its_key_or_its_file_is_another(paths, tmp_path):
+    study, path = paths()
+    folder = path_store.store_folder(study, path)
+    assert folder == tmp_path / "paths"
+    store = folder / stored_name(path.brains[0].id, "key")
+    assert path_store.kept_path(study, path, "key") is None
+    folder.mkdir()
+    shapes = WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key")
+    write_weekly_shapes(store, shapes)
+    assert path_store.kept_path(study, path, "key") == store
+    assert path_store.kept_path(study, path, None) is None
+    # another path under this name, and a damaged file
+    write_weekly_shapes(store, replace(shapes, made_from="other"))
+    assert path_store.kept_path(study, path, "key") is None
+    store.write_bytes(b"torn")
+    assert path_store.kept_path(study, path, "key") is None
+
+
+def test_a_study_has_the_path_that_was_made_from_the_same(paths, tmp_path, monkeypatch):
+    _, path = paths()
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / ATLAS_PATH.format(brain=path.brains[0].id)
+    assert not path_store.has_path(path, "key")
+    file.parent.mkdir(parents=True)
+    write_weekly_shapes(file, WeeklyShapes(np.array([21.0, 22.0]), np.zeros((2, 4, 3)), made_from="key"))
+    assert [path_store.has_path(path, key) for key in ("key", "other", None)] == [True, False, False]
 
 
 def test_a_path_has_another_key_where_anything_differs_that_it_is_made_from(keys):

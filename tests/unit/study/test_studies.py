@@ -8,9 +8,11 @@ from configurations import LABELLED
 from facts import Facts
 
 from gyriflow.errors import InputError
+from gyriflow.settings.runs import PRESETS, Run
 from gyriflow.study import paths, resolve
 from gyriflow.study.loading import load
 from gyriflow.study.paths import STUDY, log_of
+from gyriflow.study.resolve import _equality_key
 
 ROOT = Path(__file__).parents[3]
 
@@ -62,6 +64,41 @@ def test_equal_runs_are_solved_once():
     # 1500 Pa is the reference, 3000 Pa stands in the other study too
     assert members(found, "stiffness") == ["stiffness-300", "reference", "thickness-1.5"]
     assert found.may_diverge == ["thickness-0.8", "thickness-1.5", "stiffness-300"]
+
+
+VALUES = {
+    "step_s": [21600, 86400],
+    "thickness_mm": [1.2, 1.5],
+    "shear_modulus_cortex_pa": [1000, 1500],
+    "shear_modulus_core_pa": [300, 400],
+    "material": ["neo-hookean", "compressible-neo-hookean"],
+    "poisson_ratio": [0.4, 0.45],
+    "growth_rate_per_s": [1e-7, 2e-7],
+    "radial_growth_rate_per_s": [0.0, 1e-8],
+    "core_growth_rate_per_s": [0.0, 1e-8],
+    "growth": ["rates", {"model": "sizes", "area_cm2": {21: 90, 30: 200}, "volume_ml": {21: 40, 30: 150}}],
+    "stress_memory_gw": [0.0, 1.0],
+    "relaxation": ["all", "shape"],
+    "support": ["ellipsoid", "free"],
+    "contact": [{"kind": "planes"}, {"kind": "none"}],
+    "no_growth": [{"kind": "ellipsoid"}, {"kind": "none"}],
+    "output_every_gw": [0.5, 1.0],
+    "solver": [{"newton_tolerance": 1e-4}, {"newton_tolerance": 1e-5}],
+    "start": ["a", "b"],
+}
+"""Two values of each key that changes the shapes of a run."""
+ALIKE = {"end_week", "preset", "fields", "ensemble", "ranks"}
+"""Keys that change no shape of a week that both runs have."""
+
+
+def test_runs_are_equal_only_where_no_key_that_changes_shapes_differs():
+    assert VALUES.keys() | ALIKE == Run.model_fields.keys()
+    run = RUNS["short"] | PRESETS["fetalfoldsim"]
+    for key, values in VALUES.items():
+        keys = {_equality_key(Run(**run | {key: value})) for value in values}
+        assert len(keys) == 2, key
+    alike = {"end_week": 23, "preset": "fetalfoldsim", "fields": [], "ranks": 4}
+    assert _equality_key(Run(**run | alike)) == _equality_key(Run(**run))
 
 
 def test_a_shared_run_goes_on_to_the_later_comparison_and_passes_the_earlier():
