@@ -3,6 +3,9 @@
     python3 -m venv plain && plain/bin/pip install .
     ./run python benchmarks/without_solver.py plain/bin/gyriflow --data ../shared/data --out FOLDER
 
+`--checkout` is the checkout whose ./run has the solver (default: this one). In 622a1dfd, the last commit with the tree
+of Debian's dolfinx 0.9, modes are computed by SLEPc.
+
 DATA holds `spina_bifida_atlas/week{21,34}_labels.nii.gz` and `hemispheres/fetal.week21.{left,right}.pial.surf.gii`.
 Each brain is a study of its own, measured on one core to the report. The last line is one JSON object: for each brain
 the CPU seconds of all processes, the memory of the largest one, and the largest relative difference of the results, as
@@ -59,9 +62,10 @@ def main() -> None:
     parser.add_argument("program", type=Path, help="gyriflow of a venv without the extra fold")
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--checkout", type=Path, default=ROOT)
     arguments = parser.parse_args()
     plain = [str(arguments.program.absolute())]
-    checkout = [str(ROOT / "run"), "gyriflow"]
+    checkout = [str(arguments.checkout.resolve() / "run"), "gyriflow"]
     rows = []
     is_equal = True
     for name, brain in studies(arguments.data.resolve()).items():
