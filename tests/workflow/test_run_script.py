@@ -215,7 +215,7 @@ def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp
     assert f"-m venv {venv}" in calls
     (installation,) = [line for line in calls if "pip install" in line]
     assert "--require-hashes" in installation
-    assert installation.endswith(f"-r {ROOT}/envs/requirements.txt")
+    assert installation.endswith(f"-r {ROOT}/envs/requirements.txt -r {ROOT}/envs/requirements-dev.txt")
 
 
 def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
