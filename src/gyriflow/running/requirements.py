@@ -50,6 +50,8 @@ def require_for(programs: Mapping[str, Path]) -> None:
     if compiles and not has_compiler():
         remedy = f"{_install(['gcc', 'libc6-dev'])}, or without root: pip install ziglang"
         raise InputError("simulations need a C compiler, and there is none", remedy=remedy)
+    if compiles and not has_python_headers():
+        raise InputError("simulations need Python.h, and there is none", remedy=_install(["python3-dev"]))
 
 
 def packages_behind(program: Path) -> list[str]:
@@ -85,12 +87,17 @@ def missing_libraries() -> list[str]:
     return lacking
 
 
+def has_python_headers() -> bool:
+    """Return whether C code can be compiled for this Python."""
+    return Path(sysconfig.get_path("include"), "Python.h").is_file()
+
+
 def missing_debian_packages() -> list[str]:
     """Return the Debian packages that this system lacks."""
     packages = [LIBRARIES[name] for name in missing_libraries()]
     if not has_compiler():
         packages += ["gcc", "libc6-dev"]
-    if not Path(sysconfig.get_path("include"), "Python.h").is_file():
+    if not has_python_headers():
         packages.append("python3-dev")
     return packages
 

@@ -60,6 +60,17 @@ def test_without_a_compiler_only_simulations_are_refused(monkeypatch, tmp_path):
         require_for({"simulate": requirements.SOLVER})
 
 
+def test_without_pythons_headers_only_simulations_are_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(requirements.sysconfig, "get_path", lambda name: str(tmp_path))
+    monkeypatch.setattr(requirements, "has_compiler", lambda: True)
+    monkeypatch.setattr(requirements, "is_installed", lambda name: True)
+    monkeypatch.setattr(requirements, "LIBRARIES", {})
+    require_for({"measure": SCRIPTS / "measure.py"})
+    with pytest.raises(InputError, check=Facts("Python.h", "apt-get install python3-dev")):
+        require_for({"simulate": requirements.SOLVER})
+    assert requirements.missing_debian_packages() == ["python3-dev"]
+
+
 def test_ziglang_serves_where_there_is_no_compiler(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
