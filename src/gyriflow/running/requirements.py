@@ -40,7 +40,8 @@ def require_for(programs: Mapping[str, Path]) -> None:
         package, rule = next(iter(missing.items()))
         remedy = 'Install the extra "fold": pip install "gyriflow[fold]"'
         if "dolfinx" in missing and not has_dolfinx_wheels():
-            remedy = f"PyPI has no dolfinx for this system: use conda, {CONDA}"
+            where = "in WSL, use" if sys.platform == "win32" else "use"
+            remedy = f"PyPI has no dolfinx with PETSc for this system: {where} conda, {CONDA}"
         problem = f"simulations and registrations need packages that are not installed ({', '.join(missing)})"
         raise InputError(problem, found=f"step {rule}, which imports {package}", remedy=remedy)
     lacking = missing_libraries()
@@ -70,8 +71,12 @@ def is_installed(package: str) -> bool:
 
 
 def has_dolfinx_wheels() -> bool:
-    """Return whether PyPI has dolfinx with PETSc for this system."""
-    return sys.platform == "linux" and platform.machine() == "x86_64"
+    """Return whether PyPI has dolfinx with PETSc for this system: Linux x86_64 with glibc 2.34 or later."""
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return False
+    library, version = platform.libc_ver()
+    numbers = re.findall(r"\d+", version)
+    return library == "glibc" and [int(number) for number in numbers[:2]] >= [2, 34]
 
 
 def missing_libraries() -> list[str]:

@@ -43,6 +43,24 @@ def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
         require_for({"simulate": requirements.SOLVER})
 
 
+def test_windows_is_sent_to_wsl(monkeypatch):
+    monkeypatch.setattr(requirements, "is_installed", lambda name: False)
+    monkeypatch.setattr(requirements.sys, "platform", "win32")
+    with pytest.raises(InputError, check=Facts("dolfinx", "WSL", "envs/gyriflow.yaml")):
+        require_for({"simulate": requirements.SOLVER})
+
+
+@pytest.mark.parametrize(
+    ("libc", "has_wheels"),
+    [(("glibc", "2.34"), True), (("glibc", "2.100"), True), (("glibc", "2.31"), False), (("", ""), False)],
+)
+def test_the_wheels_of_dolfinx_need_glibc_2_34(monkeypatch, libc, has_wheels):
+    monkeypatch.setattr(requirements.sys, "platform", "linux")
+    monkeypatch.setattr(requirements.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(requirements.platform, "libc_ver", lambda: libc)
+    assert requirements.has_dolfinx_wheels() is has_wheels
+
+
 def test_a_missing_library_is_named_with_its_package(monkeypatch):
     monkeypatch.setattr(requirements, "LIBRARIES", {"libnowhere.so.7": "libnowhere7"})
     with pytest.raises(InputError, check=Facts("libnowhere.so.7", "apt-get install libnowhere7")):
