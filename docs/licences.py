@@ -81,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--doc", type=Path, default=Path("/usr/share/doc"))
     folder = parser.parse_args().doc
-    text, _, _ = (ENVIRONMENT / "requirements.txt").read_text().partition("# development")
+    text = (ENVIRONMENT / "requirements.txt").read_text()
     direct = re.findall(r"^([\w.-]+)", text, re.MULTILINE)
     found: dict[str, metadata.Distribution] = {}
     for name in (*direct, "fenics-dolfinx", "petsc4py", "mpi4py"):

@@ -58,7 +58,7 @@ inside() {
     build run --isolation chroot --user 1000:1000 --volume "$work/study:/study" "$container" -- "$@"
 }
 inside gyriflow --version
-inside python -c 'import dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
+inside python -c 'import gyriflow.folding, dolfinx, pymeshlab, pytetwild, pyvista; print("dolfinx", dolfinx.__version__)'
 inside gyriflow /study/data /study/out participant --settings /study/settings.yaml --cores 2
 test -s "$work/study/out/sub-01/anat/sub-01_hemi-L_desc-referencegw2200_pial.surf.gii"
 echo "the image works"

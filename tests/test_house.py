@@ -199,11 +199,15 @@ def test_no_vague_names():
 
 
 def locked() -> dict[str, str]:
-    """Return the version of each package that is locked, all with hashes."""
-    text = (ROOT / "envs" / "requirements.txt").read_text()
-    found = dict(re.findall(r"^([\w.-]+)==([^ ]+).*?\\\n    --hash=sha256:", text, flags=re.MULTILINE))
-    assert len(found) == len(re.findall(r"^\w", text, flags=re.MULTILINE))
-    return found
+    """Return the version of each package that is locked, all with hashes, and the same in both files."""
+    versions: dict[str, str] = {}
+    for name in ("requirements.txt", "requirements-dev.txt"):
+        text = (ROOT / "envs" / name).read_text()
+        found = dict(re.findall(r"^([\w.-]+)==([^ ]+).*?\\\n    --hash=sha256:", text, flags=re.MULTILINE))
+        assert len(found) == len(re.findall(r"^\w", text, flags=re.MULTILINE))
+        assert found == found | {package: versions[package] for package in found.keys() & versions}
+        versions |= found
+    return versions
 
 
 def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():

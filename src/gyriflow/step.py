@@ -1,6 +1,7 @@
 """Run a step of the workflow: its log, short error messages, its exit code, and the time and memory that it took.
 
-`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code and exits with it.
+`python -m gyriflow.step CODE LOG` ends a failed shell step: it explains the exit code and exits with it, or with 5 for
+a bus error.
 """
 
 import logging
@@ -23,6 +24,13 @@ INTERRUPTED = 130
 KILLED = 137
 KILLED_MESSAGE = (
     "gyriflow: the program was killed, most probably because memory ran out; see the memory predicted above"
+)
+
+BUS_ERROR_CODES = (7, 135)
+"""Exit codes of mpiexec and of a shell for a program that a bus error stopped."""
+SHARED_MEMORY_MESSAGE = (
+    "gyriflow: the program was stopped by a bus error, most probably because /dev/shm is full: MPI needs 6 MB of it for"
+    " each rank. In a container: --shm-size 1g"
 )
 
 
@@ -125,10 +133,16 @@ def step(log: str, *inputs: str) -> Iterator[None]:
 
 
 def _end_shell_step(code: int, log: str) -> int:
+    message = ""
     if code == KILLED:
-        print(KILLED_MESSAGE, file=sys.stderr)
+        message = KILLED_MESSAGE
+    elif code in BUS_ERROR_CODES:
+        message = SHARED_MEMORY_MESSAGE
+        code = StorageError.exit_code
+    if message:
+        print(message, file=sys.stderr)
         with Path(log).open("a") as file:
-            file.write(KILLED_MESSAGE + "\n")
+            file.write(message + "\n")
     record_exit_code(code)
     return code
 

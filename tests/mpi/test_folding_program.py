@@ -1,9 +1,11 @@
 """The folding program as users start it: outputs, ranks, and how it ends."""
 
+import os
 import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -68,6 +70,34 @@ def test_a_run_leaves_every_file_and_nothing_else(tight_run):
 def test_default_tolerances_are_good_to_a_thousandth_of_a_millimetre(tight_run, default_run):
     one, other = (read_positions(out / "frames.h5", 21.5) for out in (tight_run, default_run[0]))
     assert np.linalg.norm(other - one, axis=1).max() <= 1e-3
+
+
+@pytest.mark.extended
+def test_ziglang_compiles_forms_and_c_code_where_there_is_no_compiler(mesh, tight_run, tmp_path):
+    packages = tmp_path / "packages"
+    install = [sys.executable, "-m", "pip", "install", "--quiet", "--target", packages, "ziglang"]
+    subprocess.run(install, check=True, timeout=600)
+    without_cc = {"PATH": str(Path(sys.executable).parent), "PYTHONPATH": f"{packages}:{os.environ['PYTHONPATH']}"}
+    without_cc |= {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment = {name: value for name, value in os.environ.items() if name != "CC"} | without_cc
+    program = command(mesh, tmp_path / "out", solver=TIGHT)
+    done = ran(*program, env=environment, timeout_s=900)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "cache" / "zig").is_dir()
+    expected = read_positions(tight_run / "frames.h5", 21.5)
+    np.testing.assert_allclose(read_positions(tmp_path / "out" / "frames.h5", 21.5), expected, atol=1e-5)
+
+
+def test_too_little_shared_memory_is_named(mesh, tmp_path):
+    on_small_disk = 'mount -t tmpfs -o size=1m tmpfs /dev/shm && exec "$@"'
+    mounted = ["unshare", "--map-root-user", "--mount", "sh", "-c", on_small_disk, "sh"]
+    done = ran(*mounted, *command(mesh, tmp_path / "out", 2))
+    if "unshare" in done.stderr:
+        pytest.skip("this machine allows no mounts")
+    log = tmp_path / "simulate.log"
+    ended = ran(sys.executable, "-m", "gyriflow.step", str(done.returncode), log)
+    assert ended.returncode == StorageError.exit_code
+    assert ended.stderr == log.read_text() == Facts("/dev/shm", "6 MB", "--shm-size")
 
 
 @pytest.mark.fault(30, 38)

@@ -4,6 +4,7 @@ import hashlib
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -130,6 +131,75 @@ def test_blas_is_an_optimised_one():
     assert "openblas" in loaded or "mkl" in loaded
 
 
+PETSC = """
+class ScalarType({scalar}): pass
+class Vec:
+    local_size = 2
+    def createMPI(self, size, comm): return self
+"""
+OPEN_MPI = "raise ImportError('libpetsc.so: undefined symbol: ompi_mpi_comm_world')"
+
+
+def write_solver(folder, petsc, dolfinx="0.11.0"):
+    """Write packages that stand in for dolfinx, mpi4py and petsc4py."""
+    modules = {"dolfinx": f"__version__ = {dolfinx!r}", "mpi4py/MPI": "COMM_SELF = None", "petsc4py/PETSc": petsc}
+    for name, code in modules.items():
+        module = folder / f"{name}.py"
+        module.parent.mkdir(parents=True, exist_ok=True)
+        module.write_text(code + "\n")
+
+
+@pytest.fixture
+def active(outside, tmp_path):
+    """Return variables of an active venv with stand-ins for the solver."""
+    folder = tmp_path / "active"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True, timeout=60)
+    for python in (folder / "bin").glob("python3*"):
+        # ./run would make its own environment by it
+        python.unlink()
+    (folder / "bin" / "python").unlink()
+    (folder / "bin" / "python").symlink_to(sys._base_executable)
+    write_program(folder / "bin", "tool", "#!/bin/sh\necho from the active environment\n")
+    write_solver(packages_of(folder), PETSC.format(scalar="float"))
+    return outside | {"VIRTUAL_ENV": str(folder), "PATH": f"{folder / 'bin'}:{outside['PATH']}"}
+
+
+def packages_of(folder):
+    (found,) = folder.glob("lib/python*/site-packages")
+    return found
+
+
+def test_an_active_environment_with_the_solver_is_taken_whatever_variables_name_another(active, tmp_path):
+    write_solver(tmp_path / "foreign", OPEN_MPI)
+    other = {"PETSC_DIR": "/nowhere", "PETSC_ARCH": "linux-gnu", "PYTHONPATH": str(tmp_path / "foreign")}
+    assert run("tool", env=active | other).stdout == "from the active environment\n"
+
+
+@pytest.mark.parametrize(
+    ("petsc", "dolfinx"),
+    [(PETSC.format(scalar="complex"), "0.11.0"), (OPEN_MPI, "0.11.0"), (PETSC.format(scalar="float"), "0.10.0")],
+)
+def test_an_active_environment_with_another_solver_is_not_taken(active, tmp_path, petsc, dolfinx):
+    write_solver(packages_of(tmp_path / "active"), petsc, dolfinx)
+    (tmp_path / "active" / "bin" / "tool").unlink()
+    assert run("tool", "1", env=active).stdout == "from the environment: 1\n"
+
+
+def test_with_conda_and_a_venv_active_the_first_python_on_path_decides(active, tmp_path):
+    conda = tmp_path / "conda"
+    write_program(conda / "bin", "python", "#!/bin/sh\nexit 1\n")
+    both = active | {"CONDA_PREFIX": str(conda)}
+    assert run("tool", env=both).stdout == "from the active environment\n"
+    conda_first = both | {"PATH": f"{conda / 'bin'}:{both['PATH']}"}
+    assert run("tool", "1", env=conda_first).stdout == "from the environment: 1\n"
+
+
+def test_ranks_under_mpiexec_are_of_one_run():
+    program = "from mpi4py import MPI; print(MPI.COMM_WORLD.size)"
+    done = ran("mpiexec", "-n", "2", RUN, "python", "-c", program, timeout_s=120)
+    assert done.stdout == "2\n2\n", done.stderr
+
+
 # --- the set-up ----------------------------------------------------------------------------------------------
 
 
@@ -145,7 +215,7 @@ def test_the_first_python_that_runs_makes_a_venv_from_the_lock_once(outside, tmp
     assert f"-m venv {venv}" in calls
     (installation,) = [line for line in calls if "pip install" in line]
     assert "--require-hashes" in installation
-    assert installation.endswith(f"-r {ROOT}/envs/requirements.txt")
+    assert installation.endswith(f"-r {ROOT}/envs/requirements.txt -r {ROOT}/envs/requirements-dev.txt")
 
 
 def test_a_python_of_pyenv_is_found_behind_shims(outside, tmp_path):
@@ -167,6 +237,30 @@ def test_without_any_way_it_says_what_is_needed(outside, tmp_path):
     done = run("tool", env=outside | {"PATH": f"{tmp_path / 'programs'}:/usr/bin:/bin"})
     assert done.returncode == 2
     assert done.stderr == Facts("3.12", "2.35", "envs/gyriflow.yaml")
+
+
+def test_with_python_3_11_alone_it_says_what_is_needed(outside, tmp_path):
+    programs = tmp_path / "programs"
+    write_program(programs, "python3.13", SHIM)
+    for name in ("python3", "python3.11"):
+        write_program(programs, name, "#!/bin/sh\nexit 1\n")
+    write_program(programs, "id", "#!/bin/sh\necho 1000\n")
+    env = {"PATH": f"{programs}:/usr/bin:/bin", "PYENV_ROOT": str(tmp_path / "pyenv")}
+    done = run("tool", env=outside | env)
+    assert done.returncode == 2
+    assert done.stderr == Facts("3.12", "envs/gyriflow.yaml")
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_full_disk_is_named_before_anything_is_loaded(outside, tmp_path):
+    on_small_disk = f"mount -t tmpfs -o size=1m tmpfs '{tmp_path / 'cache'}' && '{RUN}' tool"
+    (tmp_path / "cache").mkdir()
+    done = ran("unshare", "--map-root-user", "--mount", "sh", "-c", on_small_disk, env=outside)
+    if "unshare" in done.stderr:
+        pytest.skip("this machine allows no mounts")
+    assert done.returncode == 2
+    assert done.stderr == Facts(tmp_path / "cache", "1 MB", "3000", "GYRIFLOW_CACHE")
+    assert "pip install" not in (tmp_path / "record").read_text()
 
 
 @pytest.mark.parametrize(

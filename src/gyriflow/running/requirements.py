@@ -40,7 +40,8 @@ def require_for(programs: Mapping[str, Path]) -> None:
         package, rule = next(iter(missing.items()))
         remedy = 'Install the extra "fold": pip install "gyriflow[fold]"'
         if "dolfinx" in missing and not has_dolfinx_wheels():
-            remedy = f"PyPI has no dolfinx for this system: use conda, {CONDA}"
+            where = "in WSL, use" if sys.platform == "win32" else "use"
+            remedy = f"PyPI has no dolfinx with PETSc for this system: {where} conda, {CONDA}"
         problem = f"simulations and registrations need packages that are not installed ({', '.join(missing)})"
         raise InputError(problem, found=f"step {rule}, which imports {package}", remedy=remedy)
     lacking = missing_libraries()
@@ -50,6 +51,8 @@ def require_for(programs: Mapping[str, Path]) -> None:
     if compiles and not has_compiler():
         remedy = f"{_install(['gcc', 'libc6-dev'])}, or without root: pip install ziglang"
         raise InputError("simulations need a C compiler, and there is none", remedy=remedy)
+    if compiles and not has_python_headers():
+        raise InputError("simulations need Python.h, and there is none", remedy=_install(["python3-dev"]))
 
 
 def packages_behind(program: Path) -> list[str]:
@@ -68,8 +71,12 @@ def is_installed(package: str) -> bool:
 
 
 def has_dolfinx_wheels() -> bool:
-    """Return whether PyPI has dolfinx with PETSc for this system."""
-    return sys.platform == "linux" and platform.machine() == "x86_64"
+    """Return whether PyPI has dolfinx with PETSc for this system: Linux x86_64 with glibc 2.34 or later."""
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        return False
+    library, version = platform.libc_ver()
+    numbers = re.findall(r"\d+", version)
+    return library == "glibc" and [int(number) for number in numbers[:2]] >= [2, 34]
 
 
 def missing_libraries() -> list[str]:
@@ -85,12 +92,17 @@ def missing_libraries() -> list[str]:
     return lacking
 
 
+def has_python_headers() -> bool:
+    """Return whether C code can be compiled for this Python."""
+    return Path(sysconfig.get_path("include"), "Python.h").is_file()
+
+
 def missing_debian_packages() -> list[str]:
     """Return the Debian packages that this system lacks."""
     packages = [LIBRARIES[name] for name in missing_libraries()]
     if not has_compiler():
         packages += ["gcc", "libc6-dev"]
-    if not Path(sysconfig.get_path("include"), "Python.h").is_file():
+    if not has_python_headers():
         packages.append("python3-dev")
     return packages
 

@@ -43,6 +43,24 @@ def test_where_pypi_has_no_dolfinx_conda_is_named(monkeypatch):
         require_for({"simulate": requirements.SOLVER})
 
 
+def test_windows_is_sent_to_wsl(monkeypatch):
+    monkeypatch.setattr(requirements, "is_installed", lambda name: False)
+    monkeypatch.setattr(requirements.sys, "platform", "win32")
+    with pytest.raises(InputError, check=Facts("dolfinx", "WSL", "envs/gyriflow.yaml")):
+        require_for({"simulate": requirements.SOLVER})
+
+
+@pytest.mark.parametrize(
+    ("libc", "has_wheels"),
+    [(("glibc", "2.34"), True), (("glibc", "2.100"), True), (("glibc", "2.31"), False), (("", ""), False)],
+)
+def test_the_wheels_of_dolfinx_need_glibc_2_34(monkeypatch, libc, has_wheels):
+    monkeypatch.setattr(requirements.sys, "platform", "linux")
+    monkeypatch.setattr(requirements.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(requirements.platform, "libc_ver", lambda: libc)
+    assert requirements.has_dolfinx_wheels() is has_wheels
+
+
 def test_a_missing_library_is_named_with_its_package(monkeypatch):
     monkeypatch.setattr(requirements, "LIBRARIES", {"libnowhere.so.7": "libnowhere7"})
     with pytest.raises(InputError, check=Facts("libnowhere.so.7", "apt-get install libnowhere7")):
@@ -58,6 +76,17 @@ def test_without_a_compiler_only_simulations_are_refused(monkeypatch, tmp_path):
     require_for({"measure": SCRIPTS / "measure.py"})
     with pytest.raises(InputError, check=Facts("apt-get install gcc", "pip install ziglang")):
         require_for({"simulate": requirements.SOLVER})
+
+
+def test_without_pythons_headers_only_simulations_are_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(requirements.sysconfig, "get_path", lambda name: str(tmp_path))
+    monkeypatch.setattr(requirements, "has_compiler", lambda: True)
+    monkeypatch.setattr(requirements, "is_installed", lambda name: True)
+    monkeypatch.setattr(requirements, "LIBRARIES", {})
+    require_for({"measure": SCRIPTS / "measure.py"})
+    with pytest.raises(InputError, check=Facts("Python.h", "apt-get install python3-dev")):
+        require_for({"simulate": requirements.SOLVER})
+    assert requirements.missing_debian_packages() == ["python3-dev"]
 
 
 def test_ziglang_serves_where_there_is_no_compiler(monkeypatch, tmp_path):
