@@ -158,7 +158,7 @@ BY_TESTS = {
         ("src/gyriflow/settings/terms.py", "{1: 2.0, 2: 0.8}", "{1: 1.0, 2: 0.8}"),
     ],
     "report/test_tables.py": [
-        ("src/gyriflow/report/tables.py", "costs.carbon_g_per_kwh / 1000", "costs.carbon_g_per_kwh")
+        ("src/gyriflow/report/tables.py", "core_hours=hours.max(axis=1)", 'core_hours=hours["cpu_s"]')
     ],
     "report/test_report_scripts.py": [
         ("workflow/scripts/study_records.py", '"inputs": inputs[brain["id"]]', '"inputs": {}'),

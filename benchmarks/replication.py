@@ -3,7 +3,7 @@
     ./run gyriflow run config/examples/paper.yaml -d paper --stage replication
     ./run python benchmarks/replication.py paper
 
-Rows that cannot be compared (costs on another machine, results of other authors, bands that are not resolved, sides of
+Rows that cannot be compared (results of other authors, bands that are not resolved, sides of
 a brain that is its own mirror image) and values of whole bands are left out; the page `results/study/replication.html`
 has them.
 """
@@ -11,7 +11,7 @@ has them.
 import argparse
 from pathlib import Path
 
-from gyriflow.compare.published import NO_BANDS, NOT_COMPARABLE, NOT_RUN, NOT_TESTED
+from gyriflow.compare.published import NO_BANDS, NOT_RUN, NOT_TESTED
 from gyriflow.io.files import read_table
 
 
@@ -20,7 +20,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="working directory of the run")
     table = read_table(parser.parse_args().folder / "results" / "study" / "replication.csv")
     print("| result | the paper | here | verdict |\n| --- | --- | --- | --- |")
-    is_compared = ~table["verdict"].isin([NOT_RUN, NOT_COMPARABLE, NOT_TESTED]) & (table["here"] != NO_BANDS)
+    is_compared = ~table["verdict"].isin([NOT_RUN, NOT_TESTED]) & (table["here"] != NO_BANDS)
     is_compared &= ~table["result"].str.contains("measured") & ~table["here"].str.startswith("hemispheres are mirror")
     for row in table[is_compared].itertuples():
         print(f"| {row.result} | {row.paper} | {row.here.split('; left, whole bands')[0]} | {row.verdict} |")

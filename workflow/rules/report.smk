@@ -54,7 +54,6 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        costs=CONFIG.costs.model_dump(),
         # pattern of the records of time and memory of each rule; those of earlier configurations do not match
         benchmarks=lambda w: usage_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)

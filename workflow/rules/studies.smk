@@ -72,7 +72,6 @@ rule replication:
         },
         published=PUBLISHED,
         displacement=rules.run_tables.output.displacement,
-        summary=study.files(FOLDING["summary"])[:1],
         frames=study.files(FOLDING["frames"])[:1],
         params=study.files(PARAMETERS)[:1],
         rates=GROWTH["rates"] if study.series_with_rates else [],
@@ -94,7 +93,6 @@ rule replication:
         },
         run=next(iter(study.pairs), (None, None)),
         observed=list(study.brains),
-        costs=CONFIG.costs.model_dump(),
     script:
         "../scripts/replication.py"
 

@@ -12,12 +12,11 @@ from gyriflow.compare.published import (
 )
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, boundary_surface
 from gyriflow.io.figures import write_html
-from gyriflow.io.files import read_json, read_table, write_table
+from gyriflow.io.files import read_table, write_table
 from gyriflow.io.frames import read_positions, read_tets, read_weeks
 from gyriflow.io.surfaces import read_surface
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.report.tables import html_table
-from gyriflow.settings.stages import CostSettings
 from gyriflow.step import step
 
 files, output, params = snakemake.input, snakemake.output, snakemake.params
@@ -29,7 +28,7 @@ with step(snakemake.log[0]):
         for number, (name, settings) in enumerate(params.studies.items())
     }
     published = read_yaml(files.published)
-    displacement, summary = read_table(files.displacement), read_json(files.summary[0])
+    displacement = read_table(files.displacement)
     run, brain = params.run
     displacement = displacement[(displacement["run"] == run) & (displacement["subject"] == brain)]
     from_back, week = None, published["largest"]["from_week"]
@@ -42,8 +41,6 @@ with step(snakemake.log[0]):
         published,
         displacement,
         list(sweeps.values()),
-        summary,
-        costs=CostSettings(**params.costs),
         rates=read_table(files.rates) if files.rates else None,
         used_rate=read_yaml(files.params[0])["growth_rate_per_s"],
         from_back=from_back,
@@ -53,7 +50,7 @@ with step(snakemake.log[0]):
     write_table(output.csv, table)
     write_table(output.nearest, published_nearest(published, sweeps))
     lines = [
-        f"Displacements and cost are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}.",
+        f"Displacements are those of {' from '.join(params.run)}. The paper's brains: {published['atlas']}.",
         published["sensitivity"],
         *(comparison_caption(name, sweep.week, sweep.comparison) for name, sweep in sweeps.items()),
     ]

@@ -9,7 +9,6 @@ import pandas as pd
 
 from ..geometry.alignment import MIRROR
 from ..geometry.triangles import Floats, Ints, TriangleMesh, area, convex_hull, transformed
-from ..settings.stages import CostSettings
 from ..settings.terms import FOLD_BANDS
 from .comparison import aligned_distances
 from .sweeps import CROSSING_FACES, WEYL_NUMBER
@@ -25,7 +24,7 @@ MAX_MIRROR_MM = 0.2
 atlas has 0.06 to 0.09 mm."""
 MAX_OCCIPITAL_SHARE = 0.25
 """Share of the brain's length, from the back, that counts as the occipital lobe."""
-NOT_RUN, AGREES, NOT_COMPARABLE = "not run", "as in the paper", "another machine and mesh"
+NOT_RUN, AGREES = "not run", "as in the paper"
 NO_BANDS = "the bands are cut off or not resolved"
 NOT_TESTABLE, NOT_TESTED = "not testable", "not tested"
 MISSING = "–"
@@ -92,9 +91,7 @@ def replication_table(
     published: Mapping[str, Any],
     displacement: pd.DataFrame,
     sweeps: Sequence[SweepTables],
-    summary: Mapping[str, Any],
     *,
-    costs: CostSettings,
     rates: pd.DataFrame | None = None,
     used_rate: Any = None,
     from_back: float | None = None,
@@ -104,7 +101,7 @@ def replication_table(
     """Compare each result of the paper with the same result here: result, place, paper, here, verdict.
 
     `published` is the content of `fetalfoldsim.yaml`; the verdict on a result whose sweep is not among `sweeps` is
-    `NOT_RUN`. Of one run are `displacement` (from_week, to_week, nodes, max_mm, mean_mm), its `summary.json`, and the
+    `NOT_RUN`. Of one run are `displacement` (from_week, to_week, nodes, max_mm, mean_mm) and the
     growth rate that it used; `rates` are those from surface areas (from_week, to_week, rate_per_s). `from_back` is
     `place_of_largest` of the displacement from 24 to 25 GW, `mirror_mm` the `mirror_distance` of the start brain's
     hemispheres, `surfaces` the whole pial surfaces of observed brains by id.
@@ -134,7 +131,6 @@ def replication_table(
         rows.append((entry["finding"], entry["place"], "stated", found))
     for entry in published["untested"]:
         rows.append((entry["finding"], entry["place"], "stated", (entry["reason"], NOT_TESTED)))
-    rows += _costs(published["cost"], summary, costs)
     table = [(*row, *(found or (MISSING, NOT_RUN))) for *row, found in rows]
     return pd.DataFrame(table, columns=["result", "place", "paper", "here", "verdict"])
 
@@ -175,17 +171,6 @@ def _growth_rate(published: Mapping[str, Any], rates: pd.DataFrame | None, used:
             found = here, _verdict(within >= published["min_per_s"])
     paper = f"at least {published['min_per_s']:g} by areas; {published['used_per_s']:g} used, twice as much"
     return f"growth rate of the cortex, {first}-{last} GW (1/s)", published["place"], paper, found
-
-
-def _costs(published: Mapping[str, Any], summary: Mapping[str, Any], costs: CostSettings) -> Iterator[Row]:
-    weeks = (summary["reached_week"] - summary["weeks"][0]) or np.nan
-    energy_wh = summary["cpu_seconds"] / 3600 * costs.core_power_w / weeks
-    values = (summary["seconds"] / 3600 / weeks, energy_wh, energy_wh / 1000 * costs.carbon_g_per_kwh)
-    size = f"{summary['tets']} elements, {summary['ranks']} ranks"
-    size += f", {costs.core_power_w:g} W a core, {costs.carbon_g_per_kwh:g} g/kWh"
-    for entry, value in zip(published["rows"], values, strict=True):
-        paper, found = f"{entry['value']:g} ({published['machine']})", (f"{value:.3g} ({size})", NOT_COMPARABLE)
-        yield f"{entry['quantity']} per gestational week", published["place"], paper, found
 
 
 def _gyrification(surfaces: Mapping[str, TriangleMesh]) -> Found:

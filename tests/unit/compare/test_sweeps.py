@@ -11,7 +11,6 @@ from shapes import sphere
 from gyriflow.compare.published import (
     AGREES,
     MISSING,
-    NOT_COMPARABLE,
     NOT_RUN,
     NOT_TESTABLE,
     NOT_TESTED,
@@ -36,7 +35,6 @@ from gyriflow.geometry.alignment import motion
 from gyriflow.geometry.triangles import merged, transformed
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.metrics.spangy import PART_POWERS
-from gyriflow.settings.stages import CostSettings
 
 
 def spectra(run, subject, powers):
@@ -227,7 +225,6 @@ def test_spectra_are_cut_at_the_largest_number_of_modes_of_all_surfaces_compared
 
 PUBLISHED = read_yaml(Path(__file__).parents[3] / "workflow" / "published" / "fetalfoldsim.yaml")
 SIDES = ("left", "right")
-SUMMARY = {"weeks": [21.0, 23.0], "reached_week": 23.0, "seconds": 3600, "cpu_seconds": 7200, "tets": 9, "ranks": 2}
 
 
 def moves(**largest: float) -> pd.DataFrame:
@@ -264,7 +261,7 @@ SHARES = {("thin", "left"): (0.5, 0.3, 0.1), ("thin", "right"): (0.6, 0.2, 0.02)
 
 
 def verdicts(displacement: pd.DataFrame, *studies: SweepTables, **facts) -> dict[str, tuple[str, str]]:
-    table = replication_table(PUBLISHED, displacement, studies, SUMMARY, **({"costs": CostSettings()} | facts))
+    table = replication_table(PUBLISHED, displacement, studies, **facts)
     assert list(table) == ["result", "place", "paper", "here", "verdict"]
     return {row["result"]: (row["here"], row["verdict"]) for row in table.to_dict("records")}
 
@@ -295,16 +292,6 @@ def test_growth_rates_are_held_against_the_papers_least():
         row for result, row in verdicts(moves(), rates=rates, used_rate=2e-7).items() if "growth rate" in result
     )
     assert (here, verdict) == (Facts("8e-08", "2e-07", "used"), "in part")
-
-
-def test_energy_and_emissions_are_those_of_a_week_of_the_run():
-    *_, hours, energy, emissions = verdicts(moves()).items()
-    assert hours == (Facts("hours"), (Facts(0.5, 9, 2), NOT_COMPARABLE))
-    # 2 h of a core of 12 W in two weeks
-    assert energy == (Facts("(Wh)"), (Facts(12, 9, 2), NOT_COMPARABLE))
-    assert emissions == (Facts("(g CO2e)"), (Facts(5.7, 9, 2, "475 g/kWh"), NOT_COMPARABLE))
-    *_, emissions = verdicts(moves(), costs=CostSettings(core_power_w=6, carbon_g_per_kwh=50)).values()
-    assert emissions[0] == Facts(0.3, "6 W", "50 g/kWh")
 
 
 def test_findings_of_a_sweep_are_checked_one_by_one():
@@ -360,7 +347,7 @@ def test_bands_that_are_not_resolved_decide_nothing():
 def test_another_sweep_is_not_the_papers(week, varied):
     own = sweep(SHARES, (0.4, 0.35, 0.04))
     other = SweepTables(varied, week, own.members, own.comparison, own.nearest)
-    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {NOT_RUN, NOT_TESTED, NOT_COMPARABLE}
+    assert {verdict for _, verdict in verdicts(moves(), other).values()} == {NOT_RUN, NOT_TESTED}
 
 
 def test_nearest_runs_are_listed_with_the_papers_value_if_it_reports_one():
