@@ -119,7 +119,7 @@ rule html_report:
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
         notice=f"{PAGE}/three.LICENSE.txt",
-        controls=f"{PAGE}/OrbitControls.js",
+        controls=f"{PAGE}/OrbitControls.min.js",
         viewer=f"{PAGE}/viewer.js",
     output:
         report=f"{REPORT}/report.html",

@@ -32,7 +32,7 @@ from gyriflow.settings.terms import SPREAD_UNKNOWN
 from gyriflow.shipped import SHIPPED
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
-PARTS = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
+PARTS = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.min.js", "viewer": "viewer.js"}
 PARTS |= {"notice": "three.LICENSE.txt"}
 BRAINS = [
     {"id": name, "week": week, "population": "healthy", "source": "labels", "synthetic": False, "licence": licence}
