@@ -255,7 +255,6 @@ def test_a_start_is_carried_to_one_brain_a_week_up_to_the_first_past_the_end(rea
     chain = found.chains["b21", "self"]
     assert (ids(chain.brains), chain.weeks[1:]) == (["b21", "b22", "b23", "b27"], [22, 23, 27])
     assert chain.correspondences[0] == "results/study/registration/b21/b22.h5"
-    assert found.registered_starts == ["b21"]
     assert [one.targets for one in found.run_simulations] == ["results/brains/b21/mesh/targets.self.h5", []]
 
 
