@@ -195,14 +195,16 @@ def cut_shares(comparison: pd.DataFrame) -> pd.DataFrame:
 
 def share_rows(shares: pd.DataFrame, mirror_mm: float | None) -> list[Row]:
     """Compare statements on the shares of bands at 28 GW; `mirror_mm` is how asymmetric the start brain is."""
-    simulated, observed = shares.xs(False, level="observed"), shares.xs(True, level="observed")
-    smallest = observed["B5"].groupby("hemisphere").min()
+    is_observed = shares.index.get_level_values("observed").astype(bool)
+    smallest = shares.loc[is_observed, "B5"].groupby("hemisphere").min()
+    largest = shares.loc[~is_observed, "B5"].groupby("hemisphere").max()
     margins = {
         "B4 is above B5 and B6, in real and simulated brains": shares["B4"] - shares[["B5", "B6"]].max(axis=1),
         "B6 is very weak, in real and simulated brains": MAX_WEAK_SHARE - shares["B6"],
-        "B5 of the real brain is above that of any simulation": smallest - simulated["B5"].groupby("hemisphere").max(),
+        "B5 of the real brain is above that of any simulation": smallest - largest,
     }
-    if mirror_mm is not None and mirror_mm > MAX_MIRROR_MM:
+    has_both = {"left", "right"} <= set(shares.index.get_level_values("hemisphere"))
+    if has_both and mirror_mm is not None and mirror_mm > MAX_MIRROR_MM:
         right, left = shares.xs("right", level="hemisphere"), shares.xs("left", level="hemisphere")
         fine = pd.concat([left["B5"] - right["B5"], left["B6"] - right["B6"]])
         margins["B4 is higher on the right, in real and simulated brains"] = right["B4"] - left["B4"] - SHARE_TOL
