@@ -16,12 +16,10 @@ from ..settings.terms import SIDES
 from .labels import parameter_label, plain, with_unit
 from .style import (
     MUTED_COLOUR,
-    OBSERVED_COLOUR,
     RUN_COLOURS,
     panel_figure,
     run_colours,
     run_legend,
-    star,
     styled,
     week_axis,
     wrap,
@@ -35,11 +33,10 @@ SIDE_NAMES = {"whole": "whole brain", "left": "left hemisphere", "right": "right
 def validation_chart(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> Figure:
     """Draw by week how much better a run's curvature correlates with the observed brain's than the scaled start's.
 
-    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted. Stars are the
-    headroom, the gain of the observed brain of the week before.
+    Bars are 95 % intervals of the bootstrap; filled marks are explained weeks, open ones predicted.
 
-    `validation` has the columns run, start_week, week, kind, and gain and headroom (gain_…, gain_low_…, gain_high_…) of
-    each of `COMPARED_MAPS`.
+    `validation` has the columns run, start_week, week, kind, and gain_…, gain_low_… and gain_high_… of each of
+    `COMPARED_MAPS`.
     """
     colours = run_colours(validation["run"], runs)
     figure, panels = panel_figure(len(COMPARED_MAPS), per_row=2, panel_in=2.5)
@@ -48,33 +45,23 @@ def validation_chart(validation: pd.DataFrame, *, runs: Sequence[str] = ()) -> F
             line = rows.sort_values("week")
             shift = 0.03 * (number - (len(colours) - 1) / 2)
             _gain_line(axes, line["week"] + shift, line, measure, colours[str(run)])
-        for _, rows in validation.groupby("start_week"):
-            weeks = rows.drop_duplicates("week")
-            headroom, bars = weeks[f"headroom_{measure}"], _bars(weeks, "headroom", measure)
-            style: dict[str, Any] = {"color": OBSERVED_COLOUR, "markersize": 6, "elinewidth": 0.7}
-            axes.errorbar(weeks["week"], headroom, yerr=bars, fmt="*", **style)
         axes.axhline(0, color=MUTED_COLOUR, linewidth=0.8)
         axes.set_title(VERTEX_MAPS[measure].label)
         week_axis(axes, validation["week"])
     panels[0].set_ylabel("gain in r over the scaled start")
-    extra: list[Artist] = [star("headroom: observed brain of the week before", markersize=6)]
-    run_legend(figure, colours, extra=extra)
+    run_legend(figure, colours)
     return figure
 
 
 def _gain_line(axes: Axes, x: pd.Series, rows: pd.DataFrame, measure: str, colour: Any) -> None:
     """Draw a gain with its interval; filled marks are explained weeks, open ones predicted."""
     gain = rows[f"gain_{measure}"]
-    axes.errorbar(x, gain, yerr=_bars(rows, "gain", measure), color=colour, linewidth=1.0, elinewidth=0.7)
+    below, above = gain - rows[f"gain_low_{measure}"], rows[f"gain_high_{measure}"] - gain
+    lengths = np.stack([below, above]).clip(min=0)
+    axes.errorbar(x, gain, yerr=lengths, color=colour, linewidth=1.0, elinewidth=0.7)
     for kind, face in (("explained", colour), ("predicted", "white")):
         if (selected := rows["kind"] == kind).any():
             axes.plot(x[selected], gain[selected], "o", color=colour, markerfacecolor=face)
-
-
-def _bars(rows: pd.DataFrame, name: str, measure: str) -> Any:
-    """Return the (2, n) lengths of error bars below and above values, to the ends of their intervals."""
-    value, low, high = (rows[f"{part}_{measure}"] for part in (name, f"{name}_low", f"{name}_high"))
-    return np.stack([value - low, high - value]).clip(min=0)
 
 
 @styled
