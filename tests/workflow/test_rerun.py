@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 STAGES = (
     *("pial_with_thickness", "growth_curves", "growth_rates", "growth_figure"),
-    *("register", "tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
+    *("tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
     *("validation", "study_records", "html_report"),
 )
 """The rules that stand for all: tables and figures follow what they are made of."""
@@ -30,7 +30,7 @@ BOTH_RUNS = RESULTS | {rule: 2 * count for rule, count in ONE_RUN.items() if rul
 CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
 # of the surface of a measured brain that starts no run: its own, and what compares others with it
 OF_THE_OTHER_BRAIN = RESULTS | CURVES | {
-    "pial_with_thickness": 1, "register": 1, "measure": 1, "validation": 2,
+    "pial_with_thickness": 1, "measure": 1, "validation": 2,
 }  # fmt: skip
 
 
