@@ -10,13 +10,14 @@ volume), and crossing faces. The last line is one JSON object.
 
     ./run python benchmarks/explained.py FOLDER RUN BRAIN OBSERVED --companions [--uniform RUN] [--smoothing 5 3]
 
-compares the run with four companions instead, which an explanation has to beat. For each week: r of the shape index and
+compares the run with five companions instead, which an explanation has to beat. For each week: r of the shape index and
 mean distance of the observed surface (mm), after scaling to the observed volume and rigid alignment, of
 
 - run: the run;
 - start: the start brain;
 - uniform: a run whose growth does not depend on place, if there is one;
 - smooth: the start, moved by the displacement to its target at this week smoothed along the surface, without mechanics;
+- registration: the start, carried to this week by the registrations alone, without mechanics;
 - random: folds of no brain. To the smooth displacement (of the first length) random folds are added with the root mean
   square along the normal and the mean squared wavenumber of what smoothing has removed. The body follows these shapes
   from week to week of the table, as it follows the targets. It is compared with the observed brain, and with the random
@@ -53,14 +54,15 @@ from gyriflow.geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
+from gyriflow.growth.carrying import carry_surface
 from gyriflow.growth.series_shapes import CONTINUATION_TOL, fit_body
 from gyriflow.io.frames import read_positions, read_weeks
-from gyriflow.io.registrations import read_weekly_shapes
-from gyriflow.io.surfaces import read_surface
+from gyriflow.io.registrations import read_correspondence, read_weekly_shapes
+from gyriflow.io.surfaces import read_pose, read_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.metrics.gyrification import gyrification_index, pieces_over
 from gyriflow.settings.terms import SIDES
-from gyriflow.study.paths import FOLDING, MESH, PIAL, TARGETS
+from gyriflow.study.paths import FOLDING, MESH, PIAL, REGISTERED, TARGETS
 
 FINEST_MM, FINEST_TOL_MM = 0.01, 0.05
 """Least length over which random folds are smoothed, and tolerance of this length."""
@@ -140,6 +142,7 @@ def companion_rows(start: ExplainedBrain, arguments: argparse.Namespace) -> Iter
     # remeshing loads PETSc without initialising it
     petsc4py.init()
     body, pieces = ElasticFit(start.mesh), linear_pieces(start.mesh)
+    carried = carry_alone(start, arguments.observed)
     for week in arguments.weeks or start.weeks:
         observed, target = start.pial(arguments.observed.format(week=week)), start.targets[week]
         models = {f"smooth {length:g} mm": move_smoothly(boundary, target, length) for length in arguments.smoothing}
@@ -155,7 +158,7 @@ def companion_rows(start: ExplainedBrain, arguments: argparse.Namespace) -> Iter
         row: dict[str, Any] = {"week": week}
         for name, heights in {"removed": removed, "added": folds}.items():
             row[f"{name}_mm"], row[f"{name}_wavelength_mm"] = size_and_wavelength(smooth, heights)
-        models = {"start": boundary, **models, "random": body.boundary}
+        models = {"start": boundary, **models, "registration": carried[week], "random": body.boundary}
         for against, goal in {"observed": observed, "random": shape}.items():
             prepared = prepare_for_comparison(goal, goal)
             for name in models if against == "observed" else ["random"]:
@@ -163,6 +166,25 @@ def companion_rows(start: ExplainedBrain, arguments: argparse.Namespace) -> Iter
                 values = {"r_shape_index": r_shape_index(surface, goal, prepared)}
                 values |= {"distance_mm": distance_mm(surface, goal)}
                 yield row | {"shape": name, "against": against} | values
+
+
+def carry_alone(start: ExplainedBrain, pattern: str) -> dict[float, TriangleMesh]:
+    """Return the start brain's surface carried to each later brain by the registrations alone."""
+    pose = read_pose(start.folder / PIAL["report"].format(brain=start.brain))
+    # registrations refer to the worlds of the files
+    places = transform_points(start.boundary.vertices, pose.inverse)
+    surfaces = {}
+    earlier = start.brain
+    for week in start.weeks:
+        later = pattern.format(week=week)
+        path = start.folder / REGISTERED.format(earlier=earlier, later=later)
+        # the path of the targets may stop at weeks without a brain
+        if not path.exists():
+            continue
+        places = carry_surface(TriangleMesh(places, start.boundary.faces), [read_correspondence(path)])
+        surfaces[week] = TriangleMesh(transform_points(places, pose.world), start.boundary.faces)
+        earlier = later
+    return surfaces
 
 
 def distance_mm(surface: TriangleMesh, observed: TriangleMesh) -> float:

@@ -38,7 +38,7 @@ EXPECTED = {
     "paper": (
         "paper",
         {"simulate": 2, "simulate_member": 10, "compare_member": 12, "study_tables": 2, "tetrahedralise": 1}
-        | {"measure": 1, "replication": 1},
+        | {"measure": 1},
     ),
     "calibration": ("calibrate", {"calibration_design": 4, "simulate_member": 24, "calibration_score": 24}),
     "crl-atlas": ("all", {"atlas_file": 9, "pial_with_thickness": 9}),

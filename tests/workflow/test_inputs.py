@@ -67,14 +67,6 @@ def test_regions_are_carried_from_the_brain_that_has_them(jobs):
     assert "results/study/registration/b23/b22.h5" in files
 
 
-def test_sulci_begin_as_the_regions_of_the_last_real_brain_name_them(jobs):
-    files = jobs[f"{RUN}/onset.csv"]
-    assert [file for file in files if "left.regions" in file] == ["results/brains/b24/metrics/left.regions.label.gii"]
-    assert [file for file in files if file.endswith(".h5")] == [
-        f"results/study/registration/b{week}/b{week + 1}.h5" for week in (21, 22, 23)
-    ]
-
-
 def test_maps_of_simulated_brains_are_brought_to_the_template_from_their_start(jobs):
     files = jobs[f"{RUN}/week-24.00/left.template.shape.gii"]
     # they keep the vertices of the start

@@ -1,27 +1,19 @@
-"""Matched surfaces with the real commands: their correspondence, where it is known, and when sulci begin."""
-
-from itertools import pairwise
+"""Matched surfaces with the real commands: their correspondence, where it is known."""
 
 import numpy as np
 import odd_brains
-import pandas as pd
 import pytest
-from configurations import labelled
-from shapes import LPS, cerebrum_surface, phantom, rigid, sphere
+from shapes import LPS, cerebrum_surface, phantom, rigid, without_rigid_motion
 
 from gyriflow.anatomy.repair import pieces
-from gyriflow.geometry.alignment import without_rigid_motion
-from gyriflow.geometry.deformations import MatchedSurfaces, transform_points
-from gyriflow.geometry.poses import Pose
+from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh
-from gyriflow.io.files import read_json, write_json
-from gyriflow.io.registrations import read_weekly_shapes, write_correspondence
-from gyriflow.io.surfaces import read_pose, write_surface, write_vertex_labels
+from gyriflow.io.files import read_json
+from gyriflow.io.registrations import read_weekly_shapes
+from gyriflow.io.surfaces import read_pose, write_surface
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.settings.terms import SIDES
-from gyriflow.study.loading import load
-from gyriflow.study.resolve import resolve
 
 from .conftest import COARSE
 
@@ -86,16 +78,15 @@ def in_week_21(results, points: np.ndarray) -> np.ndarray:
 @pytest.mark.extended
 def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres):
     name = write_study(workflow, hemispheres)
-    outcome = workflow.run("results/brains/b21/mesh/carried.h5", "--cores", "2", "--configfile", name)
+    outcome = workflow.run("results/brains/b21/mesh/targets.self.h5", "--cores", "2", "--configfile", name)
     assert outcome.returncode == 0, outcome.stderr[-3000:]
     results = workflow.directory / "results"
     mesh = read_tetrahedral_mesh(results / "brains/b21/mesh/brain.xdmf")
-    carried = read_weekly_shapes(results / "brains/b21/mesh/carried.h5")
-    assert carried.weeks.tolist() == list(WEEKS)
+    targets = read_weekly_shapes(results / "brains/b21/mesh/targets.self.h5")
     places = in_week_21(results, mesh.vertices)
     # where the surface goes, whatever the pose of the files
     pial = boundary_surface(mesh)[1]
-    moved, wanted = carried.positions[2][pial], grown(places[pial], 23)
+    moved, wanted = targets.positions[targets.index(23)][pial], grown(places[pial], 23)
     away = without_rigid_motion(wanted, moved, np.ones(len(pial)))
     assert np.linalg.norm(wanted - places[pial], axis=1).mean() > 1
     assert np.linalg.norm(away, axis=1).mean() < 0.03
@@ -105,52 +96,5 @@ def test_the_mesh_goes_where_the_surface_goes(workflow, hemispheres):
 @pytest.mark.parametrize("kind", ["hemispheres", "hemisphere"])
 def test_matched_vertices_take_the_place_of_registration(workflow, hemispheres, kind):
     jobs = workflow.jobs("all", "validate", "--configfile", write_study(workflow, hemispheres, kind))
-    assert [jobs[rule] for rule in ("match_surfaces", "onset", "registration_ceiling")] == [2, 1, 1]
-    # sulci have names where there are both hemispheres
-    assert ("named_sulci" in jobs) == (kind == "hemispheres")
+    assert [jobs[rule] for rule in ("match_surfaces", "targets", "validation")] == [2, 1, 1]
     assert "register" not in jobs
-
-
-BALL = sphere(20.0)
-MM_PER_WEEK = {"real": 1.2, "reference": 0.8}
-"""How the groove deepens in the real brains, and in the run."""
-THERE_MM = 2.74
-"""Its depth when its bottom is 2 mm below the hull of its rims."""
-
-
-def groove(depth_mm):
-    """Return a ball with a groove along the equator's front."""
-    x, y, z = BALL.vertices.T
-    depth = depth_mm * np.exp(-((z / 4) ** 2)) * (np.abs(np.arctan2(y, x)) * 20 < 15)
-    return TriangleMesh(BALL.vertices * (1 - depth / 20)[:, None], BALL.faces)
-
-
-@pytest.mark.slow
-def test_sulci_of_real_brains_and_of_a_run_begin_in_their_weeks(workflow):
-    # the last brain is named first
-    folding = {"end_week": 27, "output_every_gw": 2}
-    config = {"brains": labelled(27, 22, 24), "start": "b", "folding": folding, "runs": {"reference": {}}}
-    name = workflow.write("study.yaml", config)
-    study = resolve(load(config, workflow.directory))
-    chain, run = study.chains["b", "self"], study.simulations["reference", "b"]
-    brains = {"real": [brain.measurement for brain in chain.brains], "reference": run.measurements}
-    weeks = {"real": [22, 24, 27], "reference": [22, 24, 26, 27]}
-    assert list(run.weeks) == weeks["reference"]
-    shapes = {who: [groove(rate * (week - 22)) for week in weeks[who]] for who, rate in MM_PER_WEEK.items()}
-    for side in ("left", "right"):
-        for who, rows in brains.items():
-            for row, shape in zip(rows, shapes[who], strict=True):
-                write_surface(workflow.directory / row.parts[side], shape)
-        regions = chain.brains[-1].regions[f"{side}_regions"]
-        write_vertex_labels(workflow.directory / regions, np.zeros(len(BALL.vertices), int), {})
-    for brain in chain.brains:
-        write_json(workflow.directory / brain.report, {"pose": Pose().plain()})
-    for file, (one, other) in zip(chain.correspondences, pairwise(shapes["real"]), strict=True):
-        write_correspondence(workflow.directory / file, MatchedSurfaces(one, other.vertices), {})
-    table = "results/runs/reference/b/metrics/onset.csv"
-    outcome = workflow.run(table, "--allowed-rules", "onset", "--cores", "1", "--configfile", name)
-    assert outcome.returncode == 0, outcome.stdout + outcome.stderr
-    begins = pd.read_csv(workflow.directory / table).set_index(["run", "hemisphere"])["onset_week"]
-    assert len(begins) == 4
-    for who, rate in MM_PER_WEEK.items():
-        assert begins[who].to_list() == pytest.approx([22 + THERE_MM / rate] * 2, abs=0.15)

@@ -109,9 +109,9 @@ def test_another_version_runs_only_what_its_code_changes(made, tmp_path):
     newer = shutil.copytree(made.checkout, tmp_path / "newer", copy_function=shutil.copy)
     workflow = Workflow(newer, made.directory)
     assert "everything is up to date" in commands(workflow, "check", "study.yaml")
-    with (newer / "src" / "gyriflow" / "compare" / "onset.py").open("a") as file:
+    with (newer / "src" / "gyriflow" / "compare" / "placement.py").open("a") as file:
         file.write("\nCHANGED = True\n")
     said = commands(workflow, "check", "study.yaml")
     (line,) = re.findall(r"^  changed code.*(?:\n    .*)*", said, re.MULTILINE)
-    assert "onset" in line
+    assert "validation" in line
     assert "measure" not in said

@@ -17,8 +17,8 @@ pytestmark = pytest.mark.slow
 
 STAGES = (
     *("pial_with_thickness", "growth_curves", "growth_rates", "growth_figure"),
-    *("register", "tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
-    *("validation", "registration_ceiling", "study_records", "html_report"),
+    *("tetrahedralise", "prepare", "simulate", "measure_simulated", "measure"),
+    *("validation", "study_records", "html_report"),
 )
 """The rules that stand for all: tables and figures follow what they are made of."""
 REPORT = {"html_report": 1}
@@ -27,12 +27,10 @@ ONE_RUN = RESULTS | {
     "prepare": 1, "simulate": 1, "measure_simulated": 2, "validation": 1,
 }  # fmt: skip
 BOTH_RUNS = RESULTS | {rule: 2 * count for rule, count in ONE_RUN.items() if rule not in RESULTS}
-CARRIED = {"registration_ceiling": 1}
-MESH = CARRIED | {"tetrahedralise": 1}
 CURVES = {"growth_curves": 1, "growth_rates": 1, "growth_figure": 1}
 # of the surface of a measured brain that starts no run: its own, and what compares others with it
-OF_THE_OTHER_BRAIN = RESULTS | CARRIED | CURVES | {
-    "pial_with_thickness": 1, "register": 1, "measure": 1, "validation": 2,
+OF_THE_OTHER_BRAIN = RESULTS | CURVES | {
+    "pial_with_thickness": 1, "measure": 1, "validation": 2,
 }  # fmt: skip
 
 
@@ -59,17 +57,17 @@ def changed_files(root, *names, content=b"\n# changed\n"):
 SETTINGS = {
     "metric": (
         {"metrics": {"curvature_radius_mm": 4.0}},
-        RESULTS | {"measure": 2, "measure_simulated": 4, "validation": 2, "registration_ceiling": 1},
+        RESULTS | {"measure": 2, "measure_simulated": 4, "validation": 2},
     ),
     "run": ({"runs": {"thick": {"thickness_mm": 3.5}}}, ONE_RUN),
     "growth": ({"folding": {"growth_rate_per_s": 1e-7}}, BOTH_RUNS | {"growth_figure": 1}),
     "mesh": (
         {"mesh": {"surface_edge_mm": 0.9}},
-        BOTH_RUNS | MESH,
+        BOTH_RUNS | {"tetrahedralise": 1},
     ),
     "surface": (
         {"surface": {"edge_length_mm": 1.5}},
-        BOTH_RUNS | MESH | CURVES | {"pial_with_thickness": 2, "measure": 2},
+        BOTH_RUNS | CURVES | {"tetrahedralise": 1, "pial_with_thickness": 2, "measure": 2},
     ),
     "later end": ({"folding": {"end_week": 22.5}}, BOTH_RUNS | {"measure_simulated": 6}),
     # the number of ranks changes no result, but the report shows the configuration

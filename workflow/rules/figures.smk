@@ -54,5 +54,4 @@ rule paper:
     input:
         target_files(FIGURES, "paper"),
         rules.growth_rates.output if study.growth_brains else [],
-        rules.replication.output if study.run_simulations else [],
         rules.studies.input,

@@ -1,5 +1,5 @@
 # Regions of the cortex: given on some brains, carried to others by registration, to simulated brains with the tissue.
-# If no regions are given, named sulci are carried. Maps of all brains are also written at the vertices of the template.
+# Maps of all brains are also written at the vertices of the template.
 from gyriflow.settings.atlas import SULCI
 
 

@@ -54,7 +54,6 @@ rule study_records:
             for path in paths
         ],
         folded=study.pairs,
-        costs=CONFIG.costs.model_dump(),
         # pattern of the records of time and memory of each rule; those of earlier configurations do not match
         benchmarks=lambda w: usage_patterns(
             takewhile(lambda rule: rule.name != "study_records", workflow.rules)
@@ -120,7 +119,7 @@ rule html_report:
         style=f"{PAGE}/style.css",
         three=f"{PAGE}/three.min.js",
         notice=f"{PAGE}/three.LICENSE.txt",
-        controls=f"{PAGE}/OrbitControls.js",
+        controls=f"{PAGE}/OrbitControls.min.js",
         viewer=f"{PAGE}/viewer.js",
     output:
         report=f"{REPORT}/report.html",

@@ -63,42 +63,6 @@ rule study_tables:
         "../scripts/study_tables.py"
 
 
-# each result of the paper, the result here, and a verdict
-rule replication:
-    input:
-        **{
-            name: expand(f"{SWEEP}/{name}.csv", study=study.sweeps)
-            for name in ("members", "comparison", "nearest")
-        },
-        published=PUBLISHED,
-        displacement=rules.run_tables.output.displacement,
-        summary=study.files(FOLDING["summary"])[:1],
-        frames=study.files(FOLDING["frames"])[:1],
-        params=study.files(PARAMETERS)[:1],
-        rates=GROWTH["rates"] if study.series_with_rates else [],
-        observed=[brain.pial for brain in study.brains.values()],
-        sides=[
-            PIAL[side].format(brain=simulation.start.id)
-            for simulation in study.run_simulations[:1]
-            for side in simulation.start.sides
-        ],
-    output:
-        csv=f"{STUDY}/replication.csv",
-        page=f"{STUDY}/replication.html",
-        nearest=f"{STUDY}/paper_nearest.csv",
-    params:
-        studies={
-            name: {"varied": list(asked.vary), "week": asked.compare_week}
-            for name, asked in CONFIG.studies.items()
-            if name in study.sweeps
-        },
-        run=next(iter(study.pairs), (None, None)),
-        observed=list(study.brains),
-        costs=CONFIG.costs.model_dump(),
-    script:
-        "../scripts/replication.py"
-
-
 rule studies:
     input:
         expand(list(rules.study_tables.output), study=study.sweeps),

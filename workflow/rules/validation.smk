@@ -13,16 +13,15 @@ rule prepared_surfaces:
         "../scripts/prepared_surfaces.py"
 
 
-def prepared_files(start, weeks):
-    """Return the files that `prepared_surfaces` writes for a start brain, by kind, one per week."""
-    return {name: [file_of(file, brain=start, week=week) for week in weeks] for name, file in PREPARED.items()}
-
-
 def compared_files(wildcards):
     """Return the surfaces of a run and those that they are compared with, by kind, one per week."""
     run = simulation_of(wildcards)
+    prepared = {
+        name: [file_of(file, brain=wildcards.brain, week=week) for week in run.observed]
+        for name, file in PREPARED.items()
+    }
     return {
-        **prepared_files(wildcards.brain, run.observed),
+        **prepared,
         "simulated": [run.at(week).parts["whole"] for week in run.observed],
         "whole": [real.pial for real in run.observed.values()],
     }
@@ -118,65 +117,6 @@ rule deviation:
         "../scripts/deviation.py"
 
 
-def ceiling_weeks(brain):
-    """Return the validated weeks to which a start brain's mesh is carried."""
-    return [week for week in study.chains[brain, "self"].weeks[1:] if (brain, week) in study.references]
-
-
-# the start brain's mesh carried to later weeks by registration alone
-rule registration_ceiling:
-    input:
-        unpack(lambda w: prepared_files(w.brain, ceiling_weeks(w.brain))),
-        **START_MESH,
-        whole=lambda w: [study.references[w.brain, week][0].pial for week in ceiling_weeks(w.brain)],
-        report=PIAL["report"],
-        correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
-    output:
-        table=CEILING,
-        carried=CARRIED_MESH,
-    resources:
-        mem_mb=8000,
-    params:
-        carried_weeks=lambda w: study.chains[w.brain, "self"].weeks,
-        start_week=lambda w: brain_of(w).week,
-        weeks=lambda w: ceiling_weeks(w.brain),
-        run="registration",
-        observed=lambda w: [study.references[w.brain, week][0].id for week in ceiling_weeks(w.brain)],
-        kind="explained",
-        curvature_radius_mm=CONFIG.metrics.curvature_radius_mm,
-    script:
-        "../scripts/validation.py"
-
-
-def onset_surfaces(wildcards):
-    """Return the hemispheres of a run and of the observed brains after its start, and the regions of the last brain."""
-    real = study.chains[wildcards.brain, "self"].brains
-    rows = {"run": simulation_of(wildcards).measurements, "real": [brain.measurement for brain in real]}
-    files = {
-        f"{name}_{side}": [row.parts[side] for row in rows[name]] for name in rows for side in real[0].sides
-    }
-    return {**files, **real[-1].regions}
-
-
-# onset weeks of sulci in a simulated brain and in the observed brains after its start
-rule onset:
-    input:
-        unpack(onset_surfaces),
-        reports=lambda w: [brain.report for brain in study.chains[w.brain, "self"].brains],
-        correspondences=lambda w: study.chains[w.brain, "self"].correspondences,
-    output:
-        ONSET,
-    params:
-        sides=lambda w: brain_of(w).sides,
-        radius_mm=CONFIG.metrics.curvature_radius_mm,
-        run=lambda w: w.run,
-        subject=lambda w: w.brain,
-        run_weeks=lambda w: simulation_of(w).weeks,
-        real_weeks=lambda w: study.chains[w.brain, "self"].weeks,
-    script:
-        "../scripts/onset.py"
-
-
 # tables of validation, and the files that are joined in each
 JOINED = {
     "prediction": [simulation.file(PREDICTION) for simulation in study.predictions],
@@ -186,32 +126,22 @@ JOINED = {
         for week in simulation.observed
     ],
     "validation": [simulation.file(VALIDATION) for simulation in study.validated],
-    "registration_ceiling": expand(CEILING, brain=study.registered_starts),
-    "onset": [simulation.file(ONSET) for simulation in study.validated_registered],
 }
 VALIDATION_TABLES = [
     *(name for name, files in JOINED.items() if files),
     *(["deviation_centiles"] if study.atlas_predictions else []),
-    *(["displacement_agreement"] if study.registered_starts else []),
 ]
 
 
 rule validation_tables:
     input:
         **JOINED,
-        frames=[simulation.file(FOLDING["frames"]) for simulation in study.validated_registered],
-        carried=[simulation.file(CARRIED_MESH) for simulation in study.validated_registered],
     output:
         **{name: f"{STUDY}/{name}.csv" for name in VALIDATION_TABLES},
     params:
         individuals=study.are_individuals(
             {real.id for simulation in study.atlas_predictions for real in simulation.observed.values()}
         ),
-        # whether the growth of a run was measured by the same registrations
-        carried=[
-            (simulation.run, simulation.shapes is not None and not simulation.is_atlas_prediction)
-            for simulation in study.validated_registered
-        ],
     script:
         "../scripts/validation_tables.py"
 

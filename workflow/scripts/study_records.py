@@ -1,4 +1,4 @@
-"""Write time, memory, energy and warnings of all jobs, and the provenance of each brain, run, study and report."""
+"""Write time, memory and warnings of all jobs, and the provenance of each brain, run, study and report."""
 
 from pathlib import Path
 
@@ -10,7 +10,6 @@ from gyriflow.report.page import methods_text
 from gyriflow.report.tables import html_table, resources
 from gyriflow.running.jobs import gather_messages, read_usage
 from gyriflow.running.provenance import software, texts_in
-from gyriflow.settings.stages import CostSettings
 from gyriflow.settings.terms import run_names
 from gyriflow.step import step
 
@@ -31,7 +30,7 @@ with step(snakemake.log[0]):
         names.get((run, brain)) if rule == "simulate" else None
         for rule, run, brain in zip(jobs["rule"], jobs["run"], jobs["brain"], strict=True)
     ]
-    table = resources(jobs, CostSettings(**params.costs))
+    table = resources(jobs)
     write_table(output.resources, table)
     write_html(output.resources_page, html_table(table))
     write_table(output.warnings, gather_messages(".", params.known_brains, params.folded))

@@ -1,16 +1,13 @@
-"""Compare a run, or the start brain's mesh as registration alone carries it, with the observed brains week by week."""
-
-import numpy as np
+"""Compare a run with the observed brains week by week."""
 
 from gyriflow.compare.comparison import ObservedBrain, add_curves, comparison_table, simple_predictions
 from gyriflow.compare.shapes import PreparedSurface
 from gyriflow.geometry.tetrahedra import boundary_surface
-from gyriflow.geometry.triangles import TriangleMesh, transformed
-from gyriflow.growth.carrying import carry_mesh
+from gyriflow.geometry.triangles import TriangleMesh
 from gyriflow.growth.curves import sizes_on_curves
 from gyriflow.io.files import read_table, write_table
-from gyriflow.io.registrations import WeeklyShapes, read_correspondence, read_weekly_shapes, write_weekly_shapes
-from gyriflow.io.surfaces import read_pose, read_surface, read_vertex_maps
+from gyriflow.io.registrations import read_weekly_shapes
+from gyriflow.io.surfaces import read_surface, read_vertex_maps
 from gyriflow.io.tetmeshes import read_tetrahedral_mesh
 from gyriflow.io.yaml_files import read_yaml
 from gyriflow.step import step
@@ -21,17 +18,6 @@ files, params, output = snakemake.input, snakemake.params, snakemake.output
 def prepared(name, number):
     """Read a surface that was prepared for comparison in a week."""
     return PreparedSurface(read_surface(files[name][number]), **read_vertex_maps(files[f"{name}_maps"][number]))
-
-
-def carried_surfaces():
-    """Yield the boundary of the start brain's mesh in each week, and write the carried mesh."""
-    mesh, pose = read_tetrahedral_mesh(files.mesh), read_pose(files.report)
-    positions = carry_mesh(mesh, [read_correspondence(path) for path in files.correspondences], pose)
-    write_weekly_shapes(output.carried, WeeklyShapes(np.array(params.carried_weeks), positions))
-    carried, (boundary, used) = read_weekly_shapes(output.carried), boundary_surface(mesh)
-    for week in params.weeks:
-        points = carried.positions[carried.index(week)][used]
-        yield transformed(TriangleMesh(points, boundary.faces), pose.world)
 
 
 def simple_models():
@@ -47,8 +33,7 @@ def simple_models():
 
 
 with step(snakemake.log[0]):
-    surfaces = map(read_surface, files.simulated) if files.get("simulated") else carried_surfaces()
-    models = {week: {"run": surface} for week, surface in zip(params.weeks, surfaces, strict=True)}
+    models = {week: {"run": read_surface(path)} for week, path in zip(params.weeks, files.simulated, strict=True)}
     # these are written with the run that grows as the atlas
     if params.get("of_atlas"):
         models = {week: models[week] | simple for week, simple in zip(models, simple_models(), strict=True)}

@@ -34,8 +34,6 @@ INTERVAL = (0.025, 0.975)
 """Quantiles of the bootstrap samples at the ends of a 95 % interval."""
 RESAMPLED = "modes and patches of one brain, not subjects"
 """Note in tables with bootstrap intervals, which do not include differences between subjects."""
-NO_HEADROOM = "no headroom"
-"""Flag of a share that is not computed, since the baseline may be no better than the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,20 +144,13 @@ def interpolate_measures(surface: PreparedSurface, observed: PreparedSurface) ->
     return values, float(np.average(match.agrees, weights=observed.areas))
 
 
-def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float | str]:
+def gain_columns(r: Floats, r_start: Floats, r_adjacent: Floats) -> dict[str, float]:
     """Compare correlations and their bootstrap samples with those of the start brain and of the week before.
 
-    Columns r, r_start and r_adjacent; gain = r − r_start; headroom = r_adjacent − r_start, the gain of the observed
-    brain of the week before; gain_share = gain/headroom and gain_share_flag: "ok", or NaN and `NO_HEADROOM` unless the
-    interval of headroom lies above 0. r, gain, headroom and gain_share have 95 % intervals …_low, …_high.
+    Columns r, r_start and r_adjacent; gain = r − r_start. r and gain have 95 % intervals …_low, …_high.
     """
-    gain, headroom = r - r_start, r_adjacent - r_start
-    has_headroom = with_interval("", headroom)["_low"] > 0
-    share = gain / headroom if has_headroom else np.full_like(gain, np.nan)
-    row: dict[str, float | str] = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
-    for name, draws in {"r": r, "gain": gain, "headroom": headroom, "gain_share": share}.items():
-        row |= with_interval(name, draws)
-    return row | {"gain_share_flag": "ok" if has_headroom else NO_HEADROOM}
+    row = {"r_start": float(r_start[0]), "r_adjacent": float(r_adjacent[0])}
+    return row | with_interval("r", r) | with_interval("gain", r - r_start)
 
 
 def with_interval(name: str, draws: Floats) -> dict[str, float]:

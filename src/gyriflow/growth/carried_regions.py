@@ -98,8 +98,8 @@ def register_to_drawn_sulci(brain: Channels, drawn: Channels, *, threads: int = 
         quality = measure_quality(brain, drawn, deformation) | {"dice_cortex": float("nan")}
         require_good(quality, pair="with the brain of the named sulci")
     except InputError as error:
-        # a study can go on with numbered sulci
-        log.warning("sulci have no names: %s", error)
+        # a study can go on without regions of this brain
+        log.warning("no named sulci: %s", error)
         return None
     return deformation
 

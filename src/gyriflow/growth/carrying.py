@@ -12,11 +12,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.alignment import angle_deg, rigid_fit
 from ..geometry.deformations import Correspondence, Deformation, MatchedSurfaces, carry, transform_points
-from ..geometry.diffusion import harmonic_continuation
 from ..geometry.matching import labels_at, match_points, values_at
-from ..geometry.poses import Pose
-from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, linear_pieces
-from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, transformed, vertex_areas, vertex_normals
+from ..geometry.triangles import Floats, TriangleMesh, flipped, signed_volume, vertex_areas, vertex_normals
 
 MAX_DISTANCE_MM = 2.0
 """Largest mean distance of a mesh's surface from the matched surface that it follows."""
@@ -97,18 +94,6 @@ def follow_surfaces(mesh: TriangleMesh, chain: Sequence[MatchedSurfaces]) -> Flo
     )
 
 
-def follow_inside(mesh: TetrahedralMesh, chain: Sequence[MatchedSurfaces]) -> Floats:
-    """Return the (w + 1, n, 3) positions of a tetrahedral mesh's vertices that follow matched surfaces.
-
-    The boundary follows them, and the displacement inside is harmonic.
-    """
-    boundary, used = boundary_surface(mesh)
-    followed = follow_surfaces(boundary, chain)
-    moves = (followed - boundary.vertices).transpose(1, 0, 2).reshape(len(used), -1)
-    inside = harmonic_continuation(mesh.vertices, linear_pieces(mesh), used)(moves)
-    return np.asarray(mesh.vertices + inside.reshape(len(mesh.vertices), len(followed), 3).transpose(1, 0, 2))
-
-
 def _triangles(mesh: TriangleMesh) -> NDArray[np.integer]:
     return np.unique(np.sort(mesh.faces, axis=1), axis=0)
 
@@ -125,19 +110,6 @@ def carry_over_weeks(points: Floats, deformations: Sequence[Deformation]) -> Flo
     return np.stack(positions)
 
 
-def carry_mesh(mesh: TetrahedralMesh, later: Sequence[Correspondence], pose: Pose | None = None) -> Floats:
-    """Return the (w + 1, n, 3) positions of a mesh's vertices: its own, and carried to w later weeks.
-
-    All are in the worlds of the files, which correspondences refer to; `pose` is that of the mesh, if it is posed. With
-    matched surfaces the boundary follows them and the inside is continued harmonically.
-    """
-    if pose is not None:
-        mesh = TetrahedralMesh(transform_points(mesh.vertices, pose.inverse), mesh.tets)
-    if matched := [pair for pair in later if isinstance(pair, MatchedSurfaces)]:
-        return follow_inside(mesh, matched)
-    return carry_over_weeks(mesh.vertices, [pair for pair in later if isinstance(pair, Deformation)])
-
-
 def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floats:
     """Return the (n, 3) positions of a surface's vertices in the last brain; unchanged without correspondences."""
     if not between:
@@ -146,15 +118,6 @@ def carry_surface(mesh: TriangleMesh, between: Sequence[Correspondence]) -> Floa
     if matched:
         return np.asarray(follow_surfaces(mesh, matched)[-1])
     return np.asarray(carry_over_weeks(mesh.vertices, [pair for pair in between if isinstance(pair, Deformation)])[-1])
-
-
-def carry_to_pose(mesh: TriangleMesh, pose: Pose, between: Sequence[Correspondence], later_pose: Pose) -> TriangleMesh:
-    """Carry a brain's posed surface to a later brain, in the pose of the later brain's surface.
-
-    Correspondences refer to the worlds of the files.
-    """
-    world = transformed(mesh, pose.inverse)
-    return transformed(TriangleMesh(carry_surface(world, between), mesh.faces), later_pose.world)
 
 
 def carry_regions(

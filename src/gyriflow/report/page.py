@@ -384,15 +384,12 @@ def _scores(validation: Mapping[Any, Any]) -> dict[str, str]:
         ends = " to ".join(text(f"{name}_{end}_shape_index", pattern) for end in ("low", "high"))
         return f"{text(f'{name}_shape_index', pattern)} ({ends})" if len(validation) else "–"
 
-    has_share = validation.get("gain_share_flag_shape_index", "ok") == "ok"
     return {
         "observed brain": f"{week_label(validation['week'])}, {validation['kind']}" if len(validation) else "none",
         "distance (mm)": text("distance_mm", ".2f"),
         "r": spread("r", ".2f"),
         "r of the scaled start": text("r_start_shape_index", ".2f"),
         "gain": spread("gain", "+.2f"),
-        "headroom": spread("headroom", "+.2f"),
-        "gain / headroom": spread("gain_share", ".2f") if has_share else validation["gain_share_flag_shape_index"],
         "area (%)": text("area_difference", "+.1f", 100),
         "volume (%)": text("volume_difference", "+.1f", 100),
     }

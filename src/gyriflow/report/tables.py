@@ -11,7 +11,6 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from ..quantities import METRICS, Shown, metrics_shown
-from ..settings.stages import CostSettings
 from ..settings.terms import MEASURED, OBSERVED_BRAIN, SIDES, element_error, is_too_coarse
 from .labels import SIMPLER_PREDICTIONS, metric_title, parameter_label, plain, week_label
 from .style import run_colours, runs_by_name
@@ -161,14 +160,13 @@ def resolution_over_steps(order: int, steps: pd.DataFrame, *, has_layers: bool) 
     }
 
 
-def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
+def resources(jobs: pd.DataFrame) -> pd.DataFrame:
     """Sum up jobs: a row per rule, a row per run of the simulations, the longest first, and the sum of all.
 
-    A job keeps at least one core busy, so its energy is the longer of wall and CPU time times the power of a core.
-    `jobs` has the columns rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown; such jobs are
-    counted, and add nothing to the sums.
+    A job occupies at least one core, so its core hours are the longer of wall and CPU time. `jobs` has the columns
+    rule, run, wall_s, cpu_s, memory_MiB: NaN if unknown; such jobs are counted, and add nothing to the sums.
 
-    Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job), energy_Wh, co2e_g.
+    Columns stage, run, jobs, hours and core_hours (sums), memory_MiB (of the largest job).
     """
     hours = jobs[["wall_s", "cpu_s"]].astype(float) / 3600
     each = jobs.assign(hours=hours["wall_s"], core_hours=hours.max(axis=1), run=jobs["run"].fillna(""), jobs=1)
@@ -176,9 +174,7 @@ def resources(jobs: pd.DataFrame, costs: CostSettings) -> pd.DataFrame:
     stages = each.groupby(["rule", "run"], sort=False, as_index=False).agg(totals)
     stages = stages.rename(columns={"rule": "stage"}).sort_values("core_hours", ascending=False, kind="stable")
     whole = pd.DataFrame([{"stage": "all", "run": "", **stages.agg(totals)}])
-    table = pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
-    table["energy_Wh"] = costs.core_power_w * table["core_hours"]
-    return table.assign(co2e_g=costs.carbon_g_per_kwh / 1000 * table["energy_Wh"])
+    return pd.concat([stages, whole], ignore_index=True).astype({"jobs": int})
 
 
 def atlas_ages_table(ages: pd.DataFrame) -> pd.DataFrame:

@@ -51,11 +51,9 @@ SECONDS_PER_STAGE = {
     "folding_figures": 13.0,
     "growth_found_figures": 5.0,
     "named_sulci": 6.0,
-    "onset": 2.0,
     "prepare": 2.0,
     "prepare_with_maps": 4.0,
     "prepared_surfaces": 9.0,
-    "registration_ceiling": 16.0,
     "shape_maps": 6.5,
     "validation": 16.0,
 }

@@ -10,7 +10,7 @@ from .brains import BrainConfig, ParticipantsSettings
 from .folding import FoldingSettings
 from .runs import CalibrationSettings, GrowthSettings, Run, RunName, Start, StudyName, SweepSettings, complete_runs
 from .schemes import SchemeSettings
-from .stages import CostSettings, MeshSettings, MetricsSettings, SurfaceSettings
+from .stages import MeshSettings, MetricsSettings, SurfaceSettings
 
 FOLDING_SECTIONS = ("start", "folding", "runs", "studies", "calibrate")
 """Sections that are absent if a study only measures."""
@@ -45,8 +45,6 @@ class Config(Settings):
     """A search for the parameters that meet a real brain best."""
     metrics: MetricsSettings = MetricsSettings()
     """Metrics."""
-    costs: CostSettings = CostSettings()
-    """Energy and emissions."""
     _left_out: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)
     _age_sources: dict[str, str] = PrivateAttr(default_factory=dict)
 

@@ -53,17 +53,6 @@ Modes = Annotated[LastBand | Annotated[int, Field(ge=2, le=20000)], FirstIf(str)
 Regions = Annotated[Literal["named_sulci"] | dict[str, GivenRegions], FirstIf(str)]
 
 
-class CostSettings(Settings):
-    """Estimates of energy and emissions."""
-
-    core_power_w: float = Field(12.0, gt=0, le=1000)
-    """Power of a busy core: a processor's thermal design power over its cores, as in Green Algorithms (Lannelongue
-    et al. 2021, doi 10.1002/advs.202100707). [W]"""
-    carbon_g_per_kwh: float = Field(475.0, ge=0, le=5000)
-    """CO₂ emitted for electricity where the study runs; by default the world's average (IEA, Global Energy & CO₂
-    Status Report 2019). [g/kWh]"""
-
-
 class MetricsSettings(Settings):
     """Measurement of curvature and of spectra of gyrification (SpAnGy), the same for observed and simulated brains."""
 

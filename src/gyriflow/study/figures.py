@@ -249,8 +249,7 @@ def regions_figure(kind: Kind, study: Study) -> Iterator[Figure]:
 
 def validation_figure(kind: Kind, study: Study) -> Iterator[Figure]:
     if study.validated:
-        ceiling = "results/study/registration_ceiling.csv" if study.registered_starts else None
-        yield Figure(kind, inputs={"ceiling": ceiling}, options={"runs": list(study.config.runs)})
+        yield Figure(kind, options={"runs": list(study.config.runs)})
 
 
 def prediction_figure(kind: Kind, study: Study) -> Iterator[Figure]:
@@ -285,11 +284,6 @@ def deviation_figure(kind: Kind, study: Study) -> Iterator[Figure]:
         for quantity in ("log_area", *(["thickness_difference_mm"] if simulation.start.has_thickness else [])):
             names = {**simulation.names, "quantity": quantity}
             yield Figure(kind, names, {"brains": {"observed minus expected": maps}}, {"quantity": quantity})
-
-
-def onset_figure(kind: Kind, study: Study) -> Iterator[Figure]:
-    if study.validated_registered:
-        yield Figure(kind, options={"runs": list(study.config.runs)})
 
 
 # sweeps, which the configuration calls studies

@@ -86,7 +86,6 @@ MESH = {
     "surface": f"{BRAIN}/mesh/pial.stl",
     "quality": f"{BRAIN}/mesh/quality.json",
 }
-CARRIED_MESH = f"{BRAIN}/mesh/carried.h5"
 TARGETS = f"{BRAIN}/mesh/targets.{{origin}}.h5"
 PATH_MESH = {name: f"{BRAIN}/path/{PurePath(file).name}" for name, file in MESH.items()}
 ATLAS_PATH = f"{BRAIN}/path/shapes.h5"
@@ -124,10 +123,8 @@ ENSEMBLE = f"{RUN}/metrics/ensemble.csv"
 """Intervals of a run with an ensemble."""
 DEVIATION = {"table": f"{RUN}/metrics/{WEEK}/deviation.csv", "maps": f"{RUN}/metrics/{WEEK}/deviation.shape.gii"}
 VALIDATION = f"{RUN}/metrics/validation.csv"
-ONSET = f"{RUN}/metrics/onset.csv"
 COMPARED_MEMBER = f"{SWEEP}/members/{{run}}/{{brain}}/comparison.csv"
 MEMBER_COEFFICIENTS = f"{SWEEP}/members/{{run}}/{{brain}}/coefficients.csv"
-CEILING = f"{STUDY}/validation/{{brain}}/registration.csv"
 
 
 def one_of(names: Iterable[str]) -> str:

@@ -96,7 +96,7 @@ def _brain(
         regions_from = "given"
     elif is_whole and with_regions and settings.source != "shape":
         regions_from = "carried"
-    elif is_whole and not with_regions and not settings.synthetic:
+    elif is_whole and regions == "named_sulci" and not settings.synthetic:
         regions_from = "named"
     return Brain(
         config=settings,
@@ -104,7 +104,6 @@ def _brain(
         has_thickness=has_thickness,
         has_white=bool(settings.white_files) or (has_thickness and config.metrics.white_surfaces == "all"),
         regions_from=regions_from,
-        has_regions=bool(regions_from) and (bool(with_regions) or regions == "named_sulci"),
         checksums={path: checksums[path] for path in settings.files if path in checksums},
     )
 

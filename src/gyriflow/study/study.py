@@ -148,17 +148,6 @@ class Study:
             simulation for simulation in self.validated if simulation.start in starts and simulation.kind == "predicted"
         ]
 
-    @cached_property
-    def validated_registered(self) -> list[Simulation]:
-        """The validated simulations whose start brain is registered to later brains of its series."""
-        return [simulation for simulation in self.validated if self.chains[simulation.start.id, "self"].later]
-
-    @property
-    def registered_starts(self) -> list[str]:
-        """The ids of the start brains of `validated_registered`."""
-        starts = {simulation.start for simulation in self.validated_registered}
-        return [start.id for start in self.starts if start in starts]
-
     # measurements
 
     @cached_property

@@ -10,15 +10,11 @@ from shapes import LPS, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, carry, transform_points
-from gyriflow.geometry.poses import Pose
-from gyriflow.geometry.tetrahedra import quadratic
 from gyriflow.geometry.triangles import TriangleMesh, flipped, transformed
 from gyriflow.growth.carrying import (
-    carry_mesh,
     carry_over_weeks,
     carry_regions,
     carry_surface,
-    carry_to_pose,
     follow_surfaces,
     maps_on_template,
     match_surfaces,
@@ -84,29 +80,6 @@ def test_another_mesh_of_the_brain_goes_along_in_any_pose():
     assert carry_surface(own, []) is own.vertices
     with pytest.raises(InputError, check=Facts("5.16 mm", "2 mm")):
         follow_surfaces(TriangleMesh(own.vertices * 1.5, own.faces), [turned])
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_the_inside_goes_along_smoothly(order):
-    solid = ellipsoid_mesh(8, (10.0, 10.0, 10.0))
-    if order == 2:
-        solid = quadratic(solid)
-    found = carry_mesh(solid, [GROWN])
-    # a linear displacement is harmonic
-    assert found[1] == pytest.approx(solid.vertices * STRETCH, abs=0.05)
-    pose = Pose(rigid(0, 0, 30, shift=(4, 0, 1)))
-    posed = replace(solid, vertices=transform_points(solid.vertices, pose.world))
-    assert carry_mesh(posed, [GROWN], pose) == pytest.approx(found, abs=0.01)
-
-
-def test_a_posed_surface_is_carried_into_the_pose_of_the_later_brain():
-    own = own_surface()
-    first, last = Pose(rigid(0, 0, 30, shift=(4, 0, 1))), Pose(rigid(20, 0, 0, shift=(0, -3, 0)))
-    found = carry_to_pose(transformed(own, first.world), first, [GROWN], last)
-    expected = transformed(TriangleMesh(own.vertices * STRETCH, own.faces), last.world)
-    assert found.vertices == pytest.approx(expected.vertices, abs=0.05)
-    # the last brain itself stays where it is
-    assert carry_to_pose(own, last, [], last).vertices == pytest.approx(own.vertices)
 
 
 def test_regions_are_carried_along_matched_surfaces():

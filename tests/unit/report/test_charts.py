@@ -15,7 +15,7 @@ from gyriflow.metrics.norms import cohort_norms, measured_scores, norm_curves
 from gyriflow.report.growth import growth_chart
 from gyriflow.report.labels import SIMPLER_PREDICTIONS
 from gyriflow.report.pictures import region_colours
-from gyriflow.report.scores import calibration_chart, nearest_chart, onset_chart, validation_chart
+from gyriflow.report.scores import calibration_chart, nearest_chart, validation_chart
 from gyriflow.report.tables import brain_table
 from gyriflow.report.weeks import (
     displacement_chart,
@@ -391,21 +391,20 @@ def gains(runs, weeks=(22, 23, 24)):
             row = {"run": run, "start_week": 21, "week": week, "kind": "predicted" if week > 23 else "explained"}
             for measure in ("shape_index", "mean_curvature"):
                 gain = 0.01 * (number + week - 21)
-                for name, value in (("gain", gain), ("headroom", 0.2)):
-                    ends = {f"{name}_low_{measure}": value - 0.02, f"{name}_high_{measure}": value + 0.05}
-                    row |= {f"{name}_{measure}": value} | ends
+                row |= {
+                    f"gain_{measure}": gain,
+                    f"gain_low_{measure}": gain - 0.02,
+                    f"gain_high_{measure}": gain + 0.05,
+                }
             rows.append(row)
     return pd.DataFrame(rows)
 
 
-def test_gains_are_drawn_with_their_kind_and_the_real_week_before():
-    axes = validation_chart(gains(["reference", "measured"]), gains(["registration"])).axes[0]
+def test_gains_are_drawn_with_their_kind_and_interval():
+    axes = validation_chart(gains(["reference", "measured"])).axes[0]
     dots = [line for line in axes.lines if line.get_marker() == "o"]
     assert [line.get_markerfacecolor() for line in dots].count("white") == 2
     assert sum(len(line.get_xdata()) for line in dots) == 6
-    (stars,) = (line for line in axes.lines if line.get_marker() == "*")
-    np.testing.assert_allclose(np.asarray(stars.get_ydata(), dtype=float), 0.2)
-    assert any(line.get_linestyle() == ":" for line in axes.lines)
     # the bars of the first run end where its interval does
     bars = np.array(axes.collections[0].get_segments())[:, :, 1]
     np.testing.assert_allclose(bars, [[value - 0.02, value + 0.05] for value in (0.01, 0.02, 0.03)])
@@ -430,30 +429,6 @@ def test_runs_and_simpler_ways_are_lines_in_the_panels_of_their_start():
     assert len({line.get_color() for line in first.lines}) == 4
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["expected", "stiff", SIMPLER_PREDICTIONS["scaled"], "new"]
-
-
-def onsets(**weeks):
-    """Return onsets by run of the sulci left central, left 2 and one that is there at the start."""
-    rows = [
-        {"run": run, "subject": "a", "region": name, "there_at_start": name == "left calcarine", "onset_week": week}
-        for run, found in weeks.items()
-        for name, week in zip(("left central", "left 2", "left calcarine"), found, strict=True)
-    ]
-    return pd.DataFrame(rows)
-
-
-def test_each_sulcus_has_a_row_with_its_weeks():
-    axes = onset_chart(onsets(real=(26.0, 28.0, np.nan), measured=(26.5, np.nan, np.nan)), runs=["measured"]).axes[0]
-    # the earliest on top
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["left 2", "left central"]
-    lines = {(line.get_marker(), line.get_color()): line for line in axes.lines if len(line.get_xdata())}
-    (stars,) = (line for (marker, _), line in lines.items() if marker == "*")
-    assert sorted(stars.get_xdata()) == [26.0, 28.0]
-    (dots,) = (line for (marker, _), line in lines.items() if marker == "o")
-    assert dots.get_xdata().tolist() == [26.5]
-    assert np.abs(dots.get_ydata() - 1).max() < 0.5
-    (never,) = (line for (marker, _), line in lines.items() if marker == "x")
-    assert never.get_xdata().tolist() == [29.0]
 
 
 def distances(values: dict[float, float], flag: str = "ok", **labels: str) -> pd.DataFrame:

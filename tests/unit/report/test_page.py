@@ -32,7 +32,7 @@ from gyriflow.settings.terms import SPREAD_UNKNOWN
 from gyriflow.shipped import SHIPPED
 
 PAGE = Path(__file__).parents[3] / "workflow" / "report" / "page"
-PARTS = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.js", "viewer": "viewer.js"}
+PARTS = {"style": "style.css", "three": "three.min.js", "controls": "OrbitControls.min.js", "viewer": "viewer.js"}
 PARTS |= {"notice": "three.LICENSE.txt"}
 BRAINS = [
     {"id": name, "week": week, "population": "healthy", "source": "labels", "synthetic": False, "licence": licence}
@@ -53,9 +53,6 @@ VALIDATION = pd.DataFrame(
         "volume_difference": [0.0, 0.02], "r_shape_index": [0.1, 0.566], "r_start_shape_index": [0.1, 0.568],
         "r_low_shape_index": [0.0, 0.51], "r_high_shape_index": [0.2, 0.61], "distance_mm": [0.1, 0.42],
         "gain_shape_index": [0.0, -0.002], "gain_low_shape_index": [0.0, -0.044], "gain_high_shape_index": [0.0, 0.045],
-        "headroom_shape_index": [0.0, 0.03],
-        "headroom_low_shape_index": [0.0, -0.05], "headroom_high_shape_index": [0.0, 0.08],
-        "gain_share_shape_index": [np.nan, np.nan], "gain_share_flag_shape_index": "no headroom",
     }
 )  # fmt: skip
 
@@ -294,13 +291,9 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
     assert row["observed brain"] == Facts("23 GW", "predicted")
     assert row["area (%)"] == "−7.9"
     assert (row["r"], row["gain"]) == ("0.57 (0.51 to 0.61)", "−0.00 (−0.04 to +0.04)")
-    assert (row["headroom"], row["gain / headroom"]) == ("+0.03 (−0.05 to +0.08)", "no headroom")
     assert row["distance (mm)"] == "0.42"
     (alone,) = scores_table(RUNS).to_dict("records")
-    assert [alone[name] for name in ("gain", "headroom", "gain / headroom")] == ["–", "–", "–"]
-    share = {f"gain_share{end}_shape_index": value for end, value in (("", 0.4), ("_low", -0.1), ("_high", 0.8))}
-    (row,) = scores_table(RUNS, VALIDATION.assign(gain_share_flag_shape_index="ok", **share)).to_dict("records")
-    assert row["gain / headroom"] == "0.40 (−0.10 to 0.80)"
+    assert alone["gain"] == "–"
     assert "GW" not in alone["observed brain"]
 
 

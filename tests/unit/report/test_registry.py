@@ -207,10 +207,10 @@ def test_files_are_read_wherever_they_stand_among_the_inputs(monkeypatch, tmp_pa
     (tmp_path / "published.yaml").write_text("nearest: []")
     write_table(tmp_path / "spectra.csv", pd.DataFrame({"week": [21.0]}))
     at = {name: str(tmp_path / name) for name in ("quality.json", "params.yaml", "published.yaml", "spectra.csv")}
-    inputs = {"quality": {"a": at["quality.json"]}, "ceiling": None, "tables": [at["spectra.csv"]]}
+    inputs = {"quality": {"a": at["quality.json"]}, "small": None, "tables": [at["spectra.csv"]]}
     inputs |= {"frames": {"thin": frames}, "params": at["params.yaml"], "published": at["published.yaml"]}
     given = drawn(monkeypatch, tmp_path, "tables.mesh_quality_table", inputs, gates={})
-    assert (given["quality"], given["ceiling"], given["gates"]) == ({"a": {"tets": 7}}, None, {})
+    assert (given["quality"], given["small"], given["gates"]) == ({"a": {"tets": 7}}, None, {})
     assert given["params"].end_week == 22
     assert given["published"] == {"nearest": []}
     assert given["tables"][0]["week"].tolist() == [21.0]

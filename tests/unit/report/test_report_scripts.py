@@ -145,7 +145,7 @@ def test_records_have_the_inputs_settings_results_and_times_of_each_brain_and_ru
     outputs |= {"resources": "results/study/resources.csv", "resources_page": "resources.html", "warnings": "told.csv"}
     params = {"brains": brains, "folded": FOLDED, "growth_of": GROWTH, "config": {}, "method": {}}
     params["files"] = [(brain["id"], "labels", brain["labels"]) for brain in brains]
-    params |= {"known_brains": ["young", "old"], "costs": {"core_power_w": 12.0}}
+    params["known_brains"] = ["young", "old"]
     params["benchmarks"] = {"simulate": r"results/runs/(?P<run>\w+)/(?P<brain>\w+)/benchmarks/simulate\.tsv"}
     run_script("study_records.py", folder, inputs | {"template": "template.rst"}, outputs, params)
     assert read_table(outputs["resources"]).set_index("run")["hours"][["thin", "thick"]].tolist() == [1, 2]

@@ -19,7 +19,6 @@ from gyriflow.report.tables import (
     resources,
     runs_table,
 )
-from gyriflow.settings.stages import CostSettings
 
 COLUMNS = ["subject", "run", "week", "hemisphere", "metric", "value", "unit"]
 
@@ -164,14 +163,14 @@ JOBS = pd.DataFrame(
 )
 
 
-def test_energy_is_that_of_the_busy_cores_and_the_last_row_has_the_sum():
-    table = resources(JOBS, CostSettings(core_power_w=12, carbon_g_per_kwh=475))
+def test_core_hours_are_the_longer_of_wall_and_cpu_time_and_the_last_row_has_the_sum():
+    table = resources(JOBS)
     rows = table.set_index(["stage", "run"])
     assert table["stage"].tolist() == ["simulate", "simulate", "pial_from_labels", "lost", "all"]
-    assert rows.loc[("simulate", "thin")].tolist() == pytest.approx([1, 1.0, 4.0, 2000.0, 48.0, 22.8])
-    # a job keeps a core busy all the time, however little of it was sampled
-    assert rows.loc[("pial_from_labels", "")].tolist() == pytest.approx([2, 0.02, 0.02, 300.0, 0.24, 0.114])
-    assert rows.loc[("all", "")].tolist() == pytest.approx([5, 1.52, 6.02, 2000.0, 72.24, 34.314])
+    assert rows.loc[("simulate", "thin")].tolist() == pytest.approx([1, 1.0, 4.0, 2000.0])
+    # a job occupies a core all the time, however little of it was counted
+    assert rows.loc[("pial_from_labels", "")].tolist() == pytest.approx([2, 0.02, 0.02, 300.0])
+    assert rows.loc[("all", "")].tolist() == pytest.approx([5, 1.52, 6.02, 2000.0])
     # a job without a time is counted and adds nothing
-    assert rows.loc[("lost", ""), ["jobs", "energy_Wh"]].tolist() == [1, 0.0]
+    assert rows.loc[("lost", ""), ["jobs", "core_hours"]].tolist() == [1, 0.0]
     assert np.isnan(rows.loc[("lost", ""), "memory_MiB"])
