@@ -247,7 +247,8 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
         parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
         kind = "labels" if "labels" in brain.entry else "surfaces"
         folders[kind].add(str(Path(*parts)))
-    return sorted(max(folders.values(), key=lambda names: len(names)))
+    numbers = {kind: len(names) for kind, names in folders.items()}
+    return sorted(folders[max(numbers, key=numbers.__getitem__)])
 
 
 def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
