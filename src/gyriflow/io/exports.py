@@ -145,8 +145,8 @@ def export_bids(
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
     wide = COLUMNS.copy()
-    for name in tables.get("metrics_wide", ()):
-        wide.setdefault(_column_of_input(str(name)), OF_INPUT)
+    for name in map(str, tables.get("metrics_wide", ())):
+        wide.setdefault(_column_of_input(name), OF_INPUT)
     wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
     wide.pop("subject", None)
     write_json(folder / "metrics_wide.json", wide)
