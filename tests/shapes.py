@@ -11,8 +11,6 @@ from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
-from gyriflow.geometry.alignment import rigid_fit
-from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
 from gyriflow.geometry.triangles import TriangleMesh, face_normals, flipped, submesh, vertex_normals
 
@@ -30,11 +28,6 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
     matrix[:3, :3] = Rotation.from_euler("xyz", degrees or (0.0, 0.0, 0.0), degrees=True).as_matrix()
     matrix[:3, 3] = shift
     return matrix
-
-
-def without_rigid_motion(first, second, weights) -> np.ndarray:
-    """Return the (n, 3) displacement from `first` to `second` after the latter is rigidly aligned to the former."""
-    return transform_points(second, rigid_fit(second, first, weights)) - first
 
 
 def scaling(factors, shift=0.0) -> np.ndarray:
