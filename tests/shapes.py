@@ -11,8 +11,6 @@ from phantoms import CENTRE_MM, phantom_labels
 from scipy.spatial.transform import Rotation
 
 from gyriflow.anatomy.extraction import isosurface, make_simple, shifted_affine, smooth_mask
-from gyriflow.geometry.alignment import rigid_fit
-from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import TetrahedralMesh, grid
 from gyriflow.geometry.triangles import TriangleMesh, face_normals, flipped, submesh, vertex_normals
 
@@ -36,11 +34,6 @@ def rigid(*degrees, shift=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 FAR = rigid(0.0, 0.0, 30.0, shift=(200.0, -180.0, 130.0)), rigid(25.0, 0.0, -30.0, shift=(-150.0, 220.0, 140.0))
 """Two poses, each 300 mm from the origin and turned by 30 degrees or more, so that none stands for the other."""
-
-
-def without_rigid_motion(first, second, weights) -> np.ndarray:
-    """Return the (n, 3) displacement from `first` to `second` after the latter is rigidly aligned to the former."""
-    return transform_points(second, rigid_fit(second, first, weights)) - first
 
 
 def scaling(factors, shift=0.0) -> np.ndarray:

@@ -10,7 +10,7 @@ from boxes import COMM
 from contact_bodies import after_steps, in_a_tube, problem_with_contact, two_blocks
 from facts import Facts
 from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid_mesh, rigid, without_rigid_motion
+from shapes import box_mesh, ellipsoid_mesh, rigid
 
 from gyriflow.folding.checkpoint import State
 from gyriflow.folding.growth import GrowthInputs
@@ -19,7 +19,7 @@ from gyriflow.folding.step_fields import von_mises
 from gyriflow.folding.stretches import deformation_gradients, inverse_stretch, log_stretch
 from gyriflow.folding.targets import missed_targets, shrinkage_note
 from gyriflow.folding.zones import zones_of_run
-from gyriflow.geometry.alignment import rigid_fit
+from gyriflow.geometry.alignment import rigid_fit, without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.diffusion import cell_sizes, vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES

@@ -3,9 +3,10 @@
 import numpy as np
 import odd_brains
 import pytest
-from shapes import LPS, cerebrum_surface, phantom, rigid, without_rigid_motion
+from shapes import LPS, cerebrum_surface, phantom, rigid
 
 from gyriflow.anatomy.repair import pieces
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.tetrahedra import boundary_surface
 from gyriflow.geometry.triangles import TriangleMesh

@@ -56,6 +56,12 @@ def rigid_fit(points: Floats, onto: Floats, weights: Floats) -> Floats:
     return motion(turn.as_matrix(), target - turn.apply(source))
 
 
+def without_rigid_motion(first: Floats, second: Floats, weights: Floats) -> Floats:
+    """Return the (n, 3) displacement from `first` to `second` after the latter is rigidly aligned to the former."""
+    back = rigid_fit(second, first, weights)
+    return np.asarray(second @ back[:3, :3].T + back[:3, 3] - first)
+
+
 def step_towards_planes(
     points: Floats, normals: Floats, distances: Floats, weights: Floats | None = None
 ) -> tuple[Floats, Floats]:

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from shapes import box_mesh, ellipsoid_mesh, without_rigid_motion
+from shapes import box_mesh, ellipsoid_mesh
 from verification_cases.growth_maps import WavyBox, errors_of_map
 
 from gyriflow.folding.growth import GrowthInputs, StepStart
 from gyriflow.folding.targets import FEEDBACK_FROM_MM, FEEDBACK_GW, FEEDBACK_SMOOTHING_MM, growth_on_path
 from gyriflow.folding.zones import zones_of_run
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.diffusion import vertex_sizes
 from gyriflow.geometry.paths import path_through
 from gyriflow.settings.folding import parameters_from

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from shapes import box_mesh, ellipsoid_mesh, rigid, without_rigid_motion
+from shapes import box_mesh, ellipsoid_mesh, rigid
 
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import transform_points
 from gyriflow.geometry.jacobians import inverted_on_the_way
 from gyriflow.geometry.paths import limited_velocities, merged_shapes, path_through

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from facts import Facts
 from scipy.spatial.transform import Rotation
-from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, scaling, sphere, without_rigid_motion
+from shapes import box_mesh, ellipsoid, ellipsoid_mesh, rigid, scaling, sphere
 
 from gyriflow.errors import InputError
 from gyriflow.folding.elastic_fit import ElasticFit
 from gyriflow.folding.stretches import deformation_gradients, log_stretch
+from gyriflow.geometry.alignment import without_rigid_motion
 from gyriflow.geometry.deformations import Deformation, MatchedSurfaces, transform_points
 from gyriflow.geometry.diffusion import cell_sizes, diffuse, vertex_sizes
 from gyriflow.geometry.jacobians import SLOPES
