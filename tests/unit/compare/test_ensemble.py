@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import nibabel as nib
 import numpy as np
 import pandas as pd
 import pytest
@@ -142,4 +143,6 @@ def test_the_scripts_read_run_members_and_observed_brain_of_both_sides(tmp_path)
         inputs = {"surfaces": [f"{file}.surf.gii" for file in files], "maps": [f"{file}.shape.gii" for file in files]}
         run_script("ensemble_maps.py", tmp_path, inputs, {0: "spread.shape.gii"}, wildcards=SimpleNamespace(side=side))
         spreads.append(read_vertex_maps(tmp_path / "spread.shape.gii")["position_sd_mm"].mean())
+        structure = nib.load(tmp_path / "spread.shape.gii").meta["AnatomicalStructurePrimary"]
+        assert structure == f"Cortex{side.title()}"
     assert spreads == pytest.approx([np.sqrt(2), 11 * np.sqrt(2)], rel=1e-3)

@@ -110,6 +110,13 @@ def test_several_brains_of_a_week_and_two_weeks_alone():
     assert np.isnan(alone.curve.sd).all()
 
 
+def test_four_weeks_have_three_degrees_of_freedom_a_size_a_rate_and_its_change():
+    # a rate that changes steadily is met by these
+    fit = fitted(WEEKS[:4], VOLUMES[:4])
+    assert value(fit.curve, WEEKS[:4]) == pytest.approx(VOLUMES[:4], rel=1e-3)
+    assert rate(fit.curve, WEEKS[:4]) == pytest.approx(RATES[:4], abs=1e-3)
+
+
 def test_beyond_its_ends_growth_goes_on():
     fit = fitted(WEEKS, VOLUMES)
     end = rate(fit.curve, 30.0)

@@ -66,7 +66,10 @@ def test_published_volumes_of_cortex_and_white_matter() -> None:
     assert found.loc["cortex", "z"] == pytest.approx(1.0, abs=0.01)
     assert found["centile"].tolist() == pytest.approx([84.13, 50.0], abs=0.3)
     assert np.isnan(found["brains"]).all()
-    assert published_scores(labelled(18.0, {3: 30.0}), NORMS)["flag"].tolist() == ["outside the norm's weeks"]
+    first, last = NORMS["cortex"].weeks
+    outside = "outside the norm's weeks"
+    for week, flag in ((first - 0.1, outside), (first, "ok"), (last, "ok"), (last + 0.1, outside)):
+        assert published_scores(labelled(week, {3: 30.0}), NORMS)["flag"].tolist() == [flag]
     assert all(np.polyval(norm.sd, np.linspace(*norm.weeks, 201)).min() > 0 for norm in NORMS.values())
 
 
