@@ -247,8 +247,8 @@ def _data_sets(group: Sequence[FoundBrain]) -> list[str]:
         parts = [part for part in folder.parts if not GENERIC_FOLDER.fullmatch(part)]
         kind = "labels" if "labels" in brain.entry else "surfaces"
         folders[kind].add(str(Path(*parts)))
-    numbers = {kind: len(names) for kind, names in folders.items()}
-    return sorted(folders[max(numbers, key=numbers.__getitem__)])
+    most = max(folders.values(), key=len)
+    return sorted(most)
 
 
 def _preferred_files(group: Sequence[FoundBrain], unused: dict[str, str]) -> list[FoundBrain]:
