@@ -144,7 +144,7 @@ def export_bids(
         table.insert(0, "participant_id", [subject for subject, _ in ids])
         table.insert(1, "session_id", [session for _, session in ids])
         _write_tsv(folder / f"{name}.tsv", table)
-    wide = dict.fromkeys(map(_column_of_input, tables.get("metrics_wide", ())), OF_INPUT) | COLUMNS
+    wide = {_column_of_input(str(name)): OF_INPUT for name in tables.get("metrics_wide", ())} | COLUMNS
     wide |= {name: {"Description": text, "Units": bids_unit(unit)} for name, (text, unit) in columns.items()}
     wide.pop("subject", None)
     write_json(folder / "metrics_wide.json", wide)
