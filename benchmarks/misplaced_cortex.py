@@ -8,6 +8,7 @@ has the number of volumes, the number with a warning, and the weeks without one.
 """
 
 import argparse
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 from common import ROOT, print_rows
 from scipy import ndimage
 
+from gyriflow.anatomy.extraction import dilated
 from gyriflow.anatomy.misplaced import misplaced_cortex
 from gyriflow.io.volumes import LabelVolume, read_label_volume
 from gyriflow.io.yaml_files import SCHEMES
@@ -23,7 +25,7 @@ SCHEME = SCHEMES["spina-bifida-atlas"]
 (CORTEX,) = SCHEME.cortex
 SHIPPED_VOLUMES = str(ROOT / "atlases/spina-bifida/fetal_SB_atlas_GA{week}_*/parcellation.nii.gz")
 # room for what is added outside the brain
-MARGIN_MM = 20.0
+MARGIN_MM = 18.0
 BLOB_MM = 4.0
 BLOB_AWAY_MM = 8.0
 # a sheet of cortex fills the fissure within this distance of its middle, and stands out by as much above the brain
@@ -47,33 +49,33 @@ def faults(volume: LabelVolume) -> Iterator[tuple[str, np.ndarray]]:
     cerebrum = np.isin(labels, SCHEME.cerebrum)
     ventricles = np.isin(labels, SCHEME.ventricles)
     hindbrain = np.isin(labels, (*SCHEME.cerebellum, *SCHEME.brainstem))
-    x, _, z = np.indices(labels.shape)
+    x, y, z = np.ogrid[tuple(slice(0, n) for n in labels.shape)]
 
     def ball(centre: np.ndarray) -> np.ndarray:
-        offsets = (np.indices(labels.shape).T - centre) * size
-        return np.linalg.norm(offsets, axis=-1).T <= BLOB_MM
+        squared = ((x - centre[0]) * size[0]) ** 2 + ((y - centre[1]) * size[1]) ** 2 + ((z - centre[2]) * size[2]) ** 2
+        return squared <= BLOB_MM**2
 
     yield "none", labels
     yield "cerebellum is cortex", np.where(np.isin(labels, SCHEME.cerebellum), CORTEX, labels)
     yield "brainstem is cortex", np.where(np.isin(labels, SCHEME.brainstem), CORTEX, labels)
     yield "both are cortex", np.where(hindbrain, CORTEX, labels)
 
-    depth = ndimage.distance_transform_edt(ventricles, sampling=size)
-    widest = np.argwhere(depth == depth.max())[0]
+    box = ndimage.find_objects(ventricles.astype(np.uint8))[0]
+    depth = ndimage.distance_transform_edt(np.pad(ventricles[box], 1), sampling=size)
+    widest = np.argwhere(depth == depth.max())[0] - 1 + [side.start for side in box]
     yield "blob in a ventricle", np.where(ball(widest) & ventricles, CORTEX, labels)
 
-    near = ndimage.distance_transform_edt(~ventricles, sampling=size) <= LAYER_MM
+    near = dilated(ventricles, LAYER_MM / size.min())
     yield "layer around the ventricles", np.where(near & np.isin(labels, SCHEME.white_matter), CORTEX, labels)
 
     # above the brain's middle, so that the fissure is filled from the callosum to beyond its edge
-    middle = np.argwhere(cerebrum)[:, 0].mean()
-    reached = ndimage.distance_transform_edt(~cerebrum, sampling=size) <= SHEET_ABOVE_MM
-    above = z > np.median(np.argwhere(cerebrum)[:, 2])
-    sheet = (np.abs(x - middle) * size[0] <= SHEET_MM) & reached & above
+    places = np.argwhere(cerebrum)
+    middle, height = places[:, 0].mean(), np.median(places[:, 2])
+    reached = dilated(cerebrum, SHEET_ABOVE_MM / size.min())
+    sheet = (np.abs(x - middle) * size[0] <= SHEET_MM) & reached & (z > height)
     yield "sheet in the fissure", np.where(sheet & ~cerebrum & ~hindbrain, CORTEX, labels)
 
-    top = np.argwhere(cerebrum)
-    centre = top[top[:, 2].argmax()] + np.array([0, 0, (BLOB_AWAY_MM + BLOB_MM) / size[2]])
+    centre = places[places[:, 2].argmax()] + np.array([0, 0, (BLOB_AWAY_MM + BLOB_MM) / size[2]])
     yield "blob outside, 8 mm away", np.where(ball(centre) & ~cerebrum, CORTEX, labels)
 
 
@@ -101,6 +103,7 @@ def main() -> None:
                     if fault != "none" and (week - first) % arguments.every:
                         break
                     warnings = list(misplaced_cortex(labels, volume.affine, SCHEME))
+                    print(f"{path}: {fault}: {warnings or 'no warning'}", file=sys.stderr, flush=True)
                     row = rows.setdefault((atlas, fault), {"volumes": 0, "warned": 0, "not_warned": []})
                     row["volumes"] += 1
                     row["warned"] += bool(warnings)
