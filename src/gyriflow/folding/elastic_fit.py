@@ -24,9 +24,9 @@ from ..geometry.alignment import rigid_fit
 from ..geometry.deformations import transform_points
 from ..geometry.diffusion import integrals_at_vertices, smooth_integrals, vertex_sizes
 from ..geometry.flat_elements import open_flat_elements
-from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way, lower_bounds
+from ..geometry.jacobians import SLOPES, determinants, inverted_on_the_way
 from ..geometry.matching import faces_that_cross
-from ..geometry.straightening import straighten_sides
+from ..geometry.straightening import may_fold_over, straighten_sides
 from ..geometry.tetrahedra import TetrahedralMesh, boundary_surface, has_volume, linear_pieces, volumes_between
 from ..geometry.triangles import Floats, Ints, Mask, TriangleMesh, signed_volume, vertex_areas
 from ..mechanics.materials import MATERIALS
@@ -357,8 +357,8 @@ class ElasticFit:
         if self._tets is self._pieces:
             return
         places = straighten_sides(self.positions_mm, self._tets)
-        bad = lower_bounds(places, self._tets) <= 0
-        if bad.any() or (volumes_between(places, self._pieces) <= 0).any():
+        bad = may_fold_over(places, self._tets)
+        if bad.any():
             raise SolverError(
                 "a shape cannot be reached with curved elements that are valid",
                 found=f"{int(bad.sum())} elements fold over",

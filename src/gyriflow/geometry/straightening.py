@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .jacobians import EDGES, lower_bounds
-from .tetrahedra import TetrahedralMesh, boundary_faces, volumes_between
-from .triangles import Floats, Ints
+from .tetrahedra import PIECES, TetrahedralMesh, boundary_faces, volumes_between
+from .triangles import Floats, Ints, Mask
 
 ROUNDS = 6
 """Number of rounds in which nodes are moved."""
+FULL_ROUNDS = 4
+"""Number of rounds after these in which nodes are moved to the middles of their sides."""
 PARTS = (1.0, 0.5, 0.25)
 """Parts of the way to the middle of its side that an inner node may move in a round."""
 MIN_GAIN = 1e-3
@@ -21,18 +23,25 @@ MIN_GAIN = 1e-3
 def straighten_sides(positions: Floats, tets: NDArray[np.integer]) -> Floats:
     """Return (n, 3) positions with straighter sides of (m, 10) elements that may fold over.
 
-    In each round the nodes of their sides move halfway to the middle of the side, in the last one fully. Elements with
-    inverted corners still fold over.
+    In each round the nodes of their sides move halfway to the middle of the side, in the last ones fully: that may bend
+    elements around. Elements with inverted corners still fold over.
     """
     places = positions.copy()
-    for rounds_left in reversed(range(ROUNDS)):
-        bent = tets[lower_bounds(places, tets) <= 0]
+    for number in range(ROUNDS + FULL_ROUNDS):
+        bent = tets[may_fold_over(places, tets)]
         if not len(bent):
             break
         middles = bent[:, 4:]
         straight = places[bent[:, EDGES]].mean(axis=2)
-        places[middles] = straight if rounds_left == 0 else (straight + places[middles]) / 2
+        places[middles] = straight if number >= ROUNDS else (straight + places[middles]) / 2
     return places
+
+
+def may_fold_over(positions: Floats, tets: NDArray[np.integer]) -> Mask:
+    """Return (m,) whether (m, 10) elements may fold over, or a linear piece between their nodes is inverted."""
+    volumes = volumes_between(positions, tets[:, PIECES].reshape(-1, 4))
+    has_inverted_piece = (volumes <= 0).reshape(len(tets), -1).any(axis=1)
+    return has_inverted_piece | (lower_bounds(positions, tets) <= 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ import pytest
 from shapes import box_mesh
 
 from gyriflow.geometry.jacobians import EDGES
-from gyriflow.geometry.straightening import InnerSides, straighten_sides, straightness
+from gyriflow.geometry.straightening import InnerSides, may_fold_over, straighten_sides, straightness
 from gyriflow.geometry.tetrahedra import boundary_faces, quadratic
 
 MESH = quadratic(box_mesh((3, 3, 3), (6.0, 5.0, 4.0)))
@@ -38,6 +38,15 @@ def test_an_element_that_folds_over_becomes_valid():
     positions = bowed(0.4)
     assert straightness(positions, MESH.tets).min() < 0
     assert straightness(straighten_sides(positions, MESH.tets), MESH.tets).min() > 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_neither_elements_nor_their_pieces_stay_folded_over_where_all_sides_are_bowed(seed):
+    middles = np.unique(MESH.tets[:, 4:])
+    positions = MESH.vertices.copy()
+    positions[middles] += 0.4 * np.random.default_rng(seed).normal(size=(len(middles), 3))
+    assert may_fold_over(positions, MESH.tets).any()
+    assert not may_fold_over(straighten_sides(positions, MESH.tets), MESH.tets).any()
 
 
 @pytest.mark.parametrize("least", [0.4, 0.7])
