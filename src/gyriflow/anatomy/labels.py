@@ -82,7 +82,7 @@ def read_cerebrum(labels: Labels, affine: Floats, scheme: LabelScheme, min_corte
     """
     mask = cerebrum_mask(labels, scheme)
     report: dict[str, Any] = {}
-    warnings = []
+    warnings: list[str] = []
     absent = np.setdiff1d(scheme.cerebrum, labels)
     if missing_tissues := [f"{number} {scheme.labels[number]}" for number in scheme.cerebrum if number in absent]:
         report["missing_tissues"] = missing_tissues
