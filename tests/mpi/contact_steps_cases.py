@@ -143,6 +143,16 @@ def pressed(step_s, days=4, **changes):
     return folding, state
 
 
+@pytest.mark.one_rank
+@pytest.mark.parametrize(("memory", "end"), [(0.0, "_per_gw"), ("infinite", "")])
+def test_stress_is_a_rate_where_it_is_forgotten_and_whole_where_it_is_kept(memory, end):
+    folding, _ = pressed(43200.0, days=0.5, stress_memory_gw=memory)
+    at_vertices, of_elements = step_fields(folding, ["stress", "strain", "contact_pressure"])
+    assert set(at_vertices) == {f"contact_pressure_pa{end}"}
+    elastic = {f"{name}{end}" for name in ("von_mises_pa", "pressure_pa", "elastic_strain", "elastic_volume_strain")}
+    assert set(of_elements) == elastic | {"total_strain", "area_stretch"}
+
+
 @pytest.mark.slow
 @pytest.mark.one_rank
 def test_stress_that_is_forgotten_is_written_as_a_rate_that_does_not_depend_on_the_step():

@@ -101,11 +101,11 @@ def test_oblique_affine_gives_the_same_areas_and_fissure(volume, phantom):
 @pytest.mark.parametrize("tilt", [(0.0, 0.4, 0.0), (0.0, 0.0, -0.4)])
 def test_the_fissure_is_where_the_brain_is_however_far_from_the_origin(tilt):
     """A tilt too small to be undone: at the origin, 300 mm away, the plane's x is another one by 2 mm."""
-    brain = merged(*(shapes.hemisphere(side) for side in (-1, 1)))
+    brain = merged(*shapes.phantom_halves(21.0, 2.0))
     far = transformed(brain, rigid(*tilt, shift=(20.0, -200.0, 220.0)))
     surface = from_surface(far, week=21.0, coordinates="ras", edge_length_mm=2.5)
     assert surface.report["rotation_deg"] == 0
-    assert surface.fissure_x_mm == pytest.approx(20.0, abs=0.2)
+    assert surface.fissure_x_mm == pytest.approx(20.0, abs=0.5)
 
 
 def test_sulci_that_stay_fused_are_warned_of_at_ages_at_which_labels_close_them(volume):
