@@ -68,7 +68,7 @@ def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nea
     units = {"area": "cm2", "volume": "mL"}
     table = [(brain, run, week, "whole", name, value, units.get(name, "1")) for brain, run, week, name, value in rows]
     of = {"run": "a", "brain": "s", "start_week": 22.4, "week": 29.9, "atlas_brain": "atlas30", "atlas_week": 30}
-    of["tests"] = {"errors": {"area": "largest error of 2 start brains, ± 8 %"}}
+    of["tests"] = {"errors": {"area": "largest error in 4 tests of 2 start brains: ± 8 %"}}
     metrics = pd.DataFrame(table, columns=COLUMNS)
     centiles = metrics.assign(expected=np.nan, z=np.nan, centile=np.nan, centile_low=0.0, centile_high=0.0)
     found = predicted_table(metrics, of, centiles)
@@ -78,7 +78,7 @@ def test_a_predicted_brain_stands_between_its_start_and_the_atlas_own_of_the_nea
         210.0,
         200.0,
         "+5.0",
-        "largest error of 2 start brains, ± 8 %",
+        "largest error in 4 tests of 2 start brains: ± 8 %",
     ]
     # what a brain has not is a dash
     assert found.index.tolist() == ["pial area (cm²)", "volume (mL)"]
