@@ -221,11 +221,10 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
             f"found {len(values)} values of {settings.colour_by!r}; colours can show 2 to {MAX_COLOURS}",
             ("metrics", "colour_by"),
         )
-    with_regions = settings.regions if isinstance(settings.regions, dict) else {}
-    yield from _unknown(with_regions, config, ("metrics", "regions"))
+    yield from _unknown(settings.regions, config, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # regions are carried, and their asymmetry measured, on both hemispheres together
-    if wrong := [brain.id for brain in config.brains if brain.id in with_regions and brain.hemisphere is not None]:
+    if wrong := [brain.id for brain in config.brains if brain.id in settings.regions and brain.hemisphere is not None]:
         yield KeyProblem(
             f"found {', '.join(wrong)} with one hemisphere; expected brains with both", ("metrics", "regions")
         )

@@ -75,16 +75,15 @@ class Brain:
 
     `labels` is None if it is defined by surfaces. `has_thickness`, `has_white`: there are results for its cortical
     thickness and its white surfaces, from labels or from white surfaces of the configuration. `regions_from` is the
-    source of its regions: given for this brain, carried from another brain, or named sulci. `has_regions`: its metrics
-    are also measured by region. `checksums` has atlas and SHA-256 of its files that belong to an atlas, by path.
+    source of its regions: given for this brain, carried from another brain, or None without regions. `checksums` has
+    atlas and SHA-256 of its files that belong to an atlas, by path.
     """
 
     config: BrainConfig
     labels: LabelSource | None
     has_thickness: bool
     has_white: bool
-    regions_from: Literal["given", "carried", "named"] | None
-    has_regions: bool
+    regions_from: Literal["given", "carried"] | None
     checksums: Mapping[str, tuple[str, str]]
 
     @property
@@ -142,8 +141,13 @@ class Brain:
         return paths.PIAL["report"].format(brain=self.id)
 
     @property
+    def has_regions(self) -> bool:
+        """Whether its metrics are also measured by region."""
+        return self.regions_from is not None
+
+    @property
     def regions(self) -> Mapping[str, str]:
-        return paths.region_files(f"results/brains/{self.id}/metrics") if self.regions_from else {}
+        return paths.region_files(f"results/brains/{self.id}/metrics") if self.has_regions else {}
 
     @cached_property
     def measurement(self) -> Measurement:
@@ -156,7 +160,7 @@ class Brain:
             surfaces=f"results/brains/{self.id}/surface",
             thickness=paths.THICKNESS["measured"].format(brain=self.id) if self.has_thickness else [],
             report=self.report,
-            regions=self.regions if self.has_regions else {},
+            regions=self.regions,
         )
 
 

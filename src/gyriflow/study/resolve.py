@@ -89,22 +89,18 @@ def _brain(
         labels = LabelSource(volume, settings.affine_from, label_scheme(config, settings))
     has_thickness = bool(settings.white_files) or (labels is not None and bool(labels.scheme.cortex))
     is_whole = len(settings.sides) == len(SIDES)
-    regions = config.metrics.regions
-    with_regions = [name for name in regions if name not in refused] if isinstance(regions, dict) else []
-    regions_from: Literal["given", "carried", "named"] | None = None
+    with_regions = [name for name in config.metrics.regions if name not in refused]
+    regions_from: Literal["given", "carried"] | None = None
     if is_whole and settings.id in with_regions:
         regions_from = "given"
     elif is_whole and with_regions and settings.source != "shape":
         regions_from = "carried"
-    elif is_whole and not with_regions and not settings.synthetic:
-        regions_from = "named"
     return Brain(
         config=settings,
         labels=labels,
         has_thickness=has_thickness,
         has_white=bool(settings.white_files) or (has_thickness and config.metrics.white_surfaces == "all"),
         regions_from=regions_from,
-        has_regions=bool(regions_from) and (bool(with_regions) or regions == "named_sulci"),
         checksums={path: checksums[path] for path in settings.files if path in checksums},
     )
 

@@ -151,7 +151,7 @@ def test_refused_brains_leave_studies_and_comparisons_too(real, files):
     }
     assert ids(found.sweeps["thick"].observed["b21"]) == ["twin"]
     assert found.simulations["reference", "b21"].observed == {24: found.brains["twin"]}
-    assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], "named")
+    assert (found.norm_reference, found.brains["b21"].regions_from) == (["b21"], None)
     # maps are brought to a template that is there
     in_both = study(real[:3], metrics={"template": "b23"}), found
     assert [{len(row.template_maps) for row in one.exported} for one in in_both] == [{2}, {0}]
@@ -500,12 +500,3 @@ def test_regions_are_those_of_the_nearest_brain_that_has_any(labels, files):
     # those of a run hold at all its weeks
     regions = found.all_measurements["runs/reference/b21/metrics/week-22.00"].regions
     assert regions["left_regions"] == "results/runs/reference/b21/metrics/left.regions.label.gii"
-
-
-def test_named_sulci_are_those_of_real_whole_brains(real):
-    brains = [*real, {"id": "sphere", "week": 22, **SPHERE}]
-    found = study(brains)
-    assert [brain.regions_from for brain in found.brains.values()] == ["named"] * 4 + [None]
-    assert [one.regions for one in found.measurements.values()] == [{}] * len(found.measurements)
-    everywhere = study(brains, metrics={"regions": "named_sulci"}).brains.values()
-    assert [brain.has_regions for brain in everywhere] == [True] * 4 + [False]
