@@ -208,8 +208,9 @@ def test_conda_environment_has_the_packages_of_the_project_as_they_are_locked():
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     (pip,) = [entry["pip"] for entry in environment["dependencies"] if isinstance(entry, dict)]
     content, versions = tomllib.loads((ROOT / "pyproject.toml").read_text()), locked()
-    extras = content["project"]["optional-dependencies"]["fold"]
-    entries = [*content["project"]["dependencies"], *extras, *content["dependency-groups"]["dev"]]
+    project = content["project"]
+    extras = [*project["optional-dependencies"]["fold"], *project["optional-dependencies"]["calibrate"]]
+    entries = [*project["dependencies"], *extras, *content["dependency-groups"]["dev"]]
     # conda-forge has dolfinx, which brings numpy
     from_conda = {"numpy", "dolfinx-solver-real"}
     names = [re.split(r"[<>=]", entry)[0] for entry in entries]
