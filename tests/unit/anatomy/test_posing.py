@@ -193,7 +193,6 @@ def pose_when_turned(brain, degrees):
     return pose_of_labels(brain[0], rigid(*degrees) @ brain[1], SCHEMES["spina-bifida-atlas"])
 
 
-@pytest.mark.fault(49)
 @pytest.mark.parametrize("degrees", TURNS)
 def test_quarter_turns_of_a_volume_are_undone_exactly(brain, degrees):
     pose = pose_when_turned(brain, degrees)
@@ -263,7 +262,6 @@ def test_a_brain_with_a_reversed_axis_may_be_mirrored_and_is_told_so(brain):
     assert turned.warnings[0] == Facts("180°") != Facts("left")
 
 
-@pytest.mark.fault(10)
 @pytest.mark.parametrize(
     ("turn", "most_deg", "warnings"),
     [(np.eye(4), 1e-6, []), (LPS, 1e-6, [Facts("LPS")]), (rigid(100, 40, -70), 5.0, [Facts("°")])],
@@ -290,7 +288,6 @@ def test_a_brain_that_fits_several_poses_is_taken_as_ras_and_doubted(brain, path
     assert pose.warnings[0] == Facts("RAS+", "coordinates")
 
 
-@pytest.mark.fault(9, 10)
 def test_hemispheres_in_coordinates_that_their_shapes_contradict_are_doubted():
     left, right = atlas_halves()
     assert hemisphere_warnings(left, right, "ras") == []

@@ -36,7 +36,6 @@ def drawn(values):
     return mean + sd * np.append(0.0, np.random.default_rng(0).normal(size=2000))
 
 
-@pytest.mark.fault(85)
 def test_the_share_of_a_gain_is_given_where_there_is_something_to_be_gained():
     row = gain_columns(drawn((0.45, 0.0)), drawn((0.3, 0.0)), drawn((0.7, 0.05)))
     assert [row[name] for name in ("r", "r_start", "r_adjacent")] == [0.45, 0.3, 0.7]
@@ -46,7 +45,6 @@ def test_the_share_of_a_gain_is_given_where_there_is_something_to_be_gained():
     assert row["gain_share_flag"] == "ok"
 
 
-@pytest.mark.fault(85)
 @pytest.mark.parametrize("adjacent", [0.2, 0.5, 0.55])
 def test_a_baseline_that_may_be_no_better_than_the_start_has_no_headroom(adjacent):
     row = gain_columns(drawn((0.3, 0.1)), drawn((0.5, 0.0)), drawn((adjacent, 0.05)))

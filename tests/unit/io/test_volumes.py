@@ -35,7 +35,6 @@ def position(volume, label):
     return volume.affine[:3, :3] @ np.argwhere(volume.labels == label)[0] + volume.affine[:3, 3]
 
 
-@pytest.mark.fault(3)
 @pytest.mark.parametrize("order", ["LAS", "LPS", "PIR", "SRA", "RAS"])
 def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
     image = nib.Nifti1Image(labels, AFFINE)
@@ -46,7 +45,6 @@ def test_storage_order_does_not_move_the_brain(tmp_path, labels, order):
         assert position(volume, label) == pytest.approx(AFFINE[:3, :3] @ index + AFFINE[:3, 3], abs=1e-4)
 
 
-@pytest.mark.fault(4)
 @pytest.mark.parametrize(("unit", "per_mm"), [("mm", 1.0), ("meter", 1e-3), ("micron", 1e3)])
 def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     stored = np.diag([per_mm] * 3 + [1.0]) @ AFFINE
@@ -54,7 +52,6 @@ def test_units_of_the_header_become_mm(tmp_path, labels, unit, per_mm):
     assert volume.affine == pytest.approx(AFFINE, rel=1e-5)
 
 
-@pytest.mark.fault(53)
 def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     nib.save(nib.MGHImage(labels.astype(np.int32), AFFINE.astype(np.float32)), tmp_path / "aseg.mgz")
     volume = read_label_volume(tmp_path / "aseg.mgz")
@@ -62,7 +59,6 @@ def test_labels_of_freesurfer_volumes_are_read(tmp_path, labels):
     assert volume.affine == pytest.approx(AFFINE, abs=1e-4)
 
 
-@pytest.mark.fault(2)
 def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     other = AFFINE.copy()
     other[0, 3] = 33.0
@@ -74,7 +70,6 @@ def test_disagreeing_qform_and_sform_are_refused_both_printed(tmp_path, labels):
     assert read_label_volume(path, "sform").affine[0, 3] == pytest.approx(-10.0)
 
 
-@pytest.mark.fault(2)
 @pytest.mark.parametrize(("sform", "qform"), [(1, 0), (0, 1)])
 def test_of_two_matrices_the_one_that_is_set_counts(tmp_path, labels, sform, qform):
     wrong = np.diag([3.0, 3.0, 3.0, 1.0])
@@ -109,7 +104,6 @@ def with_slope(path, labels, slope, kind):
     nib.save(image, path)
 
 
-@pytest.mark.fault(63)
 @pytest.mark.parametrize(
     ("name", "make", "off"),
     [
@@ -127,7 +121,6 @@ def test_labels_that_their_storage_moved_are_rounded_with_a_warning(tmp_path, la
     assert warnings == ([] if off is None else [Facts(tmp_path / name, off)])
 
 
-@pytest.mark.fault(64)
 @pytest.mark.parametrize(("name", "flips"), [("a.nii.gz", 150), ("a.img.gz", 20), ("a.hdr.gz", 20), ("a.mgz", 20)])
 def test_a_flipped_bit_of_a_compressed_volume_changes_no_label(tmp_path, name, flips):
     shipped = SHIPPED / "atlases" / "spina-bifida" / "fetal_SB_atlas_GA21_notoperated" / "parcellation.nii.gz"
@@ -160,7 +153,6 @@ def test_further_members_and_bytes_of_gzip_are_taken_as_gzip_does(tmp_path, labe
     assert [record.getMessage() for record in caplog.records] == [Facts(tmp_path / "b.nii.gz")]
 
 
-@pytest.mark.fault(6, 13, 43)
 @pytest.mark.parametrize(
     ("name", "make", "facts"),
     [
@@ -215,7 +207,6 @@ def test_files_of_other_formats_are_named_with_what_to_do(tmp_path, name):
         read_label_volume(tmp_path / name)
 
 
-@pytest.mark.fault(1)
 def test_a_volume_of_numbers_keeps_fractions_nan_and_its_oblique_affine(tmp_path):
     values = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
     values[0, 0, 0] = np.nan

@@ -141,7 +141,6 @@ def test_the_page_has_its_parts_and_asks_for_nothing_from_elsewhere():
     assert "absent" not in text
 
 
-@pytest.mark.fault(61)
 def test_what_a_user_has_written_is_shown_as_text(monkeypatch):
     script = "<script>alert(1)</script><img src=x onerror=alert(1)>"
     monkeypatch.setitem(BRAINS[0], "population", script)
@@ -318,7 +317,6 @@ def test_a_run_is_judged_and_scored_at_its_last_compared_week():
         (1, (2.3, 1.96), [["2.3 linear"]]),
     ],
 )
-@pytest.mark.fault(84)
 def test_a_run_is_judged_by_the_elements_through_its_cortex(order, through, facts):
     # to its end, with so many elements before its steps of half a week and in them
     steps = pd.DataFrame({"week": 21.5 + 0.5 * np.arange(len(through)), "elements_through_cortex": through})

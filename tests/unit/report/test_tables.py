@@ -125,7 +125,6 @@ def test_parameters_that_one_run_lacks_and_another_leaves_off_are_no_difference_
     assert table["measured"].tolist() == [Facts(89.92, "21.0 GW", 143.3, "25.25 GW"), "2·10⁻⁷"]
 
 
-@pytest.mark.fault(23)
 def test_the_quality_of_a_mesh_stands_beside_its_limits():
     quality = {"tets": 3072, "min_radius_ratio": 0.125, "surface_distance_mm": {"hausdorff99": 0.0625}}
     html = html_table(mesh_quality_table({"a": quality}, {"min_radius_ratio": 0.02, "max_surface_distance_mm": 0.1}))

@@ -19,7 +19,6 @@ from gyriflow.study import resolve
 from gyriflow.study.loading import load
 
 
-@pytest.mark.fault(27)
 def test_all_mistakes_are_named_at_once():
     wrong = study(folding={"end_week": 20, "poisson_ratio": 0.5, "thicknes_mm": 2}, metric={}, start="a")
     assert problems(wrong) == [
@@ -36,7 +35,6 @@ def test_all_mistakes_are_named_at_once():
     assert refusal(wrong).splitlines()[-1] != refusal(across).splitlines()[-1] == Facts("config/README.md")
 
 
-@pytest.mark.fault(28, 29)
 @pytest.mark.parametrize(
     ("folding", "key", "facts"),
     [

@@ -146,7 +146,6 @@ CROSS_SECTION, ONE_SUBJECT = [{}, {}, {}], [{"subject": "s"}] * 3
 COHORT = {"growth": {"brains": {"cohort": ["all"]}}}
 
 
-@pytest.mark.fault(73)
 @pytest.mark.parametrize(
     ("keys", "changes", "names"),
     [
