@@ -53,7 +53,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "core_growth_rate_per_s": 0.0,
         "stress_memory_gw": 0.0,
         "support": "ellipsoid",
-        "contact": {"kind": "planes", "penalty_pa_per_m": 5.0e5},
+        "contact": {"kind": "planes"},
         "no_growth": {"kind": "ellipsoid", "shift": [0.05, -0.15], "semi_axes": [0.35, 0.40, 0.50]},
     },
     # growth towards the shapes that were measured on the brain's own series

@@ -81,9 +81,6 @@ class MetricsSettings(Settings):
     norms: InputFile | None = None
     """Norms of another study's cohort, its `results/study/norms.json`, instead of those of the observed brains. They
     must be made with the same settings."""
-    colour_by: str | None = None
-    """Covariate that is shown by colour in charts of measured brains. `null`: the first with 2 to 6 values and fewer
-    values than subjects."""
     regions: dict[str, GivenRegions] = Field({})
     """Regions of the cortex by the id of the brain on which they are given. They are carried to other observed brains
     by registration, to simulated ones by the tissue."""

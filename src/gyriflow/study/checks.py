@@ -29,7 +29,7 @@ from ..settings.runs import (
     starts_of,
     variants,
 )
-from ..settings.terms import AMPLITUDE, MAX_COLOURS, MEASURED, STIFFNESS_RATIO
+from ..settings.terms import AMPLITUDE, MEASURED, STIFFNESS_RATIO
 from ..settings.varying import Varying
 from ..version import RELEASE
 from .atlases import used_atlases
@@ -215,12 +215,6 @@ def metrics(config: Config) -> Iterator[KeyProblem]:
     if settings.norms is not None:
         for problem in _norms_problems(settings.norms, norm_settings(config)):
             yield KeyProblem(problem, ("metrics", "norms"))
-    values = {brain.covariates.get(settings.colour_by or "") for brain in config.brains} - {None}
-    if settings.colour_by and not 1 < len(values) <= MAX_COLOURS:
-        yield KeyProblem(
-            f"found {len(values)} values of {settings.colour_by!r}; colours can show 2 to {MAX_COLOURS}",
-            ("metrics", "colour_by"),
-        )
     yield from _unknown(settings.regions, config, ("metrics", "regions"))
     yield from _unknown([settings.template] if settings.template else (), config, ("metrics", "template"))
     # regions are carried, and their asymmetry measured, on both hemispheres together

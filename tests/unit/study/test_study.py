@@ -11,6 +11,7 @@ from shapes import sphere
 from gyriflow.errors import InputError
 from gyriflow.io.surfaces import write_surface
 from gyriflow.io.yaml_files import read_yaml
+from gyriflow.settings import ensemble
 from gyriflow.study import resolve
 from gyriflow.study.figures import figures_of
 from gyriflow.study.loading import load
@@ -325,8 +326,9 @@ def test_members_of_an_ensemble_share_what_is_equal_and_vary_the_rest(of_two, la
     ]
 
 
-def test_the_age_of_a_member_stays_within_its_atlas(of_two):
-    run = {"preset": "expected", "ensemble": {"members": 6, "age_sd_gw": 2}}
+def test_the_age_of_a_member_stays_within_its_atlas(of_two, monkeypatch):
+    monkeypatch.setattr(ensemble, "AGE_SD_GW", 2.0)
+    run = {"preset": "expected", "ensemble": 6}
     # the start is a week before the atlas, which ends with the run
     found = study(of_two(21, 24, atlas=(22, 23, 24)), runs={"a": run})
     chains = [found.chains["own21", f"atlas.a-member-{number}"] for number in range(1, 7)]
