@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import optuna
 import pandas as pd
-from optuna.distributions import FloatDistribution
+from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.trial import FrozenTrial, TrialState, create_trial
 from scipy.stats import qmc
 
@@ -52,7 +52,9 @@ def next_round(runs: pd.DataFrame, bounds: Bounds, count: int, seed: int) -> pd.
     # another seed each round, or the same places would be drawn again
     sampler = optuna.samplers.TPESampler(seed=seed + len(runs), n_startup_trials=1)
     search = optuna.create_study(sampler=sampler)
-    distributions = {name: FloatDistribution(*limits) for name, limits in bounds.items()}
+    distributions: dict[str, BaseDistribution] = {}
+    for name, (low, high) in bounds.items():
+        distributions[name] = FloatDistribution(low, high)
     for run in runs.to_dict("records"):
         search.add_trial(_trial(run, distributions))
     proposed = []
@@ -61,12 +63,12 @@ def next_round(runs: pd.DataFrame, bounds: Bounds, count: int, seed: int) -> pd.
     return _rounded(pd.DataFrame(proposed, columns=list(bounds)), bounds)
 
 
-def _trial(run: Mapping[Any, Any], distributions: Mapping[str, FloatDistribution]) -> FrozenTrial:
+def _trial(run: Mapping[Any, Any], distributions: dict[str, BaseDistribution]) -> FrozenTrial:
     """Return a run as optuna's trial: finished, or pruned, which counts as worse than all finished ones."""
     parameters = {name: run[name] for name in distributions}
     if np.isnan(run["score"]):
-        return create_trial(state=TrialState.PRUNED, params=parameters, distributions=dict(distributions))
-    return create_trial(value=run["score"], params=parameters, distributions=dict(distributions))
+        return create_trial(state=TrialState.PRUNED, params=parameters, distributions=distributions)
+    return create_trial(value=run["score"], params=parameters, distributions=distributions)
 
 
 def _rounded(values: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
@@ -98,7 +100,7 @@ def find_optimum(runs: pd.DataFrame, bounds: Bounds) -> pd.DataFrame:
     if no run has a score.
     """
     require_finished(runs)
-    best = runs.loc[runs["score"].idxmin()]
+    best = runs.iloc[int(np.nanargmin(runs["score"].to_numpy(dtype=float)))]
     rows = []
     for name, (low, high) in bounds.items():
         value = best[name]
